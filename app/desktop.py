@@ -117,7 +117,7 @@ def open_files(window: MainWindow, files: Sequence[Path]) -> None:
 def screen() -> Iterator[None]:
     """Raise an InputError where Qt would abort: no display, or one that does not respond.
 
-    The connection to the display is held while Qt makes its own. An X server without a desktop
+    The connection to the display stays open while Qt opens its own. An X server without a desktop
     restarts when its last client disconnects, and accepts no connection meanwhile.
 
     Raises

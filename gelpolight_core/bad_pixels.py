@@ -20,12 +20,12 @@ Mask = NDArray[np.bool_]
 LEAST_STEP = 0.03
 """A bad pixel differs from its neighbours by this share of full scale at least."""
 OF_SPREAD = 1.5
-"""... and by so many times what these differ among themselves."""
+"""... and by this multiple of the difference between these."""
 LINE_SHARE = 0.5
 """A column (row) is bad where at least this share of its pixels differs from both sides."""
 ACROSS, DOWN = 1, 2
 REACH = 12
-"""Pixels to the nearest good one beyond which a bad pixel is no single pixel or line."""
+"""Distance to the nearest good pixel above which bad pixels are not single pixels or lines."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class BadPixels:
     width: int
 
     def __post_init__(self) -> None:
-        """Refuse places that no image has."""
+        """Refuse positions outside the image."""
         p = self.pixels
         if p.ndim != 2 or p.shape[1] != 2 or p.dtype != np.int32:
             raise ValueError(f"bad pixels of shape {p.shape}, {p.dtype}")
@@ -66,7 +66,7 @@ class BadPixels:
 
     @cached_property
     def _sources(self) -> tuple[Pixels, Pixels]:
-        """Return rows and columns (2, N) of the two good pixels that a bad one is replaced by."""
+        """Return rows and columns (2, N) of the two good pixels that replace a bad one."""
         rows, columns = (np.ascontiguousarray(p, np.int64) for p in self.pixels.T)
         best = np.full(rows.size, np.iinfo(np.int64).max)
         found = [np.stack([rows, rows]), np.stack([columns, columns])]
@@ -74,7 +74,7 @@ class BadPixels:
         for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
             before = self._nearest(rows, columns, -down, -across)
             after = self._nearest(rows, columns, down, across)
-            # At the border the pixel's only good side counts twice.
+            # At the border, the only good side of the pixel counts twice.
             one, other = np.where(before > 0, -before, after), np.where(after > 0, after, -before)
             span = np.where((before > 0) & (after > 0), before + after, 4 * REACH)
             span[(before == 0) & (after == 0)] = np.iinfo(np.int64).max
@@ -88,7 +88,7 @@ class BadPixels:
     def _nearest(
         self, rows: NDArray[np.int64], columns: NDArray[np.int64], down: int, across: int
     ) -> NDArray[np.int64]:
-        """Return how many steps away the nearest good pixel is; 0 where there is none."""
+        """Return the distance of the nearest good pixel in steps; 0 if there is none."""
         steps = np.zeros(rows.size, np.int64)
         for n in range(REACH, 0, -1):
             r, c = rows + n * down, columns + n * across
@@ -104,7 +104,7 @@ class BadPixels:
         Parameters
         ----------
         image : (height, width, 3)
-            Any numbers; it is not changed. Returned as it is where no pixel is bad.
+            Any number type; it is not changed. The same image is returned if no pixel is bad.
         """
         if not self.pixels.size:
             return image
@@ -112,7 +112,7 @@ class BadPixels:
         (row, other_row), (column, other_column) = self._sources
         first, second = image[row, column], image[other_row, other_column]
         mean = 0.5 * first + 0.5 * second
-        # As the arrays' own kind: whole numbers are rounded.
+        # In the type of the array: integers are rounded.
         mean = np.rint(mean) if image.dtype.kind == "u" else mean
         whole[self.pixels[:, 0], self.pixels[:, 1]] = mean.astype(image.dtype)
         return whole
@@ -126,7 +126,7 @@ def no_bad_pixels(height: int, width: int) -> BadPixels:
 def find_bad_pixels(images: list[NDArray[np.float32]], *, noise: float) -> BadPixels:
     """Return the pixels and lines that differ from their neighbours in each image.
 
-    Dirt differs too, but in one scene only; and it covers more than a pixel.
+    Dirt differs, too, but in one scene only, and it covers more than a pixel.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def find_bad_pixels(images: list[NDArray[np.float32]], *, noise: float) -> BadPi
 def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
     """Return the columns of `marks` most of whose pixels differ from both neighbours.
 
-    Neighbouring bad lines would be texture: a camera's are single.
+    Neighbouring bad lines would be texture: the bad lines of a camera are single.
     """
     if not marks.any():
         return np.zeros(0, np.intp)

@@ -19,13 +19,13 @@ LEAST_LIGHT = 0.01
 DARK_COSINE = 0.03
 """A channel whose light falls on the surface at a smaller cosine is in shadow."""
 DARK_SIGMAS = 4.0
-"""A channel within so many standard deviations of no light is dark ..."""
+"""A channel within this number of standard deviations of no light is dark ..."""
 DARK_SHARE = 0.15
-"""... but not if it has this share of the flat membrane's light, however noisy it is."""
+"""... but not if it has this share of the flat membrane's light, for any noise."""
 CONTACT_CHANGE = 5e-3
 """A contact changes the light by more than this share; less is below half a degree of slope."""
 CONTACT_SIGMAS = 5.0
-"""A contact changes the light by more than so many standard deviations of its noise."""
+"""A contact changes the light by more than this number of standard deviations of its noise."""
 
 
 def saturated(light: NDArray[np.floating[Any]]) -> Mask:
@@ -54,9 +54,9 @@ def usable(
 
 
 def throws_light(valid: Mask, background: NDArray[np.floating[Any]]) -> Mask:
-    """Return the nodes (rows, columns) that throw light onto other parts of the membrane.
+    """Return the nodes (rows, columns) that reflect light onto other parts of the membrane.
 
-    Other than :func:`usable` nodes, they may be saturated or lack a channel: only holes throw none.
+    Unlike :func:`usable` nodes, they can be saturated or lack a channel: only holes reflect none.
 
     Parameters
     ----------

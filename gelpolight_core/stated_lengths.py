@@ -1,9 +1,8 @@
 """Tolerances of the lengths that the user states, and their effect on all results.
 
-No image shows errors that are so small. The board on the top surface is seen in air: its squares
-give the surface's distance. Under the elastomer the surface then appears nearer, by what thickness
-and index say, and lengths across follow the distance at which it appears. Slopes follow the ball
-radii.
+No image shows such a small error. The board on the top surface is seen in air: its squares give the
+distance of the surface. Through the elastomer, the surface appears nearer, depending on thickness
+and index. Lateral lengths are proportional to this apparent distance, and slopes to the ball radii.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ class StatedSd(NamedTuple):
     Attributes
     ----------
     depth : float
-        Of depths, on slopes that balls show.
+        Of depths, on slopes that occur on the balls.
     lateral : float
-        Of lengths across.
+        Of lateral lengths.
     """
 
     depth: float
@@ -43,7 +42,7 @@ class StatedSd(NamedTuple):
 
 
 def stated_sd(stack: LayerStack) -> StatedSd:
-    """Return what the tolerances of the stated lengths do.
+    """Return the standard deviations by the tolerances of the stated lengths.
 
     Parameters
     ----------

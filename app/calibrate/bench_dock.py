@@ -31,7 +31,7 @@ class BenchDock(QDockWidget):
         self._area = BenchArea(source)
         self.setWidget(self._area)
         self._tried = 0
-        self._held: tuple[float, float] | None = None
+        self._grab_offset: tuple[float, float] | None = None
         self.hide()
 
     @property
@@ -80,8 +80,10 @@ class BenchDock(QDockWidget):
             return
         if phase == "begin":
             scene = bench.scene
-            self._held = scene.x_mm - position[0], scene.y_mm - position[1]
-        elif self._held is not None:
-            bench.arrange(x_mm=position[0] + self._held[0], y_mm=position[1] + self._held[1])
+            self._grab_offset = scene.x_mm - position[0], scene.y_mm - position[1]
+        elif self._grab_offset is not None:
+            bench.arrange(
+                x_mm=position[0] + self._grab_offset[0], y_mm=position[1] + self._grab_offset[1]
+            )
             if phase == "end":
-                self._held = None
+                self._grab_offset = None

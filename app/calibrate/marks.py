@@ -13,7 +13,7 @@ from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.raw_positions import rim_px, seen_at
+from gelpolight_core.optics.raw_positions import boundary_px, seen_at
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.translation import tr
@@ -42,7 +42,7 @@ def board_corners(view: BoardView) -> tuple[Marker, ...]:
 
 
 def foot_point(camera: Camera, plane: TopPlane) -> Marker:
-    """Return where the origin of the sensor frame is seen, in air."""
+    """Return the pixel of the origin of the sensor frame, in air."""
     u, v = camera.project(plane.origin_camera_mm)
     return Marker(float(u), float(v), "ring", "info", text=tr("origin"))
 
@@ -91,9 +91,9 @@ def spot_mask(rgb: NDArray[np.generic], spot: Spot, role: Role) -> Mask:
     return Mask(area, role)
 
 
-def working_rim(table: ResamplingTable) -> Line:
+def working_circle(table: ResamplingTable) -> Line:
     """Return the border of the working area, in the raw image."""
-    return Line(rim_px(table), "info", closed=True)
+    return Line(boundary_px(table), "info", closed=True)
 
 
 def ball_contour(press: BallPress, table: ResamplingTable) -> tuple[Line, ...]:
@@ -114,8 +114,8 @@ def ball_handle(press: BallPress, table: ResamplingTable) -> Circle | None:
     centre = np.asarray(found.centre)
     across = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     middle = seen_at(table, centre[None])
-    rim = seen_at(table, centre + found.contact_radius_px * across)
-    if len(middle) == 0 or len(rim) == 0:
+    edge = seen_at(table, centre + found.contact_radius_px * across)
+    if len(middle) == 0 or len(edge) == 0:
         return None
-    radius = float(np.mean(np.linalg.norm(rim - middle[0], axis=1)))
+    radius = float(np.mean(np.linalg.norm(edge - middle[0], axis=1)))
     return Circle(float(middle[0, 0]), float(middle[0, 1]), radius, "good", handle="ball")

@@ -22,7 +22,7 @@ The mirror spots are not compared with other stages and need a shorter exposure.
 
 
 class SetupCamera(QObject):
-    """Shows in the set-up form how the camera is set, and opens its settings.
+    """Shows the camera settings in the set-up form, and opens the settings dialog.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class SetupCamera(QObject):
         show_settings_of_source(self._context, self._setup)
 
     def show(self) -> None:
-        """Show in the set-up form how the camera is set."""
+        """Show the camera settings in the set-up form."""
         info = self._context.source.info
         camera = self._context.cameras.of(info)
         if camera is None:
@@ -66,9 +66,11 @@ class SetupCamera(QObject):
             text, role = tr("{name}: set and lock the camera before the first image."), "text"
             text = text.format(name=name)
         else:
-            held = is_locked(state.controls) and bool(state.controls)
-            role = "text" if held else "warn"
-            text = tr("{name}: {format}, locked.") if held else tr("{name}: {format}, not locked.")
+            locked = is_locked(state.controls) and bool(state.controls)
+            role = "text" if locked else "warn"
+            text = (
+                tr("{name}: {format}, locked.") if locked else tr("{name}: {format}, not locked.")
+            )
             text = text.format(name=name, format=state.format)
         self._setup.show_camera(text, role, settable=True)
 

@@ -1,4 +1,4 @@
-"""What a step of the wizard is: its data, and the presenter that each step's folder supplies."""
+"""The base class of the steps of the wizard, and what they share."""
 
 from __future__ import annotations
 

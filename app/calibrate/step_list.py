@@ -55,7 +55,7 @@ class StepList(QListWidget):
         item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
 
     def go_to(self, row: int) -> None:
-        """Mark a step as the open one; this is no choice of the user."""
+        """Mark a step as the open one, without emitting `chosen`."""
         with QSignalBlocker(self):
             self.setCurrentRow(row)
 

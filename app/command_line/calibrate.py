@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def in_place_lines(result: InPlaceRun) -> list[str]:
-    """Return which model was chosen, what it cannot know, and the presses that were left out."""
+    """Return the chosen model, its unknown quantities, and the presses that were left out."""
     lines = [
         tr("model: in-place (closed sensor: background and balls only)"),
         tr("not known: {what}").format(what=", ".join(UNKNOWN)),

@@ -79,9 +79,9 @@ def _lines(
         lines.append(f"  {warning}")
     for c in controls:
         extent = tr("{low:g} to {high:g}").format(low=c.low, high=c.high)
-        held = "" if c.writable else tr("  (set by the camera)")
+        remark = "" if c.writable else tr("  (set by the camera)")
         value = f"{c.value:g} {c.unit}".rstrip()
-        lines.append(f"    {c.key:<22}{c.label:<30}{value:>10}  {extent}{held}".rstrip())
+        lines.append(f"    {c.key:<22}{c.label:<30}{value:>10}  {extent}{remark}".rstrip())
     if not controls:
         lines.append(
             tr(

@@ -68,7 +68,7 @@ def _table(rows: list[tuple[str, str]]) -> str:
 
 
 def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
-    """Return what a closed sensor's calibration holds."""
+    """Return the content of a closed sensor's calibration."""
     grid, model = c.in_place.grid, c.in_place
     return [
         (tr("calibration"), c.identity),

@@ -123,7 +123,7 @@ def _measured(
 
 
 def _named(error: InputError, image: Path) -> str:
-    """Return an error's text, with the image's name where it does not name it."""
+    """Return the text of an error; the name of the image is added if it is missing."""
     return str(error) if str(image) in str(error) else f"{image}: {error}"
 
 

@@ -51,9 +51,8 @@ def add_effort(parser: argparse.ArgumentParser) -> None:
         choices=EFFORTS,
         default=EFFORTS[-1],
         help=tr(
-            "effort of the full model: best solves the whole field at full scale "
-            "(default); balanced does what the image needs, at half scale; fast at "
-            "quarter scale"
+            "effort of the full model, which solves the pressed region: best at full scale "
+            "(default), balanced at half scale, fast at quarter scale"
         ),
     )
 

@@ -1,1 +1,1 @@
-"""What a page is given: settings, source, calibration library and messages."""
+"""The context of a page: settings, source, calibration library and messages."""

@@ -6,7 +6,7 @@ from app.workspace.gel_care import GelCare
 from gelpolight_core.translation import tr
 
 LEAST_S = 0.1
-"""Shorter recovery times are not told apart: a few frames pass meanwhile."""
+"""Shorter recovery times cannot be distinguished: they are only a few frames."""
 
 
 def care_lines(care: GelCare) -> tuple[str, ...]:

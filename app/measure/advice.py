@@ -7,7 +7,7 @@ from gelpolight_core.translation import tr
 
 
 def measuring_advice(
-    now: LiveState, *, held: bool, refused: str, notes: tuple[str, ...] = ()
+    now: LiveState, *, frozen: bool, refused: str, notes: tuple[str, ...] = ()
 ) -> Advice:
     """Return what to do next.
 
@@ -15,7 +15,7 @@ def measuring_advice(
     ----------
     now : LiveState
         State of the live image.
-    held : bool
+    frozen : bool
         Whether an image is frozen or was opened, independent of the camera.
     refused : str
         Why that image cannot be measured. Empty if it can.
@@ -23,12 +23,12 @@ def measuring_advice(
         Messages of its reconstruction.
     """
     live = advise(now)
-    if now.used is None and (held or not now.kind):
+    if now.used is None and (frozen or not now.kind):
         if now.reading:
             return preparing()
         text = tr("No calibration is in use. Depth cannot be measured without one.")
         return Advice(text, "sensors", tr("Choose or calibrate a sensor"), usable=False)
-    if held:
+    if frozen:
         if refused:
             return Advice(refused, "live", tr("Back to the camera"), "fail", live.usable)
         text = " ".join(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in notes)

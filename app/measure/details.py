@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QStackedWidget, QTabWidget, QWidget
 from app.live.frame_results import Shown
 from app.live.image_view import ImageView
 from app.live.overlay import Line, Overlay, Role
-from app.measure.measuring import Answer
+from app.measure.measuring import ImageResults
 from app.measure.solid import solid_of
 from app.measure.tool_layer import COLOURS, DrawnTool
 from app.services.jobs import Jobs
@@ -43,7 +43,7 @@ ROLES: dict[str, Role] = {"ok": "good", "doubtful": "expected", "refused": "bad"
 
 
 class Details(QTabWidget):
-    """Shows what the map cannot show. Only the visible view is updated.
+    """Section, 3D view and camera image next to the map. Only the visible view is updated.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Details(QTabWidget):
         named(self, "measure.details", tr("Section, 3D and camera"))
         self.setDocumentMode(True)
         self.setMinimumHeight(HEIGHT)
-        self._answer: Answer | None = None
+        self._image_results: ImageResults | None = None
         self._calibration: Calibration | None = None
         self._pixel_map: PixelMap | None = None
         self._drawn: tuple[DrawnTool, ...] = ()
@@ -110,28 +110,29 @@ class Details(QTabWidget):
     def use(self, calibration: Calibration | None) -> None:
         """Use this calibration to draw tools in the camera image. The previous depth is cleared."""
         self._calibration, self._pixel_map = calibration, None
-        self._answer = None
+        self._image_results = None
         self.surface.show_surface(None)
 
     # What is shown
 
     def show_live(self, shown: Shown) -> None:
         """Show a frame while no image is frozen."""
-        self._answer = None
+        self._image_results = None
         if self.wants_surface and shown.surface is not None:
             self.surface.show_surface(shown.surface)
         if self.wants_camera and shown.camera is not None:
             rows, columns = shown.frame.rgb.shape[:2]
             self.camera.show_rgb(shown.camera, size=(columns, rows))
 
-    def show_answer(self, answer: Answer | None) -> None:
+    def show_results(self, image_results: ImageResults | None) -> None:
         """Show a frozen image."""
-        if answer is not None and (
-            self._answer is None or answer.heightmap is not self._answer.heightmap
+        if image_results is not None and (
+            self._image_results is None
+            or image_results.heightmap is not self._image_results.heightmap
         ):
-            self._answer = answer
-            self.show_held()
-        self._answer = answer
+            self._image_results = image_results
+            self.show_frozen()
+        self._image_results = image_results
 
     def show_tools(self, drawn: tuple[DrawnTool, ...], chosen: int) -> None:
         """Show the tools as on the map."""
@@ -154,7 +155,7 @@ class Details(QTabWidget):
             self._measurement = measurement
             self.surface.show_solid(None if measurement is None else partial(solid_of, measurement))
             if self._colour_by == "residual":
-                self.show_held()
+                self.show_frozen()
         profile = found.profile if isinstance(found, ToolResult) else self._cut(tool)
         self.section.setCurrentWidget(self._words if profile is None else self.plot)
         self.plot.show_profiles({} if profile is None else {1: profile})
@@ -169,11 +170,11 @@ class Details(QTabWidget):
 
     def _cut(self, tool: Tool | None) -> Profile | None:
         """Return the section of a tool that could not measure, to show the reason."""
-        if self._answer is None or not isinstance(tool, ProfileWidth):
+        if self._image_results is None or not isinstance(tool, ProfileWidth):
             return None
         try:
             return take_profile(
-                self._answer.heightmap, tool.start_mm, tool.end_mm, width_mm=tool.width_mm
+                self._image_results.heightmap, tool.start_mm, tool.end_mm, width_mm=tool.width_mm
             )
         except InputError:
             return None  # the message is next to the map
@@ -184,23 +185,23 @@ class Details(QTabWidget):
 
     def _on_tab(self) -> None:
         self.wanted_changed.emit()
-        self.show_held()
+        self.show_frozen()
         self.show_tools(self._drawn, self._chosen)
 
-    def show_held(self) -> None:
+    def show_frozen(self) -> None:
         """Show the frozen image in the visible view."""
-        answer = self._answer
-        if answer is None:
+        image_results = self._image_results
+        if image_results is None:
             return
         if self.wants_surface:
-            self.surface.show_surface(self._held_surface(answer))
+            self.surface.show_surface(self._frozen_surface(image_results))
         if self.wants_camera:
-            shown = np.clip(255.0 * answer.linear + 0.5, 0.0, 255.0)
+            shown = np.clip(255.0 * image_results.linear + 0.5, 0.0, 255.0)
             self.camera.show_rgb(shown.astype(np.uint8))
 
-    def _held_surface(self, answer: Answer) -> Surface | None:
+    def _frozen_surface(self, image_results: ImageResults) -> Surface | None:
         """Return the surface of the frozen image, coloured by depth or fit residual."""
-        image, heightmap = answer.map_image, answer.heightmap
+        image, heightmap = image_results.map_image, image_results.heightmap
         rgb, scale = image.rgb, depth_scale(Display().colours, image.range_mm)
         if self._colour_by == "residual" and self._measurement is not None:
             residual = fit_residual(heightmap, self._measurement)
@@ -213,7 +214,7 @@ class Details(QTabWidget):
     def _on_colour(self, quantity: str) -> None:
         self._colour_by = quantity
         self.surface.menu.set_colours(_quantities(), quantity)
-        self.show_held()
+        self.show_frozen()
 
     def _mark_camera(self) -> None:
         width, height = self.camera.image_size
@@ -232,7 +233,7 @@ class Details(QTabWidget):
             return np.empty((0, 2))
         if self._pixel_map is None:
             self._pixel_map = PixelMap(self._calibration.table)
-        depth = None if self._answer is None else self._answer.heightmap.depth_mm
+        depth = None if self._image_results is None else self._image_results.heightmap.depth_mm
         found = [self._pixel_map.pixel_of(float(x), float(y), depth) for x, y in along(line)]
         return np.array([pixel for pixel in found if pixel is not None]).reshape(-1, 2)
 

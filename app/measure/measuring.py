@@ -83,7 +83,7 @@ def _linear(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Question:
+class MeasureRequest:
     """What to measure.
 
     Attributes
@@ -108,7 +108,7 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
+class ImageResults:
     """The results.
 
     Attributes
@@ -133,9 +133,9 @@ class Answer:
 
 
 class Measuring:
-    """Answers questions, and keeps what does not change between them.
+    """Answers requests, and keeps what does not change between them.
 
-    Used by one thread at a time. None instead of a question clears all kept data.
+    Used by one thread at a time. None instead of a request clears all kept data.
     """
 
     def __init__(self) -> None:
@@ -147,7 +147,7 @@ class Measuring:
         self._shown: tuple[HeightMap, MapImage, NDArray[np.float32]] | None = None
         self._results: dict[Tool, ToolResult | str] = {}
 
-    def __call__(self, question: Question | None) -> Answer | None:
+    def __call__(self, request: MeasureRequest | None) -> ImageResults | None:
         """Measure.
 
         Raises
@@ -155,39 +155,39 @@ class Measuring:
         InputError
             If the image cannot be used, or does not fit the calibration's sensor or size.
         """
-        if question is None:
+        if request is None:
             self._forget()
             return None
-        heightmap, shown, linear = self._depth_of(question)
+        heightmap, shown, linear = self._depth_of(request)
         results = {}
-        for item in question.sheet.items:
+        for item in request.sheet.items:
             if item.tool not in self._results:
                 self._results[item.tool] = apply_tool(item.tool, heightmap)
             results[item.key] = self._results[item.tool]
-        proposal = propose(heightmap) if question.propose else None
-        return Answer(heightmap, shown, linear, MappingProxyType(results), proposal)
+        proposal = propose(heightmap) if request.propose else None
+        return ImageResults(heightmap, shown, linear, MappingProxyType(results), proposal)
 
-    def _depth_of(self, question: Question) -> tuple[HeightMap, MapImage, NDArray[np.float32]]:
-        reconstructor = self._reconstructor_for(question)
-        if question.image is not self._image or self._shown is None:
+    def _depth_of(self, request: MeasureRequest) -> tuple[HeightMap, MapImage, NDArray[np.float32]]:
+        reconstructor = self._reconstructor_for(request)
+        if request.image is not self._image or self._shown is None:
             self._image = None
-            _require_sensor(question.image, question.calibration)
-            image = question.image.image(question.calibration.response)
-            name = question.image.name
+            _require_sensor(request.image, request.calibration)
+            image = request.image.image(request.calibration.response)
+            name = request.image.name
             heightmap = measurable_depth(reconstructor, image.rgb, name=name)
             self._shown = heightmap, map_image(heightmap, Display()), image.rgb
-            self._image, self._results = question.image, {}
+            self._image, self._results = request.image, {}
         return self._shown
 
-    def _reconstructor_for(self, question: Question) -> Reconstructor:
+    def _reconstructor_for(self, request: MeasureRequest) -> Reconstructor:
         """Return its own reconstructor, because that of another thread must not be shared."""
         known = self._reconstructor
         if (
             known is None
-            or known.calibration is not question.calibration
-            or known.model != question.model
+            or known.calibration is not request.calibration
+            or known.model != request.model
         ):
-            self._reconstructor = Reconstructor(question.calibration, model=question.model)
+            self._reconstructor = Reconstructor(request.calibration, model=request.model)
             self._image = None
         assert self._reconstructor is not None
         return self._reconstructor

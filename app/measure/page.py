@@ -104,7 +104,7 @@ class MeasurePage(QWidget):
 
     def _show_again(self) -> None:
         """Show the values in another unit."""
-        self.press_view.details.show_held()
+        self.press_view.details.show_frozen()
         self.press_view.work.image_changed.emit()
         self.press_view.work.changed.emit()
 

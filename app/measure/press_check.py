@@ -22,7 +22,7 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 
 TOLERANCE_MM = 1.5
-"""Allowed distance of an object from its position: what a hand without a guide achieves."""
+"""Allowed distance of an object from its position: the accuracy of placing by hand."""
 OUTLINE_POINTS = 72
 
 
@@ -119,7 +119,7 @@ def object_name(truth: Truth) -> str:
 
 @dataclass(frozen=True, slots=True)
 class PressSeen:
-    """What a frame shows of a press.
+    """Result of checking a frame of a press.
 
     Attributes
     ----------
@@ -127,13 +127,13 @@ class PressSeen:
         Marks on the image.
     sentence : str
         What to do.
-    held : bool
+    at_mark : bool
         Whether the object is pressed in at its position.
     """
 
     overlay: Overlay
     sentence: str
-    held: bool = False
+    at_mark: bool = False
 
 
 class PressCheck:
@@ -158,7 +158,7 @@ class PressCheck:
         self._target, self._bare = target, bare
 
     def __call__(self, rgb: NDArray[Any]) -> PressSeen:
-        """Return what a frame shows of the press."""
+        """Check a frame of the press."""
         target, bare = self._target, self._bare
         if rgb.shape != bare.shape or rgb.dtype != bare.dtype:
             text = tr("The size of the camera image has changed. Capture the bare membrane again.")
@@ -180,7 +180,7 @@ class PressCheck:
             )
             return PressSeen(target.overlay("bad"), text.format(away=away_mm))
         self.phase = "hold"
-        return PressSeen(target.overlay("good"), tr("Hold it still."), held=True)
+        return PressSeen(target.overlay("good"), tr("Hold it still."), at_mark=True)
 
 
 def _face(press: PressWanted) -> Array:

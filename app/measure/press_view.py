@@ -66,7 +66,7 @@ class PressView(PressViewFrame):
         self.restore()
 
     def _connect(self) -> None:
-        self.hold_pressed.connect(self.toggle_hold)
+        self.freeze_pressed.connect(self.toggle_freeze)
         self.open_pressed.connect(self.choose_file)
         self.propose_pressed.connect(self.propose)
         self.keep_pressed.connect(self.keep)
@@ -85,7 +85,7 @@ class PressView(PressViewFrame):
         self.work.busy_changed.connect(self._advise)
         self.work.refused.connect(self._on_refused)
         self.work.proposed.connect(self._on_proposed)
-        self.map.hold_wanted.connect(lambda: self.hold(True))
+        self.map.freeze_wanted.connect(lambda: self.freeze(True))
         self.map.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         panel = self.panel
         panel.propose_wanted.connect(self.propose)
@@ -170,14 +170,14 @@ class PressView(PressViewFrame):
 
     # Live and frozen
 
-    def toggle_hold(self) -> None:
+    def toggle_freeze(self) -> None:
         """Freeze the image, or continue."""
         if self.work.image is None:
-            self.hold()
+            self.freeze()
         else:
             self.release()
 
-    def hold(self, by_hand: bool = True) -> None:
+    def freeze(self, by_hand: bool = True) -> None:
         """Freeze the shown image to measure on it."""
         shown = self._shown
         if self.work.image is None and shown is not None:
@@ -185,14 +185,14 @@ class PressView(PressViewFrame):
             name = tr("{camera}, {time:%H:%M:%S}").format(camera=self._camera(), time=now)
             image = MeasuredImage(name, frame=shown.frame, serial=self.live.serial)
             self._take(image, propose=not by_hand)
-        self._follow_hold()
+        self._follow_freeze()
 
     def release(self) -> None:
         """Continue with the live image."""
         self._steady.hold_off()
         self.work.take(None)
         self.live.pause(False)
-        self._follow_hold()
+        self._follow_freeze()
         if self.live.stream is None or not self.map.view.has_image:
             self._say_what_comes()
 
@@ -204,7 +204,7 @@ class PressView(PressViewFrame):
         self.work.take(image, propose=propose)
         if image.path is not None:
             self._say_what_comes()
-        self._follow_hold()
+        self._follow_freeze()
 
     def _say_what_comes(self) -> None:
         """Show a text instead of the map."""
@@ -214,10 +214,10 @@ class PressView(PressViewFrame):
         else:
             self.map.say(tr("Reconstructing {name}…").format(name=image.name))
 
-    def _follow_hold(self) -> None:
-        held = self.work.image is not None
-        self.hold_action.setChecked(held)
-        self.hold_action.setText(tr("Frozen") if held else tr("Freeze"))
+    def _follow_freeze(self) -> None:
+        frozen = self.work.image is not None
+        self.freeze_action.setChecked(frozen)
+        self.freeze_action.setText(tr("Frozen") if frozen else tr("Freeze"))
         self._refresh()
 
     def _on_live(self, shown: Shown) -> None:
@@ -226,15 +226,15 @@ class PressView(PressViewFrame):
         self.map.show_live(shown, Display())
         self.details.show_live(shown)
         heightmap = shown.heightmap
-        could, self._shown = self._can_hold, None if heightmap is None else shown
-        if could != self._can_hold:
+        could, self._shown = self._can_freeze, None if heightmap is None else shown
+        if could != self._can_freeze:
             self._refresh()
         if heightmap is None:
             return
         frame = shown.frame
         steady = self._steady.update(heightmap.depth_mm, frame.time_s, settled=frame.settled)
         if steady and self.auto.isChecked():
-            self.hold(by_hand=False)
+            self.freeze(by_hand=False)
 
     def _camera(self) -> str:
         info = self.context.source.info
@@ -245,7 +245,7 @@ class PressView(PressViewFrame):
     def propose(self) -> None:
         """Detect the pressed object."""
         if self.work.image is None:
-            self.hold(by_hand=False)
+            self.freeze(by_hand=False)
         else:
             self.work.propose()
 
@@ -284,16 +284,16 @@ class PressView(PressViewFrame):
         self.panel.truth.show_verdict(rows, self.work.result)
 
     def _refresh(self) -> None:
-        known = self.work.heightmap is not None or self._can_hold
+        known = self.work.heightmap is not None or self._can_freeze
         self.panel.show_work(self.work, known=known)
         self._show_details()
         self.map.tools.allow(known)
-        self.hold_action.setEnabled(self.work.image is not None or self._can_hold)
+        self.freeze_action.setEnabled(self.work.image is not None or self._can_freeze)
         self.judge_again()
         self._advise()
 
     def _show_details(self) -> None:
-        self.details.show_answer(self.work.answer)
+        self.details.show_results(self.work.image_results)
         self.details.show_result(self.work.tool, self.work.result)
 
     def _on_switched(self) -> None:
@@ -306,7 +306,7 @@ class PressView(PressViewFrame):
             self.release()
 
     @property
-    def _can_hold(self) -> bool:
+    def _can_freeze(self) -> bool:
         return self._shown is not None
 
     def _on_proposed(self, proposal: Proposal | None) -> None:
@@ -348,11 +348,11 @@ class PressView(PressViewFrame):
 
     def _advise(self) -> None:
         """Show what to do next."""
-        held = self.work.image is not None
-        heightmap = self.work.heightmap if held else None
+        frozen = self.work.image is not None
+        heightmap = self.work.heightmap if frozen else None
         notes = () if heightmap is None else heightmap.notes
         self.banner.advise(
-            measuring_advice(self.depth.state, held=held, refused=self._refused, notes=notes)
+            measuring_advice(self.depth.state, frozen=frozen, refused=self._refused, notes=notes)
         )
 
     def _on_act(self, name: str) -> None:

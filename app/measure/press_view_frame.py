@@ -51,11 +51,11 @@ class PressViewFrame(QMainWindow):
 
     Signals
     -------
-    hold_pressed(), open_pressed(), propose_pressed(), keep_pressed()
+    freeze_pressed(), open_pressed(), propose_pressed(), keep_pressed()
         A button or key of the toolbar was pressed.
     """
 
-    hold_pressed = Signal()
+    freeze_pressed = Signal()
     open_pressed = Signal()
     propose_pressed = Signal()
     keep_pressed = Signal()
@@ -119,11 +119,11 @@ class PressViewFrame(QMainWindow):
         bar = named(QToolBar(tr("Measure")), "measure.bar", tr("Measure"))
         bar.setMovable(False)
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self.hold_action = make_action(
-            self, "measure.hold", tr("Freeze"), self.hold_pressed.emit, keys=("Space",),
+        self.freeze_action = make_action(
+            self, "measure.hold", tr("Freeze"), self.freeze_pressed.emit, keys=("Space",),
             icon_name="hold", tip=tr("Freeze the image to measure on it, or continue (Space)"),
         )  # fmt: skip
-        self.hold_action.setCheckable(True)
+        self.freeze_action.setCheckable(True)
         open_action = make_action(
             self, "measure.open", tr("Open image…"), self.open_pressed.emit, keys=("Ctrl+P",),
             icon_name="folder", tip=tr("Measure on an image from a file (Ctrl+P)"),
@@ -148,7 +148,7 @@ class PressViewFrame(QMainWindow):
         bar.addWidget(self.box)
         bar.addWidget(self.validated)
         bar.addSeparator()
-        bar.addAction(self.hold_action)
+        bar.addAction(self.freeze_action)
         bar.addWidget(self.auto)
         bar.addSeparator()
         bar.addActions([undo, redo])

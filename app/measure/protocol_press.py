@@ -188,12 +188,12 @@ class PressingView(QWidget):
             return
         self.image.set_overlay(seen.detection.overlay)
         # Observations of the previous press do not apply to this one.
-        held = self._check.phase == "hold" and seen.detection.held
-        if self._must_move and held and not seen.moved:
+        at_mark = self._check.phase == "hold" and seen.detection.at_mark
+        if self._must_move and at_mark and not seen.moved:
             return
         self._must_move = False
-        self.panel.show_live(seen.detection.sentence, good=held)
-        if held and seen.still:
+        self.panel.show_live(seen.detection.sentence, good=at_mark)
+        if at_mark and seen.still:
             self.panel.show_live(tr("Steady. Capturing…"), good=True)
             self.capture()
 
@@ -207,7 +207,7 @@ class PressingView(QWidget):
         ready = self._bare is not None and press is not None
         self.panel.capture.setEnabled(ready)
         there = self.live.stream is not None
-        # It stays after the first time: if that was wrong, every press would be refused.
+        # It remains visible: with a wrong first image, every press would be refused.
         self.panel.bare.setVisible(press is not None)
         self.panel.bare.setEnabled(there)
         self.panel.bare.setText(
@@ -264,7 +264,7 @@ class PressingView(QWidget):
             self._tick.stop()
 
     def _move_hand(self) -> None:
-        """Do what a technician would do now."""
+        """Let the virtual bench do the next action of a technician."""
         press = self._work.run.next()
         if self._hand is None or press is None or self.live.capturing:
             if press is None:

@@ -47,7 +47,7 @@ def verdict_word(verdict: str) -> str:
 
 
 def shape_label(shape: str) -> str:
-    """Return the name of what was measured."""
+    """Return the name of the measured object or figure."""
     if shape == EVALUATION:
         return tr("Evaluation (mean errors)")
     return kind_label(shape.replace("_", "-"))

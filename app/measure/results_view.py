@@ -260,7 +260,7 @@ class ResultsView(QWidget):
 
 
 def _thing(record: MeasurementRecord) -> tuple[str, tuple[object, ...]]:
-    """Return what was measured. Measurements with equal results can be compared."""
+    """Return the measured object. Measurements of the same object can be compared."""
     truths = tuple(quantity.truth for quantity in record.quantities)
     return record.serial, (record.shape, *truths)
 

@@ -73,7 +73,7 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
         self._key = 0
         self._grips: tuple[Grip, ...] = ()
         self._grip = ""
-        self._held = ""
+        self._dragged = ""
         self._begun: tuple[Point, ...] = ()
 
     def show_tools(
@@ -128,15 +128,15 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
             if grip is None or event.button() != Qt.MouseButton.LeftButton:
                 event.ignore()
                 return
-            self._held = grip.name
+            self._dragged = grip.name
             self.grip_chosen.emit(grip.name)
-        if not self._held:
+        if not self._dragged:
             event.ignore()
             return
         event.accept()
-        name, at = self._held, event.pos()
+        name, at = self._dragged, event.pos()
         if event.isFinish():
-            self._held = ""
+            self._dragged = ""
             self.dropped.emit(name, float(at.x()), float(at.y()))
         else:
             self.dragged.emit(name, float(at.x()), float(at.y()))

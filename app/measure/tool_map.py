@@ -47,15 +47,15 @@ class ToolMap(QWidget):
 
     Signals
     -------
-    hold_wanted()
-        A tool was chosen: the image must be held.
+    freeze_wanted()
+        A tool was chosen: the image must be frozen.
     refused(str)
         A sentence: why a tool cannot be placed like this.
     drawn(object, int)
         The tools as they are drawn now (tuple of DrawnTool), and the key of the chosen one.
     """
 
-    hold_wanted = Signal()
+    freeze_wanted = Signal()
     refused = Signal(str)
     drawn = Signal(object, int)
 
@@ -101,12 +101,12 @@ class ToolMap(QWidget):
         self.layer.dropped.connect(lambda name, x, y: self._work.drop(name, (x, y)))
         self.view.pointed.connect(self._on_pointed)
         self._work.changed.connect(self._draw)
-        self._work.image_changed.connect(self._show_answer)
+        self._work.image_changed.connect(self._show_results)
 
     # The image
 
     def show_live(self, shown: Shown, display: Display) -> None:
-        """Show a frame's depth while nothing is held."""
+        """Show the depth of a live frame while no image is frozen."""
         if shown.heightmap is not None:
             self._live = shown.heightmap
             self.panel.show_frame(shown, display.colours, still=False)
@@ -116,11 +116,11 @@ class ToolMap(QWidget):
         self._live = None
         self.view.say(text)
 
-    def _show_answer(self) -> None:
-        answer = self._work.answer
-        if answer is not None:
-            rgb, shown = answer.map_image.rgb, answer.map_image.range_mm
-            self.panel.show_image(rgb, answer.heightmap, Display().colours, shown)
+    def _show_results(self) -> None:
+        image_results = self._work.image_results
+        if image_results is not None:
+            rgb, shown = image_results.map_image.rgb, image_results.map_image.range_mm
+            self.panel.show_image(rgb, image_results.heightmap, Display().colours, shown)
         elif self._work.image is None:
             self.cancel_placing()
 
@@ -146,7 +146,7 @@ class ToolMap(QWidget):
         self._report()
         if name:
             self.setFocus()
-            self.hold_wanted.emit()
+            self.freeze_wanted.emit()
 
     def _on_point(self, x_mm: float, y_mm: float) -> None:
         self.setFocus()

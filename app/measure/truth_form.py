@@ -128,7 +128,7 @@ class TruthForm(QGroupBox):
             self.state(found)
 
     def new_press(self) -> None:
-        """Forget the true values: another press may be of another object, at another depth.
+        """Clear the true values: the next press can be of another object or depth.
 
         A button offers them for this press, too.
         """

@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.measure.grips import grips_of, moved
-from app.measure.measuring import Answer, MeasuredImage, Measuring, Question
+from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.placing import kind_label
 from app.measure.sheet import Sheet
 from app.services.newest_wins import NewestWins
@@ -34,7 +34,7 @@ class Work(QObject):
     ----------
     undo : QUndoStack
         History of the tools on the image.
-    answer : Answer or None
+    image_results : ImageResults or None
         Results of the image. None until it is reconstructed.
     chosen : int
         Key of the chosen tool. 0 for none.
@@ -65,7 +65,7 @@ class Work(QObject):
         super().__init__(parent)
         self.undo = QUndoStack(self)
         self.image: MeasuredImage | None = None
-        self.answer: Answer | None = None
+        self.image_results: ImageResults | None = None
         self.chosen = 0
         self.grip = ""
         self._sheet = Sheet()
@@ -74,7 +74,7 @@ class Work(QObject):
         self._propose = False
         self._detected = 0
         self._busy = False
-        self._worker: NewestWins[Question | None, Answer | None] | None = None
+        self._worker: NewestWins[MeasureRequest | None, ImageResults | None] | None = None
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -89,12 +89,12 @@ class Work(QObject):
     @property
     def heightmap(self) -> HeightMap | None:
         """Depth of the image."""
-        return None if self.answer is None else self.answer.heightmap
+        return None if self.image_results is None else self.image_results.heightmap
 
     @property
     def results(self) -> Mapping[int, ToolResult | str]:
         """Results of the tools by key. Those of tools that were just moved are missing."""
-        return MappingProxyType({}) if self.answer is None else self.answer.results
+        return MappingProxyType({}) if self.image_results is None else self.image_results.results
 
     @property
     def tool(self) -> Tool | None:
@@ -117,14 +117,14 @@ class Work(QObject):
     def use(self, reconstructor: Reconstructor | None) -> None:
         """Measure with this calibration from now on."""
         self._reconstructor = reconstructor
-        self.answer = None
+        self.image_results = None
         self.image_changed.emit()
         self.changed.emit()
         self._ask()
 
     def take(self, image: MeasuredImage | None, *, propose: bool = False) -> None:
         """Measure on another image, or on none. It starts without tools."""
-        self.image, self.answer, self._preview = image, None, None
+        self.image, self.image_results, self._preview = image, None, None
         self.undo.clear()
         self._sheet = Sheet()
         self.chosen, self.grip = 0, ""
@@ -187,10 +187,10 @@ class Work(QObject):
     def nudge(self, dx_mm: float, dy_mm: float) -> bool:
         """Move the grip selected for the keys. Return whether there is one."""
         tool = self._sheet.tool(self.chosen)
-        held = next((g for g in grips_of(tool) if g.name == self.grip), None) if tool else None
-        if tool is None or held is None:
+        selected = next((g for g in grips_of(tool) if g.name == self.grip), None) if tool else None
+        if tool is None or selected is None:
             return False
-        x, y = held.at_mm
+        x, y = selected.at_mm
         self.change(self.chosen, moved(tool, self.grip, (x + dx_mm, y + dy_mm)), nudge=True)
         return True
 
@@ -219,57 +219,57 @@ class Work(QObject):
         self._reconstructor = None
 
     def _ask(self) -> None:
-        maker, question = self._reconstructor, None
+        maker, request = self._reconstructor, None
         if maker is not None and self.image is not None:
-            question = Question(
+            request = MeasureRequest(
                 maker.calibration, maker.model, self.image, self.sheet, self._propose
             )
         if self._worker is None:
-            if question is None:
+            if request is None:
                 return
             self._worker = NewestWins(Measuring(), name="measure")
-        self._worker.ask(question)  # an empty question releases the last image
+        self._worker.submit(request)  # an empty request releases the last image
         self._timer.start()
-        if question is not None:
+        if request is not None:
             self._say_busy(True)
 
     def _poll(self) -> None:
         assert self._worker is not None
-        answered = self._worker.take()
+        finished = self._worker.take()
         if self._worker.idle:
             self._timer.stop()
             self._say_busy(False)
-        if answered is None or answered.question is None:
+        if finished is None or finished.request is None:
             return
-        if not self._is_of_now(answered.question):
+        if not self._is_of_now(finished.request):
             return
-        if isinstance(answered.error, InputError):
-            self.refused.emit(str(answered.error))
-        elif answered.error is not None:
-            _LOG.error("Measuring failed", exc_info=answered.error)
-            kind = type(answered.error).__name__
+        if isinstance(finished.error, InputError):
+            self.refused.emit(str(finished.error))
+        elif finished.error is not None:
+            _LOG.error("Measuring failed", exc_info=finished.error)
+            kind = type(finished.error).__name__
             self.refused.emit(tr("Internal error: {k}. See the log for details.").format(k=kind))
-        elif answered.answer is not None:
-            self._show(answered.question, answered.answer)
+        elif finished.result is not None:
+            self._show(finished.request, finished.result)
 
-    def _is_of_now(self, question: Question) -> bool:
-        """Return whether a question is about the current image and calibration."""
+    def _is_of_now(self, request: MeasureRequest) -> bool:
+        """Return whether a request is about the current image and calibration."""
         maker = self._reconstructor
         return (
             maker is not None
-            and question.calibration is maker.calibration
-            and question.model == maker.model
-            and question.image is self.image
+            and request.calibration is maker.calibration
+            and request.model == maker.model
+            and request.image is self.image
         )
 
-    def _show(self, question: Question, answer: Answer) -> None:
-        before, self.answer = self.answer, answer
-        if before is None or before.heightmap is not answer.heightmap:
+    def _show(self, request: MeasureRequest, image_results: ImageResults) -> None:
+        before, self.image_results = self.image_results, image_results
+        if before is None or before.heightmap is not image_results.heightmap:
             self.image_changed.emit()
         self.changed.emit()
-        if question.propose and self._propose:
+        if request.propose and self._propose:
             self._propose = False
-            self._on_proposal(answer.proposal)
+            self._on_proposal(image_results.proposal)
             self.changed.emit()
 
     def _on_proposal(self, proposal: Proposal | None) -> None:
@@ -279,7 +279,7 @@ class Work(QObject):
             if self._sheet.tool(self._detected) is None:
                 self._detected = self.add(tool)
             else:
-                # The same image has the same object: its tool, perhaps moved meanwhile, stays.
+                # The same image has the same object: its tool remains, even if it was moved.
                 self.choose(self._detected)
         self.proposed.emit(proposal)
 

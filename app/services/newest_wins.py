@@ -1,4 +1,4 @@
-"""A thread that answers only the newest question, for results that must follow the pointer."""
+"""A worker thread that processes only the newest request, for results that follow the pointer."""
 
 from __future__ import annotations
 
@@ -9,58 +9,58 @@ from typing import Generic, TypeVar
 
 from app.sources.stopping import join
 
-Question = TypeVar("Question")
-Answer = TypeVar("Answer")
+Request = TypeVar("Request")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
-class Answered(Generic[Question, Answer]):
-    """An answer, or the error raised instead, with its question."""
+class Finished(Generic[Request, Result]):
+    """A request with its result, or with the error that it raised."""
 
-    question: Question
-    answer: Answer | None
+    request: Request
+    result: Result | None
     error: Exception | None
 
 
-class NewestWins(Generic[Question, Answer]):
-    """Answers questions in a separate thread; a newer question replaces a waiting one.
+class NewestWins(Generic[Request, Result]):
+    """Processes requests in a separate thread; a newer request replaces a waiting one.
 
     Parameters
     ----------
     function : callable
-        Maps a question to its answer; called in the thread.
+        Returns the result of a request; called in the thread.
     name : str
         Name of the thread.
     """
 
-    def __init__(self, function: Callable[[Question], Answer], *, name: str) -> None:
+    def __init__(self, function: Callable[[Request], Result], *, name: str) -> None:
         self._function = function
         self._change = threading.Condition()
-        self._waiting: list[Question] = []
-        self._done: list[Answered[Question, Answer]] = []
+        self._waiting: list[Request] = []
+        self._done: list[Finished[Request, Result]] = []
         self._busy = self._stopped = False
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
-    def ask(self, question: Question) -> None:
-        """Ask a question; an earlier one that is not yet started is dropped."""
+    def submit(self, request: Request) -> None:
+        """Submit a request; an earlier one that has not started yet is dropped."""
         with self._change:
-            self._waiting[:] = [question]
+            self._waiting[:] = [request]
             self._change.notify()
 
-    def take(self) -> Answered[Question, Answer] | None:
-        """Return the newest answer that was not returned yet."""
+    def take(self) -> Finished[Request, Result] | None:
+        """Return the newest result, once; None if there is no new one."""
         with self._change:
             return self._done.pop() if self._done else None
 
     @property
     def idle(self) -> bool:
-        """Whether no question waits, runs, or has an answer to return."""
+        """Whether no request waits or runs, and no result was left to take."""
         with self._change:
             return not (self._waiting or self._busy or self._done)
 
     def stop(self, timeout_s: float = 5.0) -> bool:
-        """Stop the thread after its present question; return whether it has stopped."""
+        """Stop the thread after its present request; return whether it has stopped."""
         with self._change:
             self._stopped = True
             self._change.notify()
@@ -73,15 +73,15 @@ class NewestWins(Generic[Question, Answer]):
                 self._change.wait_for(lambda: self._waiting or self._stopped)
                 if self._stopped:
                     return
-                question = self._waiting.pop()
+                request = self._waiting.pop()
                 self._busy = True
-            answered = self._answer(question)
+            finished = self._run(request)
             with self._change:
-                self._done[:] = [answered]
-            del question, answered  # the thread would keep them until the next question
+                self._done[:] = [finished]
+            del request, finished  # the thread would keep them until the next request
 
-    def _answer(self, question: Question) -> Answered[Question, Answer]:
+    def _run(self, request: Request) -> Finished[Request, Result]:
         try:
-            return Answered(question, self._function(question), None)
-        except Exception as error:  # passed to the asking thread, which shows or raises it
-            return Answered(question, None, error)
+            return Finished(request, self._function(request), None)
+        except Exception as error:  # passed to the thread that takes it, which shows or raises it
+            return Finished(request, None, error)

@@ -38,7 +38,7 @@ PAGES = (
     ("health", tr("Faults of an image")),
     ("troubleshooting", tr("Troubleshooting")),
 )
-# What each page of the program is described in.
+# Guide page for each page of the program.
 OF_PAGE = {
     "start": "guide/first-start",
     "sensors": "guide/validate",

@@ -220,7 +220,7 @@ class RecordingSource:
                 self._changed.notify_all()
 
     def step(self, count: int = 1) -> None:
-        """Pause, and move forward by so many frames (back if negative)."""
+        """Pause, and move forward by a number of frames (back if negative)."""
         with self._changed:
             self._playing = False
             self._direction = 1 if count > 0 else -1

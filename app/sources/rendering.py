@@ -197,7 +197,7 @@ class _Makers:
         if scene.item in BOARDS or self._small is None or self._large is None:
             return self._enlarged(small)
         # A press changes the bare membrane's image by a smooth factor, so that the membrane's fine
-        # pattern stays sharp; the same holds at its rim, where nothing is divided.
+        # pattern stays sharp; the same is true at its edge, where there is no division.
         if self._bare is None:
             self._bare = self._large.brightness(BareMembrane())
         bare = self._small.brightness(BareMembrane())
@@ -238,7 +238,7 @@ def state_of(
         Called repeatedly; raises an exception to stop the work.
     """
     if scene.item == "checkerboard":
-        return Checkerboard(_held(bench.poses[scene.pose], scene))
+        return Checkerboard(_shifted(bench.poses[scene.pose], scene))
     if scene.item == "board_on_top":
         pose = board_on_top(
             design.layers,
@@ -263,7 +263,7 @@ def state_of(
     )
 
 
-def _held(pose: BoardPose, scene: Scene) -> BoardPose:
+def _shifted(pose: BoardPose, scene: Scene) -> BoardPose:
     """Return a scripted pose, moved in the camera frame and rotated in the board's plane."""
     yaw = math.radians(scene.yaw_deg)
     cos, sin = math.cos(yaw), math.sin(yaw)

@@ -27,7 +27,7 @@ MOST_BYTES = 40_000_000
 
 
 class StartPage(QWidget):
-    """Offers what a technician does first.
+    """Offers the first actions of a technician.
 
     Parameters
     ----------

@@ -228,7 +228,7 @@ class PrecisionDialog(WorkDialog):
         self._recommend()
 
     def _recommend(self) -> None:
-        """Say which mode to use for the frame rate and the error that are wanted."""
+        """Recommend a mode for the requested frame rate and error."""
         if not self.points:
             self.advice.setText("")
             return

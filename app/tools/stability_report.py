@@ -13,7 +13,7 @@ from gelpolight_core.translation import tr
 
 
 class StabilityReport:
-    """Extreme cases, each of which must be right or say that it is not."""
+    """Extreme cases: each must be correct or report that it is not."""
 
     name = "stability"
     title = tr("Numerical stability")

@@ -1,4 +1,4 @@
-"""What is done to the height map of a frozen image before it is shown and measured."""
+"""Processing of the height map of a frozen image before it is shown and measured."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 
 Point = tuple[float, float]
 LEVELLINGS = ("none", "plane", "rectangle", "points")
-FILTERS = ("none", "gaussian", "median")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +37,7 @@ class Processing:
     points_mm : tuple of (x, y)
         For ``points``.
     filter : str
-        One of FILTERS.
+        ``none``, ``gaussian`` or ``median``.
     sigma_mm : float
         Of the Gaussian filter.
     nodes : int

@@ -23,7 +23,7 @@ HOLLOW_MM = 0.5
 
 
 def fitted(values: NDArray[Any], largest_px: int) -> NDArray[Any]:
-    """Return a map or image averaged down to at most so many pixels per side."""
+    """Return a map or image averaged down to a largest number of pixels per side."""
     rows, columns = values.shape[:2]
     # An integer factor: averaging over equal blocks is by far the fastest.
     factor = -(-max(rows, columns) // largest_px)

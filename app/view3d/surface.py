@@ -1,4 +1,4 @@
-"""A depth map as rows of nodes from rim to rim, for the 3D view. No window, no pyvista."""
+"""A depth map as rows of nodes across the working circle, for the 3D view. No Qt, no pyvista."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Surface:
         down = np.linspace(0, rows - 1, min(rows, largest)).round().astype(int)
         across = np.linspace(0, columns - 1, min(columns, largest)).round().astype(int)
         nodes = np.ix_(down, across)
-        # Rows stay evenly spaced: rounding their numbers would bend the surface's y.
+        # Rows remain evenly spaced: rounded row numbers would distort the surface along y.
         y = np.linspace(self.y_mm[0], self.y_mm[-1], len(down), dtype=np.float32)
         return replace(self, x_mm=self.x_mm[nodes], y_mm=y, depth_mm=self.depth_mm[nodes])
 
@@ -111,7 +111,7 @@ class Surface:
             self.depth_mm[r, first] * (1.0 - across) + self.depth_mm[r, first + 1] * across
             for r in (upper, upper + 1)
         )
-        edge = 1e-6  # a node on the rim belongs to the surface
+        edge = 1e-6  # a node on the boundary belongs to the surface
         inside = (row >= -edge) & (row <= rows - 1 + edge)
         inside &= (column >= -edge) & (column <= columns - 1 + edge)
         return np.where(inside, above * (1.0 - down) + below * down, -np.inf)

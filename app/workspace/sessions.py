@@ -12,7 +12,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import NAME_LIMIT, parse_toml, plain_text, read_file
 
 DESCRIPTION = "session.toml"
-# Key of the stage of each image folder, in the order in which a technician takes the images.
+# Key of the stage of each image folder, in the order of the captures.
 STAGES = {
     "checkerboard": "lens",
     "top_pose": "top_pose",

@@ -120,7 +120,7 @@ def _clear(folder: Path) -> None:
 
 
 def _read(workspace: Path, trashed: Path) -> Removal:
-    """Return a removal as its note says; without a note, as the names and the file's time say."""
+    """Return a removal from its note; without a note, from the names and the time of the file."""
     # The name of the folder is the time (15 letters), a hyphen, and the name of the old folder.
     old_folder, when, in_use = trashed.parent.name[16:] or "unnamed", None, False
     try:

@@ -18,7 +18,7 @@ from gelpolight_core.reflectance.surroundings import view_directions
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 FIELD_PITCH_MM = 0.1
-"""Facets of the membrane that throw light are about as wide."""
+"""Approximate width of the facets that reflect light."""
 DRAPE_WIDTH_MM = 1.6
 EDGE_GAP_MM = 0.12
 PIXELS_PER_PART = 800
@@ -56,7 +56,7 @@ class CoarseView:
 
     @classmethod
     def of(cls, table: ResamplingTable, throwing: NDArray[np.bool_]) -> CoarseView:
-        """Return the coarse view of a table's grid, whose nodes (rows, columns) throw light."""
+        """Return the coarse view of a table's grid with its reflecting nodes (rows, columns)."""
         grid = table.grid
         factor = max(round(FIELD_PITCH_MM / grid.pitch_mm), 1)
         share = block_means(throwing.astype(np.float32), factor)
@@ -96,7 +96,7 @@ class BallPixels:
     radius_mm : float
         Radius of the ball.
     view_of_field : CoarseView
-        The whole membrane that may throw light on them.
+        The whole membrane, which can reflect light onto them.
     field : (rows, columns, 3) float32
         Press over background there; 1 where it is not usable, and 0 where nothing reflects light.
     around, around_flat : (N, 3)

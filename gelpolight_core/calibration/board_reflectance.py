@@ -20,8 +20,8 @@ THIN = 8
 BOARD_REFLECTANCE, BOARD_SD = 0.92, 0.05
 """Of matt white boards, papers and paints, which reflect 0.85 to 0.99 of the light."""
 BELIEVED_SDS = 3.0
-"""An expected reflectance that is so far from what the balls show is left out: board and membrane
-were taken at different exposures, or the board is not white."""
+"""An expected reflectance that differs by more standard deviations from that of the balls is left
+out: board and membrane had different exposures, or the board is not white."""
 
 
 class BesideBoard(NamedTuple):
@@ -49,7 +49,7 @@ class BesideBoard(NamedTuple):
         crosstalk: Array,
         leds_mm: Array,
     ) -> BesideBoard:
-        """Return both as a sensor's calibration sees them.
+        """Return both at the nodes of a calibration.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class BesideBoard(NamedTuple):
         return cls(points[lit], view[lit], share[lit])
 
     def reflectance(self, leds_mm: Array, membrane: Membrane) -> float:
-        """Return the membrane's reflectance in units of the board's; NaN where nothing is lit.
+        """Return the membrane's reflectance in units of the board's; NaN without light.
 
         The board is Lambertian (Eq. 5), the membrane is as given.
 
@@ -99,7 +99,7 @@ class BesideBoard(NamedTuple):
     ) -> tuple[float, float] | None:
         """Return the reflectance to expect with a common white board, and its standard deviation.
 
-        None where it does not agree with what balls have `shown`, given in the same way.
+        None if it does not agree with `shown`, the same values from the balls.
 
         Parameters
         ----------

@@ -51,7 +51,7 @@ PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
 NODES = 160
 NOISE = 0.003
 ROUNDS = 2
-# Walls and the light that they throw change each other.
+# Walls and the light that they reflect depend on each other.
 ROUNDS_WITH_AROUND, THROWN = 5, 3
 # Small differences of depths are compared.
 STEPS, SETTLED, TOLERANCE = 10, 1e-4, 1e-4
@@ -232,7 +232,7 @@ def _shaded(
     around, seen_as = np.zeros((*shape, 3)), np.zeros((*shape, 3))
     flat = direct_flat(full, flat_light, flat_distance, view).reshape(*shape, 3)
     for _ in range(THROWN if full.membrane.interreflection > LEAST_SHARE else 1):
-        # Light that is thrown on is thrown on again.
+        # Reflected light is reflected again.
         seen_as = direct.reshape(*shape, 3) + around
         surface = Surface(
             np.concatenate([position, -depth[:, None]], axis=1).reshape(*shape, 3),

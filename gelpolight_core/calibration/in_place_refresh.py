@@ -2,7 +2,7 @@
 
 A new background alone keeps the slopes by change of colour: another gel of the same make differs
 little (2.35 instead of 2.2 degrees on a GelSight Mini by prototypes outside this program). A few
-new presses correct what differs; where they say nothing, the old slopes stay.
+new presses correct the differences; where they give no information, the old slopes remain.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def with_background(
 
 
 def repaired(calibration: InPlaceCalibration, session: ClosedSession) -> InPlaceRun:
-    """Return a calibration of the presses of a session, drawn to an earlier calibration.
+    """Return a calibration from the presses of a session, regularised towards an earlier one.
 
     Parameters
     ----------

@@ -212,7 +212,7 @@ def _first_light(
 ) -> list[BallPixels] | None:
     """Return the pixels with interreflected light, from a fit to some; None if there is none.
 
-    The fit starts from the light that a matt membrane would throw.
+    The fit starts from the light that a matt membrane would reflect.
     """
     x, _ = _start(presses, leds, terms, curves=False)
     some = _lit([thinned(p) for p in pixels], x, slab)

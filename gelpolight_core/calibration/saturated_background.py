@@ -25,7 +25,7 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 REACH_MM = 2.0
 """Farther than this from a pixel that is not saturated, the coating is not known."""
-RIM_MM = 0.2
+MARGIN_MM = 0.2
 """The coating at the edge of the field may be incomplete or in shadow, and is not used."""
 EVENED_MM = 0.5
 """Blur of the coating's share of the light: it leaves out specks and noise."""
@@ -80,9 +80,9 @@ def _filled_light(
     grid = table.grid
     flat = _flat(full, grid.x_mm[box[1]], grid.y_mm[box[0]], table.ray_slope[box])
     light = background.copy()
-    rim = round(RIM_MM / grid.pitch_mm)
+    margin = round(MARGIN_MM / grid.pitch_mm)
     field = cv2.erode(
-        table.valid[box].astype(np.uint8), np.ones((2 * rim + 1, 2 * rim + 1), np.uint8)
+        table.valid[box].astype(np.uint8), np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)
     )
     known = np.asarray(~lost.any(axis=-1) & (field > 0) & lit(background))
     for k in range(3):

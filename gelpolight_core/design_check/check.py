@@ -97,10 +97,10 @@ def check_design(design: SensorDesign) -> DesignCheckResult:
         If the parts of the design do not fit together.
     """
     validate_design(design)
-    rim = 0.5 * design.membrane.working_diameter_mm
-    cells = np.linspace(-rim, rim, _GRID_CELLS)
+    radius_mm = 0.5 * design.membrane.working_diameter_mm
+    cells = np.linspace(-radius_mm, radius_mm, _GRID_CELLS)
     x, y = np.meshgrid(cells, cells)
-    outside = np.hypot(x, y) > rim
+    outside = np.hypot(x, y) > radius_mm
     condition = light_condition(design, x, y)
     condition[outside] = np.nan
     irradiance = flat_irradiance(design, x, y)
@@ -209,9 +209,9 @@ def veil_share(design: SensorDesign) -> float:
     design : SensorDesign
         The sensor.
     """
-    layers, rim = design.layers, 0.5 * design.membrane.working_diameter_mm
-    cells = np.linspace(-rim, rim, _VEIL_CELLS)
-    x, y = (a[np.hypot(*np.meshgrid(cells, cells)) <= rim] for a in np.meshgrid(cells, cells))
+    layers, radius_mm = design.layers, 0.5 * design.membrane.working_diameter_mm
+    cells = np.linspace(-radius_mm, radius_mm, _VEIL_CELLS)
+    x, y = (a[np.hypot(*np.meshgrid(cells, cells)) <= radius_mm] for a in np.meshgrid(cells, cells))
     direct = flat_irradiance(design, x, y)
     path_mm = 2.0 * (layers.elastomer_thickness_mm + layers.window_thickness_mm)
     r2 = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 + path_mm**2

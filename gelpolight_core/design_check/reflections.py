@@ -108,14 +108,14 @@ def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, times: int)
     away = max(math.hypot(led.x_mm, led.y_mm), 1e-12)
     at = (led.x_mm / away * radius, led.y_mm / away * radius)
     top = float(reflection(np.array(sine), layers.elastomer_refractive_index, 1.0))
-    rim = 0.5 * design.membrane.working_diameter_mm
+    radius_mm = 0.5 * design.membrane.working_diameter_mm
     return Reflection(
         name,
         "top surface" if times == 1 else "top surface twice",
         _pair(pixel),
         at,
         top ** (2 * times - 1),
-        _in_image(design, pixel) and radius <= rim,
+        _in_image(design, pixel) and radius <= radius_mm,
     )
 
 

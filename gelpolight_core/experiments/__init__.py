@@ -1,1 +1,1 @@
-"""Experiments on the method itself: what its parts are worth and what they cost."""
+"""Experiments on the method itself: the benefit and the cost of its parts."""

@@ -57,7 +57,7 @@ class Variant:
     name : str
         On the command line and in files.
     label : str
-        What is done instead, as shown to the user.
+        The replacement, as shown to the user.
     terms : Terms
         Of the reconstruction.
     calibration : CalibrationTerms
@@ -124,7 +124,8 @@ class TermResult:
     frame_ms : float
         Median processor time of a frame without the term.
     cost_ms : float
-        What the term adds to a frame: median difference to all terms on; 0 for all terms on.
+        Additional time per frame by the term: median difference to all terms on; 0 for all terms
+        on.
     calibration_s : float
         Processor time of the joint refinement of the variant; NaN for the paper's model.
     """
@@ -147,7 +148,7 @@ class Ablation:
     results : tuple of TermResult
         In the order of :data:`VARIANTS`.
     repeats : int
-        How often each press was timed.
+        Number of timed runs per press.
     refused : tuple of (Variant, str)
         Variants whose calibration is refused, with the reason.
     """
@@ -203,9 +204,9 @@ def ablate(
     session : Session
         With ``presses/truth.csv`` and ``truth/*.npz`` in addition to the images of the stages.
     variants : sequence of Variant, optional
-        To be compared with all terms on.
+        The variants, which are compared with all terms on.
     repeats : int, optional
-        How often every press is reconstructed, for the times.
+        Number of reconstructions of each press, for the times.
     workers : int, optional
         Threads of a reconstruction.
     progress : callable, optional
@@ -250,7 +251,7 @@ def read_presses(session: Session, radius_mm: float) -> list[TruePress]:
     session : Session
         With ``presses/truth.csv`` and ``truth/*.npz``.
     radius_mm : float
-        Within it each press must show its plateau.
+        Radius within which each press must show its plateau.
 
     Raises
     ------

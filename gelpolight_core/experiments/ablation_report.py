@@ -34,7 +34,7 @@ COLUMNS = (
 def ablation_rows(ablation: Ablation) -> list[dict[str, Any]]:
     """Return one table row for each variant, by the names of :data:`COLUMNS`.
 
-    A term's worth and cost are differences to all terms on; None where they do not apply.
+    Benefit and cost of a term are differences to all terms on; None if they do not apply.
     """
     everything = ablation.results[0]
     return [

@@ -33,7 +33,7 @@ class Timing:
     median_ms, p95_ms : float
         Over the repeats after warm-up.
     bytes : int
-        That must be read and written once, whatever the program.
+        Bytes that any program must read and write once.
     """
 
     name: str
@@ -64,7 +64,7 @@ class BenchmarkResult:
     plain : Timing
         The same mathematics in plain NumPy and SciPy.
     copy_floor_ms : float
-        Median time to copy as many bytes as the frame must read and write.
+        Median time to copy the number of bytes that the frame must read and write.
     threads : int
         Of the transforms.
     versions : dict
@@ -106,7 +106,7 @@ def benchmark_frame(
         else maps + calibration.radiance.nbytes
     )
     must = frame.nbytes + known + table.u_px.nbytes
-    # Pages that were never written to would all be the same one, in the nearest cache.
+    # Memory pages that were never written to are all the same page, which is in the cache.
     source, target = np.ones(must // 2, np.uint8), np.ones(must // 2, np.uint8)
     traces: list[Trace] = []
 
@@ -161,7 +161,7 @@ def _plain_in_place(light: NDArray[Any], calibration: InPlaceCalibration) -> Non
 
 
 def _traced_steps(traces: list[Trace]) -> tuple[Timing, ...]:
-    """Return the times of a frame's steps, as they were noted on the way."""
+    """Return the times of a frame's steps from its trace."""
     times: dict[str, list[float]] = {}
     sizes: dict[str, int] = {}
     for step in (step for trace in traces for step in trace.steps):
@@ -172,7 +172,7 @@ def _traced_steps(traces: list[Trace]) -> tuple[Timing, ...]:
 
 
 def _time_in_turn(actions: dict[str, Callable[[], object]], repeats: int) -> dict[str, list[float]]:
-    """Time actions one after the other, round by round, so that a slow spell meets all alike."""
+    """Time actions in turn, round by round, so that a slow phase of the machine affects all."""
     for action in actions.values():
         action()
     times: dict[str, list[float]] = {name: [] for name in actions}

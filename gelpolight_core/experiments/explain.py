@@ -1,10 +1,10 @@
 """Causes of the full model's errors: images predicted for the true surface, and the real ones.
 
-For each press with a true depth two questions are answered. *Which step loses the height?* The
-slopes that were found are replaced by the true ones, everywhere or in part, and integrated with
-the same weights. *Which light is not explained?* At the true surface, press over background is
-compared with the direct light of the LEDs, with interreflection as the model adds it, and with one
-reflection gathered over the true surface.
+For each press with a true depth there are two questions. *Which step causes the height error?* The
+computed slopes are replaced by the true ones, everywhere or in part, and integrated with the same
+weights. *Which light is not explained?* At the true surface, press over background is compared with
+the direct light of the LEDs, with the interreflection of the model, and with one reflection
+gathered over the true surface.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ Map = NDArray[np.float32]
 BANDS = (3.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0)
 """Limits of the bands of slope, degrees."""
 SIDES = ("towards", "away", "dark")
-"""A channel of a point: tilted towards its LED, away from it, or not reached by it."""
+"""Side of a point for a channel: towards its LED, away from it, or not reached by it."""
 ALL_COUNT = 0.9
-"""Weight of a node whose three channels all decide."""
+"""Least weight of a node that uses all three channels."""
 LEAST_NODES = 20
 PLATEAU = 0.98
 STEEP_DEG = 30.0
@@ -55,11 +55,11 @@ class Loss:
     found : float
         As reconstructed.
     true_slopes : float
-        True slopes, own weights: what integration and weights lose.
+        True slopes with the weights of the solution: the error of integration and weights.
     true_where_dark : float
-        True slopes where a channel is left out, own slopes elsewhere.
+        True slopes where a channel is left out, computed slopes elsewhere.
     true_where_lit : float
-        True slopes where all channels decide, own slopes elsewhere.
+        True slopes where all channels are used, computed slopes elsewhere.
     """
 
     file: str
@@ -80,10 +80,10 @@ class Light:
     low_deg, high_deg : float
         Slope.
     seen, direct, model, gathered : float
-        The image; light straight from the LED; what the model adds for interreflection; and one
-        reflection gathered over the true surface, from a membrane that absorbs nothing.
+        The image; the direct light of the LED; the interreflection of the model; and one reflection
+        gathered over the true surface, from a membrane that absorbs nothing.
     nodes : int
-        How many values.
+        Number of values.
     """
 
     side: str
@@ -97,13 +97,13 @@ class Light:
 
     @property
     def left(self) -> float:
-        """What the LED's direct light does not explain."""
+        """Light that the LED's direct light does not explain."""
         return self.seen - self.direct
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Where the errors of a session's presses come from.
+    """Causes of the errors of a session's presses.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Explanation:
     light : tuple of Light
         By side and slope.
     reflectance_needed : float
-        The share of the gathered light that explains best what is not direct light, on slopes
+        The share of the gathered light that best explains the light beyond direct light, on slopes
         above `STEEP_DEG`; NaN without such slopes.
     reflectance_seen : float
         Reflectance of the membrane, in units of the white board's: background over white board.
@@ -133,7 +133,7 @@ def explain(
     *,
     progress: Callable[[str, float], None] | None = None,
 ) -> Explanation:
-    """Compare a sensor's presses with what the calibration predicts at the true surface.
+    """Compare a sensor's presses with the prediction of the calibration at the true surface.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def explain(
     session : Session
         With ``presses/truth.csv`` and ``truth/*.npz``.
     progress : callable, optional
-        Called with what is being done and the share done, 0..1.
+        Called with the present task and the share done, 0..1.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def _view(solved: Solved, truth: TrueDepth) -> tuple[TrueView, Array]:
 
 
 def _loss(press: TruePress, solved: Solved, view: TrueView, radius_mm: float) -> Loss:
-    """Integrate found and true slopes in turn."""
+    """Integrate computed and true slopes."""
     own = solved.slopes.slope_x, solved.slopes.slope_y
     # The true depth along the rays has the true slopes along the rays.
     pitch = solved.scale.pitch_mm
@@ -231,7 +231,7 @@ def _loss(press: TruePress, solved: Solved, view: TrueView, radius_mm: float) ->
 def _light_at(maps: SensorMaps, truth: TrueDepth, solved: Solved) -> Array:
     """Return side, slope, image, direct light, the model's addition and the gathered one (N, 6).
 
-    Every second node along both axes, where it is tilted.
+    Every second node along both axes, if it is tilted.
     """
     view, ray_slope = _view(solved, truth)
     image, scale, full = solved.compared.coarse, solved.scale, maps.full

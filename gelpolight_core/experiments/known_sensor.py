@@ -1,7 +1,7 @@
-"""A virtual sensor with the calibration that it would have if every stage were exact.
+"""A virtual sensor with the exact calibration.
 
-Nothing is calibrated from images: lens, pose, LEDs, crosstalk and light are the design's own, so
-that what a reconstruction gets wrong is the reconstruction's.
+Nothing is calibrated from images: lens, pose, LEDs, crosstalk and light are those of the design.
+All errors are therefore those of the reconstruction.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
 
 Map = NDArray[np.float32]
-# Of an exact calibration: far below what any camera's noise leaves.
+# Of an exact calibration: far below the noise of any camera.
 MISFIT = 0.002
 LEAST_COSINE = 0.02
 
@@ -61,7 +61,7 @@ class KnownSensor:
     def pressed(
         self, indenter: Indenter, *, x_mm: float = 0.0, y_mm: float = 0.0, samples: int = 3
     ) -> KnownPress:
-        """Return the image of something pressed into the sensor, and the true depth."""
+        """Return the image of an object pressed into the sensor, and the true depth."""
         decay_mm = self.sensor.design.membrane.decay_length_mm
         return self.showing(press(indenter, x_mm=x_mm, y_mm=y_mm, decay_mm=decay_mm), samples)
 
@@ -72,19 +72,19 @@ class KnownSensor:
         return KnownPress(frame.astype(np.float32), truth)
 
     def noisy(self, frame: Map, *, seed: int = 0) -> NDArray[np.unsignedinteger[Any]]:
-        """Return what the camera makes of a linear image: noise, and its own whole numbers."""
+        """Return a linear image as captured by the camera: with noise, as integers."""
         camera = self.sensor.design.camera
         return exposed(frame.astype(np.float64), camera, np.random.default_rng(seed), averaged=1)
 
     def bare(self) -> Map:
-        """Return the image of the membrane that nothing touches."""
+        """Return the image of the untouched membrane."""
         return self.sensor.brightness(BareMembrane()).astype(np.float32)
 
 
 def matt_design(scale: float = 0.25) -> SensorDesign:
-    """Return the default sensor with an even, Lambertian membrane and no crosstalk.
+    """Return the default sensor with a uniform Lambertian membrane and no crosstalk.
 
-    Its shading is the formula's own, so that errors are those of the numbers, not of the model.
+    Its shading is exactly that of the model, so that all errors are numerical.
     """
     plain = SensorDesign()
     still = replace(plain.membrane, specular_weight=0.0, variation=0.0, speck_count=0)
@@ -98,7 +98,7 @@ def known_sensor(design: SensorDesign, *, seed: int = 0) -> KnownSensor:
     Raises
     ------
     InputError
-        If the design does not hold together, or no calibration can be made for it.
+        If the design is not consistent, or cannot be calibrated.
     """
     sensor = VirtualSensor(design, seed)
     return KnownSensor(sensor, exact_calibration(sensor))
@@ -113,7 +113,7 @@ def exact_calibration(
     leds_mm: NDArray[np.float64] | None = None,
     crosstalk: NDArray[np.float64] | None = None,
 ) -> Calibration:
-    """Return the calibration that a sensor would have if every stage were exact.
+    """Return the exact calibration of a sensor.
 
     The reflectance table is that of an ideal diffuse membrane; on a glossy one the full model alone
     is exact.
@@ -123,8 +123,8 @@ def exact_calibration(
     sensor : VirtualSensor
         To be calibrated.
     camera, plane, stated, leds_mm, crosstalk : optional
-        In place of the exact ones; background and light are then what the sensor's images show
-        by them.
+        Values instead of the exact ones; background and light are then those of the sensor's images
+        with these values.
     """
     design = sensor.design
     camera = camera or _camera(design)
@@ -168,7 +168,7 @@ def exact_calibration(
 
 
 def exact_membrane(design: SensorDesign) -> Membrane:
-    """Return the shares of a design's membrane as the full model writes them."""
+    """Return the membrane of a design in the form of the full model."""
     made = design.membrane
     diffuse = (1.0 - made.specular_weight) * made.diffuse_reflectance
     glossy = made.specular_weight * made.specular_reflectance

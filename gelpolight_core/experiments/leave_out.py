@@ -1,7 +1,7 @@
 """Time saved by each rule that skips a step, and its largest change of the depth.
 
-Each rule is switched off in turn, for every effort, on the same frames. Frames take turns with and
-without the rule, so that a slow spell of the machine meets both alike.
+Each rule is switched off in turn, for every effort, on the same frames. Runs with and without the
+rule alternate, so that a slow phase of the machine affects both.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from gelpolight_core.translation import tr
 Progress = Callable[[str, float], None]
 REPEATS = 2
 WORTH_PERCENT = 3.0
-"""A rule that saves less anywhere has no business in the program."""
+"""A rule must save this share somewhere; otherwise it is not worth keeping."""
 EMPTY, SHALLOW, PRESSED = "empty", "shallow", "pressed"
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """An image, and how deep the contact in it is.
+    """An image, and the depth of its contact.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Rule:
     name, label : str
         For files and people.
     kind : str
-        Of the frames that it is there for.
+        Kind of frames for which the rule is intended.
     without : callable
         The settings of an effort without the rule.
     everywhere : bool

@@ -10,7 +10,7 @@ WIDE_DECADES = 2.5
 
 
 def number_logarithmically(axis: Axis) -> None:
-    """Write 1, 10, 100 along a logarithmic axis, with 2 and 5 between where it is short."""
+    """Write 1, 10, 100 along a logarithmic axis; a short axis also has 2 and 5."""
     low, high = axis.get_view_interval()
     wide = np.log10(high / low) > WIDE_DECADES
     axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))

@@ -16,7 +16,7 @@ BY_PIXELS, BY_MODEL = 1.0, 0.3
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """How an error falls with the pitch: the exponent of a line through log-log.
+    """Order of an error in the pitch: the slope of a line in log-log coordinates.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Order:
     half_width : float
         Half of its 95 % confidence interval.
     sizes : int
-        Pitches that it is fitted to.
+        Pitches of the fit.
     """
 
     value: float
@@ -39,7 +39,7 @@ class Order:
 
     @property
     def limit(self) -> str:
-        """What limits the method; empty where the fit does not support a statement."""
+        """What limits the method; empty if the fit does not support a statement."""
         if self.value - self.half_width > BY_PIXELS:
             return tr("the pixel size")
         if self.value + self.half_width < BY_MODEL:

@@ -1,7 +1,7 @@
 """The paper's model in plain NumPy and SciPy, as a reference for the fused version.
 
-Written from the equations, array by array, in double precision and without regard to speed. Tests
-hold the fused pass to it, and the benchmark shows both.
+Written from the equations, array by array, in double precision and not optimised. Tests compare the
+fused pass with it, and the benchmark shows both.
 """
 
 from __future__ import annotations

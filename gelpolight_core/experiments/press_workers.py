@@ -1,7 +1,7 @@
 """Make and measure presses on the virtual sensor in several processes.
 
-Each worker is a process of its own with one thread: two threads may not enter the compiled loops
-together, and one frame keeps two cores less busy than two frames do.
+Each worker is a separate process with one thread: two threads cannot use the compiled loops at the
+same time, and two frames in parallel use two cores better than one frame.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from gelpolight_core.simulation.session import pressed_membrane, settled_membran
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 HAND_MM, HAND_DEG = 0.1, 1.0
-"""How well a hand finds the same place again, one standard deviation."""
+"""Repeatability of placing by hand, one standard deviation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Equipment:
-    """What a worker needs.
+    """Data for a worker.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Equipment:
     model : str or None
         ``paper`` or ``full``; None: the calibration's own.
     design : SensorDesign or None
-        Of the virtual sensor; None where no press is made.
+        Design of the virtual sensor; None if no press is made.
     seed : int
         Of the virtual sensor.
     """
@@ -59,16 +59,16 @@ class Equipment:
 
 @dataclass(frozen=True, slots=True)
 class PressTask:
-    """An image to be measured, and what to press for it where it has still to be made.
+    """An image to be measured, and the object to press if the image does not exist yet.
 
     Attributes
     ----------
     image : Path
-        Where it is or shall be.
+        Path of the image, which may not exist yet.
     shape : str
         What is measured.
     press : PressWanted or None
-        What to press; None where the image is there.
+        The object to press; None if the image exists.
     """
 
     image: Path
@@ -90,13 +90,13 @@ class PressWorker:
         self._settled: dict[Cuboid, Settled] = {}
 
     def work(self, task: PressTask) -> Measurement | str:
-        """Make the image where it has still to be made; measure it."""
+        """Make the image if it does not exist, and measure it."""
         if task.press is not None:
             self.make(task.press, task.image)
         return measure_press(task.image, task.shape, self._measure_press)
 
     def make(self, press: PressWanted, image: Path) -> None:
-        """Press an object into the virtual sensor as a hand would, and write the image."""
+        """Press an object into the virtual sensor as by hand, and write the image."""
         design = self._sensor.design
         indenter = _indenter(press.truth)
         settled = self._settled_on(indenter) if isinstance(indenter, Cuboid) else None
@@ -118,7 +118,7 @@ class PressWorker:
 
     def _settled_on(self, indenter: Cuboid) -> Settled:
         if indenter not in self._settled:
-            # One object is pressed many times, and seldom again after another.
+            # One object is pressed many times in succession.
             if len(self._settled) > 10:
                 self._settled.clear()
             self._settled[indenter] = settled_membrane(self._sensor.design, indenter)
@@ -126,14 +126,14 @@ class PressWorker:
 
 
 def placed_by_hand(press: PressWanted, seed: int = 0) -> tuple[float, float, float]:
-    """Return where a hand puts a press: x and y in mm, and how it is turned in degrees.
+    """Return the position of a press by hand: x and y in mm, and rotation in degrees.
 
     Parameters
     ----------
     press : PressWanted
-        Where it should go.
+        The nominal position.
     seed : int, optional
-        Of the hand.
+        Random generator of the hand.
     """
     rng = np.random.default_rng([seed, *press.file.encode()])
     dx, dy, turn = rng.standard_normal(3) * (HAND_MM, HAND_MM, HAND_DEG)
@@ -143,7 +143,7 @@ def placed_by_hand(press: PressWanted, seed: int = 0) -> tuple[float, float, flo
 def work_through(
     tasks: Sequence[PressTask], equipment: Equipment, *, workers: int = 2
 ) -> Generator[tuple[PressTask, Measurement | str], None, None]:
-    """Make and measure presses, several at a time; yield each as it is done.
+    """Make and measure presses, several at a time; yield each finished one.
 
     Parameters
     ----------
@@ -183,9 +183,9 @@ _worker: PressWorker | None = None
 
 
 def _equip(equipment: Equipment) -> None:
-    """Get a worker's process ready."""
+    """Prepare the process of a worker."""
     global _worker
-    # Ctrl-C is for the process that leads: the press at hand is brought to its end.
+    # Only the main process handles Ctrl-C: the present press is finished.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _worker = PressWorker(equipment)

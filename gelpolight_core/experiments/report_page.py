@@ -1,4 +1,4 @@
-"""A page of an experiment: sections with figures and tables, set as the calibration report's."""
+"""A page of an experiment: sections with figures and tables, like the calibration report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gelpolight_core.report.html import page_html
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What an experiment found, for people.
+    """Results of an experiment for people.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Page:
 
 
 def write_page(page: Page, path: Path) -> None:
-    """Write a page as one HTML file that needs nothing else, completely or not at all.
+    """Write a page as one self-contained HTML file, completely or not at all.
 
     Raises
     ------

@@ -32,18 +32,18 @@ PRESS_AT_MM = (1.5, -1.0)
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A calibration parameter that may be off.
+    """A calibration parameter with an error.
 
     Attributes
     ----------
     name, label, unit : str
         For files, for people, and what it is counted in.
     sd : float
-        Its standard uncertainty, from the stage that finds it or the data sheet that states it.
+        Its standard uncertainty, from its stage or a data sheet.
     source : str
-        Where that comes from.
+        Source of the uncertainty.
     change : callable
-        Gives a sensor's calibration with the parameter off by some of its unit.
+        Returns a sensor's calibration with the parameter changed by a number of its unit.
     """
 
     name: str
@@ -61,12 +61,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """What one parameter does.
+    """Effect of one parameter.
 
     Attributes
     ----------
     parameter : Parameter
-        What was off.
+        The changed parameter.
     low_percent, high_percent : float
         Change of the plateau's height with the parameter one standard uncertainty low, and high.
     rms_um : float
@@ -119,10 +119,8 @@ def parameters() -> tuple[Parameter, ...]:
             "exponent", tr("reflectance, exponent of the cosine"), "%", 1.0, tr("balls"), _exponent
         ),
         Parameter("gloss", tr("reflectance, glossy share"), "%", 1.0, tr("balls"), _gloss),
-        Parameter("factors", tr("light since the background, all"), "%", 1.0, tr("lamps"), _light),
-        Parameter(
-            "factor_red", tr("light since the background, red"), "%", 1.0, tr("lamps"), _red_light
-        ),
+        Parameter("factors", tr("background, all channels"), "%", 1.0, tr("lamps"), _light),
+        Parameter("factor_red", tr("background, red channel"), "%", 1.0, tr("lamps"), _red_light),
         Parameter("crosstalk", tr("crosstalk, each channel"), "%", 0.5, tr("mirror"), _crosstalk),
     )
 
@@ -133,7 +131,7 @@ def sensitivities(
     chosen: Sequence[Parameter] | None = None,
     progress: Progress | None = None,
 ) -> tuple[Sensitivity, ...]:
-    """Return what each parameter does to the depth of a cylinder of 1 mm, largest first.
+    """Return the effect of each parameter on the depth of a cylinder of 1 mm, largest first.
 
     Parameters
     ----------
@@ -164,7 +162,7 @@ def sensitivities(
 
 
 def _common(depth: NDArray[np.float32], exact: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the difference over what both grids have, which may differ by a row or two."""
+    """Return the difference on the common part of both grids."""
     rows, columns = np.minimum(depth.shape, exact.shape)
     difference: NDArray[np.float32] = depth[:rows, :columns] - exact[:rows, :columns]
     return difference

@@ -1,9 +1,8 @@
-"""Extreme cases, each of which must be correct or be refused with its reason.
+"""Extreme cases: each must be correct or be refused with its reason.
 
-A case is a function that returns what it measured. An :class:`InputError`
-counts as refused, and so does a wrong result that reports that it is not
-reliable. Any other exception is a failure of the program; the run continues and the report shows
-it.
+A case is a function that returns its measurement. An :class:`InputError` counts as refused, and so
+does a wrong result that reports that it is not reliable. Any other exception is a failure of the
+program; the run continues and the report shows it.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ class ModeSeen:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a case measured.
+    """Measurement of a case.
 
     Attributes
     ----------
@@ -73,10 +72,9 @@ class Seen:
     finite : bool
         Whether every number of the result is finite.
     error_um, bound_um : float or None
-        Root mean square of the depth's error, and the most that counts as right; None where there
-        is no truth.
+        Root mean square error of the depth, and the largest accepted error; None without truth.
     flags : tuple of (name, percent)
-        Share of the nodes with each flag, where there is any.
+        Share of the nodes with each flag, if there are any.
     condition : float or None
         Largest condition number of the light directions.
     rounds : int or None
@@ -115,7 +113,7 @@ class Case:
     quick : bool
         Whether it takes less than about a second.
     memory : bool
-        Whether the memory that it needs is of interest.
+        Whether its memory is measured.
     """
 
     name: str
@@ -233,7 +231,7 @@ def run_cases(
 
 
 def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
-    """Return the cases of that name or subject, separated by commas; all where none is named.
+    """Return the cases with the given names or subjects, separated by commas; all if none is given.
 
     Raises
     ------

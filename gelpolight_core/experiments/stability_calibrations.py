@@ -100,14 +100,14 @@ def _all_dark() -> Seen:
 
 
 def _read(change: Callable[[Calibration], Calibration]) -> Seen:
-    """Write a changed calibration and read it again, which must refuse it."""
+    """Write a changed calibration and read it again; it must be refused."""
     changed = change(standard_sensor().calibration)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "changed.gplcal"
         write_calibration(changed, path)
         try:
             read_calibration(path)
-        except InputError as error:  # without the place of a folder that is gone
+        except InputError as error:  # without the path of a folder that no longer exists
             raise InputError(error.found, where=path.name, advice=error.advice) from error
     return Seen(False, tr("it was read without an error"))
 

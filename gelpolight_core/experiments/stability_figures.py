@@ -1,4 +1,4 @@
-"""The stability report's figures: errors against what is allowed, and the tornado chart."""
+"""The figures of the stability report: errors with their limits, and the tornado chart."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LOW, HIGH = "#0072b2", "#d55e00"
 
 
 def draw_outcomes(results: Sequence[CaseResult]) -> Drawing:
-    """Show each case's error beside the most that counts as right."""
+    """Show the error of each case with its limit."""
     shown = [r for r in results if r.seen is not None and r.seen.error_um is not None]
 
     def paint(figure: Figure) -> None:
@@ -52,7 +52,7 @@ def draw_outcomes(results: Sequence[CaseResult]) -> Drawing:
 
 
 def draw_tornado(found: Sequence[Sensitivity]) -> Drawing:
-    """Show what each parameter's standard uncertainty does to the plateau's height."""
+    """Show the effect of each parameter's standard uncertainty on the height of the plateau."""
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()

@@ -32,7 +32,7 @@ SIZES = (
     (4, 65_536),
 )
 LARGE = (4904, 6544)
-"""32 megapixels, in lengths that the transform does not like: prime factors 613 and 409."""
+"""32 megapixels with lengths for which the transform is slow: prime factors 613 and 409."""
 TOLERANCES = (1e-2, 1e-3, 3e-4, 1e-6)
 
 
@@ -111,7 +111,7 @@ def grid_cases() -> tuple[Case, ...]:
 def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
     """Return a smooth bump that is 0 at the border, its slopes (at most 1), and the pitch in mm.
 
-    A product of sines squared over 20 mm; along a single row or column it does not change across.
+    A product of squared sines over 20 mm; a single row or column is constant across.
     """
     pitch = 20.0 / max(rows, columns)
 
@@ -139,7 +139,7 @@ def _bump(rows: int, columns: int) -> Seen:
     error = rms_um(np.asarray(found - depth, np.float64).ravel())
     peak_um = 1e3 * float(depth.max())
     summary = tr("{e:.2g} um RMS on a bump of {h:.4g} um").format(e=error, h=peak_um)
-    # Across so few nodes a bump is no smooth one.
+    # With so few nodes, a bump is not smooth.
     share = RIGHT_SHARE if min(rows, columns) in range(2, LEAST_NODES) else FINE_SHARE
     return Seen(True, summary, finite, error, share * peak_um)
 

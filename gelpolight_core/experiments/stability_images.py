@@ -116,7 +116,7 @@ def _with_patch(value: float, channels: tuple[int, ...], flag: Flag | None) -> S
     for channel in channels:
         frame[rows, columns, channel] = value
     wider = np.hypot(x + 6.0, y - 1.0) < HIDDEN_MM + 0.3
-    # Two lights over all of a wide patch still decide, less and nothing do not.
+    # Two lights over a wide patch are sufficient; one or none is not.
     bound = SPOILT_UM if len(channels) == 1 else 2.0 * SPOILT_UM
     needs = () if flag is None else (flag,)
     return judged(known, press, bound, frame=frame, spare=wider, needs=needs)
@@ -171,7 +171,7 @@ def _noise(frame: Map) -> Map:
 
 
 def _not_of_this_sensor(frame: NDArray[Any]) -> Seen:
-    """Reconstruct what cannot be right; each model has to say so."""
+    """Reconstruct an impossible image; each model must report it."""
     known, press = standard_sensor(), standard_press()
     found = maps_of(known, frame)
     warnings = {model: warnings_of(found[model]) for model in MODELS}
@@ -231,7 +231,7 @@ def _read_only(frame: Map) -> Map:
 
 
 def _as(make: Callable[[Map], NDArray[Any]]) -> Seen:
-    """Reconstruct other kinds of numbers, which must give the depth of the usual ones."""
+    """Reconstruct other number types, which must give the usual depth."""
     known, press = standard_sensor(), standard_press()
     frame = make(press.frame)
     seen = judged(known, press, BESIDE_UM, frame=frame)

@@ -105,7 +105,7 @@ def length_rows(costs: Sequence[LengthCost]) -> list[dict[str, Any]]:
 
 
 def length_table(costs: Sequence[LengthCost]) -> str:
-    """Return what 1 % of each stated length costs as lines of text."""
+    """Return the effect of 1 % of each stated length as lines of text."""
     head = f"{tr('1 % wrong'):<38}{tr('height %'):>10}{tr('size %'):>10}  {tr('calibration')}"
     lines = [
         f"{cost.length.label:<38}{cost.height_percent:+10.2f}{cost.size_percent:+10.2f}"
@@ -157,7 +157,7 @@ def sensitivity_table(found: Sequence[Sensitivity]) -> str:
 
 
 def summary_line(results: Sequence[CaseResult]) -> str:
-    """Return how many cases ended how."""
+    """Return the number of cases with each outcome."""
     count = {o: sum(r.outcome is o for r in results) for o in Outcome}
     return tr("{p} passed, {r} refused with the reason, {f} failed, of {n}").format(
         p=count[Outcome.PASSED], r=count[Outcome.REFUSED], f=count[Outcome.FAILED], n=len(results)

@@ -184,7 +184,7 @@ def _lens_cases() -> list[Case]:
 
 
 def _lens(design: SensorDesign) -> Seen:
-    """Press a ball, and follow every node to its pixel and back."""
+    """Press a ball, and project every node to its pixel and back."""
     known = known_sensor(design)
     calibration = known.calibration
     table = calibration.table
@@ -194,7 +194,7 @@ def _lens(design: SensorDesign) -> Seen:
     )
     away_mm = np.hypot(*(there - table.grid.points_mm()[table.valid]).T)
     press = known.pressed(BALL, x_mm=BALL_AT_MM[0], y_mm=BALL_AT_MM[1])
-    # A wide lens has wide pixels: 3 % of one, where that is more.
+    # A wide-angle lens has large pixels: 3 % of a pixel if that is more.
     bound_um = max(RIGHT_UM, 30.0 * table.grid.pitch_mm)
     seen = judged(known, press, bound_um, radius_mm=7.0)
     worst = float(away_mm.max())
@@ -237,7 +237,7 @@ def _wall_cases() -> list[Case]:
 
 
 def _cone(degrees: float) -> Seen:
-    """Press a frustum whose membrane follows it, foot and edge included."""
+    """Press a frustum that the membrane follows completely, with foot and edge."""
     steps = round(6.0 / CONE_PITCH_MM)
     axis = CONE_PITCH_MM * np.arange(-steps, steps + 1)
     x, y = np.meshgrid(axis, axis)

@@ -1,8 +1,8 @@
 """Extreme calibrations: sessions with too little, damaged or wrong data.
 
 Each case changes a session of the virtual sensor, calibrates from it, and measures a press whose
-size is known, in every mode. It is right where height and size are within three stated standard
-deviations; otherwise the calibration or the measurement must say that it is not reliable.
+size is known, in every mode. It passes if height and size are within three stated standard
+deviations; otherwise the calibration or the measurement must report that it is not reliable.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ PRESS = Press("cylinder", 5.0, 1.0, 0.5, -0.5, 0.0)
 SCALE = 0.5
 SIGMAS = 3.0
 LIT = ("mirror", "whiteboard", "background", "balls", "presses")
-"""Stages whose images are lit by the LEDs."""
+"""Stages with LED light."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +66,14 @@ class Length:
 
 @dataclass(frozen=True, slots=True)
 class LengthCost:
-    """What an error of 1 % in one stated length costs.
+    """Effect of an error of 1 % in one stated length.
 
     Attributes
     ----------
     length : Length
-        What is wrong.
+        The wrong length.
     height_percent, size_percent : float
-        Change of a measured cylinder's height and diameter; NaN where nothing was measured.
+        Change of a measured cylinder's height and diameter; NaN without a measurement.
     verdict : str
         The calibration's, or ``refused``.
     """
@@ -125,7 +125,7 @@ def session_cases() -> tuple[Case, ...]:
 
 
 def _counts() -> list[Named]:
-    """Return the cases with too few captures, or captures in one place only."""
+    """Return the cases with too few captures, or captures at one position only."""
     balls = [
         (f"balls_{n}", tr("{n} balls").format(n=n), partial(_keep, "balls", n)) for n in (1, 3, 5)
     ]
@@ -160,7 +160,7 @@ def _spoilt_images() -> list[Named]:
 
 
 def _spoilt_light() -> list[Named]:
-    """Return the cases with wrong light in single stages, or in all that the LEDs light."""
+    """Return the cases with wrong light in single stages, or in all stages with LED light."""
     entries: list[tuple[str, str, ImageChange, tuple[str, ...]]] = [
         ("spots_small", tr("mirror spots of one pixel"), _small_spots, ("mirror",)),
         ("spots_saturated", tr("mirror spots saturated"), partial(_brighter, 6.0), ("mirror",)),
@@ -180,7 +180,7 @@ def _spoilt_light() -> list[Named]:
 
 
 def length_costs(*, progress: Progress | None = None) -> tuple[LengthCost, ...]:
-    """Return what 1 % of each stated length costs, by calibrating with it.
+    """Return the effect of 1 % of each stated length, by calibrating with it.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def length_costs(*, progress: Progress | None = None) -> tuple[LengthCost, ...]:
 
 @lru_cache(maxsize=4)
 def _base(scale: float) -> tempfile.TemporaryDirectory[str]:
-    """Make a session of the virtual sensor once; its folder goes away with the program."""
+    """Make a session of the virtual sensor once; its folder is deleted with the program."""
     holder = tempfile.TemporaryDirectory(prefix="gelpolight-stability-")
     design = replace(SensorDesign(), presses=(PRESS,))
     simulate_session(design, Path(holder.name) / "session", scale=scale)

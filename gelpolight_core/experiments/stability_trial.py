@@ -52,7 +52,7 @@ def standard_press() -> KnownPress:
 
 
 def maps_of(known: KnownSensor, frame: NDArray[Any]) -> dict[str, HeightMap]:
-    """Return what both models make of a frame."""
+    """Return the height maps of a frame by both models."""
     return {m: Reconstructor(known.calibration, model=m).depth(frame) for m in MODELS}
 
 
@@ -65,7 +65,7 @@ def is_finite(found: HeightMap) -> bool:
 
 
 def flag_shares(found: HeightMap) -> tuple[tuple[str, float], ...]:
-    """Return the percentage of the seen nodes with each flag, without those that nothing has."""
+    """Return the percentage of the visible nodes with each flag that occurs."""
     seen = (found.flags & int(Flag.OUTSIDE)) == 0
     count = max(int(seen.sum()), 1)
     shares = [
@@ -84,7 +84,7 @@ def flagged(found: HeightMap, flag: Flag) -> NDArray[np.bool_]:
 def depth_error(
     found: HeightMap, truth: TrueDepth, *, radius_mm: float, spare: NDArray[np.bool_] | None = None
 ) -> NDArray[np.float64]:
-    """Return found minus true depth, mm, at the map's nodes inside a radius that are not spared."""
+    """Return found minus true depth, mm, at the compared nodes inside a radius."""
     step = truth.x_mm[1] - truth.x_mm[0]
     column = np.asarray((found.x_mm - truth.x_mm[0]) / step, np.float32)
     row = np.asarray((found.y_mm - truth.y_mm[0]) / step, np.float32)
@@ -139,11 +139,11 @@ def judged(
     known, press
         The sensor, and what is pressed into it.
     bound_um : float
-        Largest error of the full model that is right (root mean square).
+        Largest accepted error of the full model (root mean square).
     frame : array, optional
-        In place of the press's own image.
+        Image instead of that of the press.
     spare : (rows, columns) bool, optional
-        Nodes that are not compared, because nothing can be known there.
+        Nodes that are not compared, because their depth cannot be known.
     needs : sequence of Flag, optional
         Flags that must be raised somewhere by every model.
     models : sequence of str, optional
@@ -192,7 +192,7 @@ def judged(
         flags=flag_shares(best),
         condition=condition_of(calibration),
         rounds=rounds_of(by["full"], image) if "full" in found else None,
-        # A note counts for the mode that gives it, and for no other.
+        # A note counts only for the mode that gives it.
         warning="",
         modes=modes,
     )
@@ -206,17 +206,18 @@ def _raised(heightmap: HeightMap, needs: Sequence[Flag]) -> list[str]:
 
 
 def own_share(heightmap: HeightMap) -> float:
-    """Return what a mode may add to the bound, as a share of the deepest place.
+    """Return the additional error that a mode may have, as a share of the largest depth.
 
-    Coarse nodes and frozen lights err even with an exact calibration, by what is part of the
-    stated standard deviation. More than `MOST_OWN_SHARE` has to be noted on the map.
+    Coarse nodes and the lights of the flat membrane cause errors even with an exact calibration.
+    These are part of the stated standard deviation. Above `MOST_OWN_SHARE`, the map must have a
+    note.
     """
     own = mode_error(heightmap)
     return min(math.hypot(own.depth, own.depth_per_slope * BALL_SLOPE), MOST_OWN_SHARE)
 
 
 def warnings_of(found: HeightMap) -> tuple[str, ...]:
-    """Return the notes of a map that say its depth is not reliable."""
+    """Return the notes of a map that report an unreliable depth."""
     harmless = {free_boundary_note()}
     if found.health is not None:
         harmless |= {finding.line for finding in found.health.findings if finding.corrected}

@@ -15,7 +15,8 @@ Mask = NDArray[np.bool_]
 LEVELS, HALVINGS = 60, 16
 SHADOW_STEPS = 50
 CLEAR_MM = 0.004
-"""A surface that rises less above a light's ray casts no shadow: the truth is interpolated."""
+"""A surface that rises less above a light ray casts no shadow, because the truth is
+interpolated."""
 
 
 class TrueView(NamedTuple):
@@ -28,7 +29,7 @@ class TrueView(NamedTuple):
     points_mm, normals : (rows, columns, 3)
         Sensor frame; unit normals, z < 0.
     known : (rows, columns) bool
-        Whether the truth reaches so far.
+        Whether the truth is known there.
     """
 
     depth_mm: Array
@@ -45,9 +46,9 @@ def true_view(truth: TrueDepth, x_mm: Array, y_mm: Array, ray_slope: Array) -> T
     truth : TrueDepth
         The surface.
     x_mm, y_mm : (columns,), (rows,)
-        Where the rays meet the flat membrane.
+        Intersections of the rays with the flat membrane.
     ray_slope : (rows, columns, 2)
-        Their sideways move per mm of depth.
+        Their lateral displacement per mm of depth.
     """
     x, y = np.meshgrid(x_mm, y_mm)
 
@@ -82,7 +83,7 @@ def true_view(truth: TrueDepth, x_mm: Array, y_mm: Array, ray_slope: Array) -> T
 
 
 def lit_by(truth: TrueDepth, view: TrueView, leds_mm: Array) -> Mask:
-    """Return which LEDs (rows, columns, 3) reach each point: it faces them and nothing is between.
+    """Return which LEDs (rows, columns, 3) light each point: it faces them without an obstacle.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def lit_by(truth: TrueDepth, view: TrueView, leds_mm: Array) -> Mask:
     for k in range(3):
         to_led = leds_mm[k] - view.points_mm
         lit[..., k] = np.einsum("ijc,ijc->ij", to_led, view.normals) > 0.0
-        # The ray is clear once it is deeper than the deepest of the surface.
+        # The ray is clear when it is deeper than the deepest point of the surface.
         share = np.maximum(deepest - view.depth_mm, 0.0) / -to_led[..., 2]
         for i in range(1, SHADOW_STEPS + 1):
             at = (share * (i / SHADOW_STEPS) ** 1.5)[..., None] * to_led + view.points_mm
@@ -106,7 +107,7 @@ def lit_by(truth: TrueDepth, view: TrueView, leds_mm: Array) -> Mask:
 
 
 def _at(truth: TrueDepth, values: Array, x: Array, y: Array) -> Array:
-    """Return values of the truth's grid at places, 0 outside it."""
+    """Return values of the truth's grid at positions, 0 outside it."""
     pitch = float(truth.x_mm[1] - truth.x_mm[0])
     index = [(y - truth.y_mm[0]) / pitch, (x - truth.x_mm[0]) / pitch]
     return np.asarray(map_coordinates(values, index, order=1, mode="constant"))

@@ -37,7 +37,7 @@ def calibrate_virtual_sensor(
 ) -> Path:
     """Calibrate the virtual sensor as a technician would; return the calibration's file.
 
-    What an earlier call has finished is not made again.
+    Finished results of an earlier call are used again.
 
     Parameters
     ----------
@@ -85,28 +85,28 @@ def press_protocol(
     workers: int = 2,
     progress: Progress | None = None,
 ) -> None:
-    """Make every press that is left, and measure every press that is not measured yet.
+    """Make all remaining presses, and measure all presses without a measurement.
 
-    Object after object gets its next press, so that a run that is broken off has seen all.
+    The objects alternate, so that an interrupted run contains all objects.
 
     Parameters
     ----------
     run : ProtocolRun
-        What is pressed, and where it is kept.
+        The presses, and their folder.
     equipment : Equipment
         The virtual sensor, where presses are left, and the calibration.
     ledger : Ledger
         Keeps what is measured.
     workers : int, optional
-        Presses that are worked on at a time.
+        Number of presses processed at the same time.
     progress : callable, optional
-        Called with the last task and the share done, 0..1; its exceptions stop it, and nothing
-        that is done is lost.
+        Called with the last task and the share done, 0..1. Its exceptions stop the work; finished
+        presses are kept.
 
     Raises
     ------
     InputError
-        If the disk refuses something, or the calibration cannot be read.
+        If a file cannot be written, or the calibration cannot be read.
     """
     tasks = [_task(run, press, make=False) for press in run.done]
     tasks = [task for task in tasks if not _is_measured(task, ledger)]
@@ -144,7 +144,7 @@ def measure_folder(
     ledger : Ledger
         Keeps what is measured.
     workers : int, optional
-        Images that are worked on at a time.
+        Number of images processed at the same time.
     progress : callable, optional
         Called with the file name and the share done, 0..1.
 

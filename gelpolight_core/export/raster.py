@@ -166,9 +166,9 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
 
     per_centimetre = 10.0 / heightmap.pitch_mm
     # Not directly into the file: NumPy's own writing does not report a full disk.
-    held = io.BytesIO()
+    buffer = io.BytesIO()
     tifffile.imwrite(
-        held,
+        buffer,
         heightmap.depth_mm.astype(np.float32, copy=False),
         byteorder="<",
         photometric="minisblack",
@@ -178,7 +178,7 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
         metadata=None,
         software="GelPoLight Studio",
     )
-    file.write(held.getbuffer())
+    file.write(buffer.getbuffer())
 
 
 def write_png16(heightmap: HeightMap, file: BinaryIO) -> None:

@@ -36,15 +36,15 @@ from gelpolight_core.sensor_calibration import Calibration
 Map = NDArray[np.float32]
 LEAST_UNTOUCHED = 0.12
 """Share of the field that must look as at calibration; otherwise all faults are unknown."""
-RIM_CHANGE, LEAST_RIM = 0.02, 0.5
-"""Alternatively this share of the edge of the field, within this change of light: a contact covers
-the rest."""
+BOUNDARY_CHANGE, LEAST_RIM = 0.02, 0.5
+"""Alternatively, this share of the boundary must have at most this change of light: a contact
+covers the rest."""
 UNJUDGED = tuple(key for key in KEYS if key not in ("other_sensor", "colour_order", "dark"))
 SWAPPED_UNTOUCHED = 0.4
 DARK = 0.1
-"""Share of the light at calibration below which nothing is seen."""
+"""Share of the light at calibration below which an image is dark."""
 STRIPE_ROWS = 12
-"""Rows of each frame that are searched for bad pixels; the next frame's are others."""
+"""Rows of each frame that are searched for bad pixels; each frame uses other rows."""
 MISSING = 65535
 """Code of a float that is not finite: it counts as saturated."""
 ORDERS = tuple(order for order in permutations(range(3)) if order != (0, 1, 2))
@@ -53,7 +53,7 @@ ORDERS = tuple(order for order in permutations(range(3)) if order != (0, 1, 2))
 class HealthCheck:
     """Checks frames of one sensor against the background of its calibration.
 
-    It may be called from several threads, which then wait for each other.
+    Several threads can call it; they then wait for each other.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class HealthCheck:
         self._lock = Lock()
 
     def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults of a frame, whatever is pressed into the membrane.
+        """Return the faults of a frame, with or without an object pressed in.
 
         Parameters
         ----------
@@ -84,15 +84,15 @@ class HealthCheck:
             RGB; whole numbers as the camera encodes them, floats linear light 0..1.
         whole : bool, optional
             Whether to search all rows for bad pixels, and to follow large movements of the camera;
-            some tens of milliseconds. By default one stripe of rows is searched, and the next
-            frame's is another.
+            some tens of milliseconds. By default one stripe of rows is searched, another one for
+            each frame.
         """
         if not self.samples.count.size:
             return Health(unknown=("other_sensor",), untouched=0.0)
         with self._lock:
             raw, light = self._coded(frame)
             common = self._common(raw, light)
-            if common.share < LEAST_UNTOUCHED and self._rim_fits():
+            if common.share < LEAST_UNTOUCHED and self._boundary_fits():
                 return Health(unknown=UNJUDGED, untouched=common.share)
             if common.share < LEAST_UNTOUCHED:
                 return self._strange(raw, light, common.share, whole)
@@ -105,7 +105,7 @@ class HealthCheck:
         common: CommonChange,
         whole: bool,
     ) -> Health:
-        """Return what has changed on a membrane that is this sensor's."""
+        """Return the changes on the membrane of this sensor."""
         limits, samples = self._limits, self.samples
         if (common.values[:6:2] < DARK - 1.0).all():
             return health_of([dark_finding()], untouched=common.share)
@@ -116,7 +116,7 @@ class HealthCheck:
         changes = light_findings(common, limits)
         gain = light_gain(common, changes, limits)
         if moved is not None and moved.value > FOLLOWED_PX:
-            # The light's own fall has moved too.
+            # The pattern of the light has moved, too.
             changes, gain = [finding for finding in changes if finding.meaningless], None
         if gain is not None:
             changes = [corrected(change) for change in changes]
@@ -125,7 +125,7 @@ class HealthCheck:
         if blurred is not None and blurred.meaningless and common.share < LEAST_START:
             # The texture is missing.
             return health_of([stranger_finding()], untouched=common.share)
-        # Specks that have moved or faded are no dirt, nor is a bad line.
+        # Specks that have moved or become weaker are not dirt, nor is a bad line.
         specks = moved or blurred or any(finding.key == "bad_line" for finding in pixels)
         found = [
             *changes,
@@ -144,12 +144,14 @@ class HealthCheck:
             light=gain,
         )
 
-    def _rim_fits(self) -> bool:
-        """Return whether the rim looks as at calibration, where a contact covers the rest."""
+    def _boundary_fits(self) -> bool:
+        """Return whether the boundary looks as at calibration, where a contact covers the rest."""
         s = self.samples
-        at_rim = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (self._full == 0.0)
+        at_boundary = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (
+            self._full == 0.0
+        )
         change = self._change[:, :6:2] / s.normal[:, [0, 2, 4], [0, 2, 4]]
-        fits = (np.abs(change[at_rim]) < RIM_CHANGE).all(axis=1)
+        fits = (np.abs(change[at_boundary]) < BOUNDARY_CHANGE).all(axis=1)
         return bool(fits.size and fits.mean() > LEAST_RIM)
 
     def _strange(self, raw: NDArray[Any], light: Map, share: float, whole: bool) -> Health:
@@ -189,7 +191,7 @@ class HealthCheck:
         return bad_pixel_findings(single / marks.size, single, columns.tolist(), lines.tolist())
 
     def _coded(self, frame: NDArray[Any]) -> tuple[NDArray[Any], Map]:
-        """Return a frame in whole numbers, and the linear light of each number."""
+        """Return a frame as integers, and the linear light of each value."""
         if frame.dtype.kind == "f":
             finite = np.isfinite(frame)
             code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING - 1) + 0.5

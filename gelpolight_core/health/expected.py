@@ -28,7 +28,7 @@ def raw_background(calibration: Calibration) -> Map:
 
 
 def even_membrane(calibration: Calibration) -> Array:
-    """Return what an even, flat membrane would show (I_t of Eq. 9), (rows, columns, 3)."""
+    """Return the image of a uniform flat membrane (I_t of Eq. 9), (rows, columns, 3)."""
     cosines = flat_cosines(calibration.table, calibration.led_positions_mm)
     response = [calibration.reflectance.response(k, cosines[..., k]) for k in range(3)]
     return np.asarray(calibration.radiance * np.stack(response, axis=-1))

@@ -15,7 +15,7 @@ KEYS = (
     "dark", "led_off", "led_weak", "exposure", "room_light", "colour_order", "other_sensor",
     "saturated", "camera_moved", "blurred", "dirt", "bad_pixels", "bad_line", "not_recovered",
 )  # fmt: skip
-"""All that can be found."""
+"""Keys of all faults."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,13 +29,13 @@ class Finding:
     cause : str
         What is wrong, as a clause without a full stop.
     remedy : str
-        What to do about it, as a sentence without a full stop.
+        The remedy, as a sentence without a full stop.
     severity : Verdict
         ``warn``: the depth is less exact than stated; ``fail``: it is far off.
     meaningless : bool
         Whether the depth is meaningless.
     value : float
-        How large the fault is, in `unit`.
+        Size of the fault, in `unit`.
     unit : str
         Such as ``%`` or ``px``.
     corrected : bool
@@ -72,7 +72,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class LightGain:
-    """How the LEDs' light, or the exposure, has changed since the calibration.
+    """Change of the LEDs' light or of the exposure since the calibration.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class LightGain:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What was found in an image.
+    """Faults of an image.
 
     Attributes
     ----------
@@ -100,11 +100,10 @@ class Health:
     untouched : float
         Share of the field that looks as at calibration, 0..1.
     cells : (cells, 3) or None
-        Change of the light of each cell of the field, less what all have in common; None where
-        that is not known.
+        Change of the light of each cell minus the common change; None if it is not known.
     light : LightGain or None
-        What the depth is corrected for; None where the light is as at calibration within its
-        noise, or cannot be corrected.
+        Change of the light that is corrected; None if the light has not changed within its noise,
+        or if the change cannot be corrected.
     """
 
     findings: tuple[Finding, ...] = ()
@@ -115,7 +114,7 @@ class Health:
 
     @property
     def faults(self) -> tuple[Finding, ...]:
-        """The findings that the depth is not corrected for."""
+        """The findings that are not corrected in the depth."""
         return tuple(finding for finding in self.findings if not finding.corrected)
 
     @property
@@ -125,7 +124,7 @@ class Health:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """What was found."""
+        """Keys of all findings."""
         return tuple(finding.key for finding in self.findings)
 
     @property
@@ -142,7 +141,7 @@ def health_of(
     cells: NDArray[np.float64] | None = None,
     light: LightGain | None = None,
 ) -> Health:
-    """Return findings in the order of their weight."""
+    """Return the health with findings in the order of their severity."""
 
     def weight(finding: Finding) -> tuple[bool, bool, bool, int]:
         severe = finding.severity is Verdict.FAIL
@@ -152,7 +151,7 @@ def health_of(
 
 
 def refuse_meaningless(health: Health, *, where: str) -> None:
-    """Refuse an image whose depth would mean nothing.
+    """Refuse an image whose depth would be meaningless.
 
     Raises
     ------

@@ -18,36 +18,38 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 TOLERANCES = np.array([0.03, 0.01, 0.006, 0.006])
-"""Share by which a cell's light may be off the common change, round by round."""
+"""Largest deviation of a cell's light from the common change, for each round."""
 SIGMAS = 4.5
 STRONG = 0.012
-"""Cells around one that is off by more are left out as well: its drape reaches them."""
+"""If a cell deviates by more, its neighbours are left out, too: the drape reaches them."""
 NEAR, FIRST = 0.012, 0.04
-"""Changes of a cell's light that are tried for the untouched part: as at calibration, or nearly."""
+"""Tested limits for the change of light of the untouched part."""
 LEAST_NEAR = 0.15
-"""Share of the field that must look so; else the common change may be of any size ..."""
+"""Least share of the field within these limits; otherwise the common change can have any size
+..."""
 LEAST_START = 0.35
 """... and this share of the field must follow it."""
 PRECISION = np.array([0.5, 0.05, 0.5, 0.05, 0.5, 0.05, 4.0, 4.0, 8.0]) ** -2.0
-"""Of what is known of the parameters before anything is seen."""
+"""Prior precision of the parameters."""
 PAIRS = 1500
 CORRELATED = 1.6
-"""Neighbouring samples share pixels: deviations are larger than independent ones by this."""
+"""Neighbouring samples share pixels: this is the factor of their deviation over that of independent
+ones."""
 ROUGHEST = 9.0
-"""A cell whose samples scatter by this variance over the usual one has another texture."""
+"""A cell has another texture if the variance of its samples is larger than usual by this factor."""
 LEAST_CELLS = 4
 LEAST_AS_BEFORE = 0.15
-"""A connected share of the field that looks as at calibration: the light has not changed, and the
-rest of the field is pressed, such as by a shallow face."""
+"""If a connected share of the field of this size looks as at calibration, the light has not changed
+and the rest of the field is pressed, for example by a shallow face."""
 AS_BEFORE_OFF = 0.4
-"""Its light may have changed by this share of the supposed change."""
+"""Its light can have changed by this share of the assumed change."""
 WITHOUT_OFFSETS = np.array([0, 2, 4, 6, 7, 8])
 """Room light and gain are hard to separate; without room light, the gain alone is more accurate."""
 
 
 @dataclass(frozen=True, slots=True)
 class CommonChange:
-    """What all of the untouched membrane has in common.
+    """The common change of the untouched membrane.
 
     Attributes
     ----------
@@ -57,7 +59,7 @@ class CommonChange:
     untouched : (cells,) bool
         Cells that follow it.
     change : (cells, 3)
-        What is left of each cell's light, share.
+        Remaining change of each cell's light, as a share.
     gain, gain_sd : (3,)
         Gain less 1 of each channel if the room light is as at calibration; standard deviations.
     """
@@ -127,7 +129,7 @@ def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:
     samples : Samples
         The sensor's.
     light, supposed : (cells, 3)
-        Change of each cell's light, and what of it the fit takes for a change of all the light.
+        Change of each cell's light, and its part that the fit assigns to the common change.
     """
     size = float(np.abs(supposed).mean(axis=0).max())
     around = np.abs(light[samples.beside].mean(axis=1)).max(axis=1)
@@ -166,7 +168,7 @@ def _remaining(normal, change, values, left):  # type: ignore[no-untyped-def]  #
 
 @numba.njit(nogil=True, cache=True)
 def _outer_part(beside, kept):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Leave only the connected part with most of the field's rim.
+    """Keep only the connected part with the longest share of the field's boundary.
 
     The middle of a flat contact looks nearly untouched.
     """
@@ -210,9 +212,9 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     kept,
     left,
 ):
-    """Fit, and keep the cells that follow, in turns; the last six are written.
+    """Fit and select the matching cells alternately; the last six arguments are written.
 
-    Where the change is large, saturated cells part the field, and it need not be `connected`.
+    With a large change, saturated cells can divide the field, so it need not be `connected`.
     """
     cells, size = kept.size, PARAMETERS
     scatter, strong = np.empty(cells), np.empty(cells, np.bool_)

@@ -27,21 +27,20 @@ LEAST_GAIN = 0.0014
 LEAST_CHANNEL = 0.003
 """Change of one channel; 0.5 % costs 10 um."""
 LEAST_OFFSET, LEAST_LOSS = 0.0002, 0.0006
-"""Room light, and less of it than at calibration, share of full scale; 0.0003 costs 10 um.
-
-A shallow press over much of the field looks like a loss of up to 0.0005.
-"""
+"""More and less room light than at calibration, share of full scale; 0.0003 costs 10 um. A shallow
+press over much of the field looks like a loss of up to 0.0005. """
 GAIN_BY_INTERREFLECTION = 0.004
-"""A deep press changes the light from the membrane around by so much, times its strength."""
+"""A deep press changes the light from the membrane around it by this factor times the
+interreflection."""
 LEAST_CORRECTED, LEAST_MEAN_CORRECTED = 0.001, 0.0005
-"""Smaller changes of a channel, and of all, are left as they are: they cost 3 to 5 um, and shallow
-faces look like as much."""
+"""Smaller changes of a channel, and of all channels, are not corrected: they cost 3 to 5 um, and
+shallow faces have the same effect."""
 CLEAR_ROOM_LIGHT = 3.0
-"""Room light of so many times the limit counts although a gain may cancel it."""
+"""Room light above this multiple of the limit counts, although a gain can cancel it."""
 MEAN_BY_INTERREFLECTION = 0.002
 """As `GAIN_BY_INTERREFLECTION`, of the mean of the channels."""
 PRESS_BY_INTERREFLECTION = 0.0015
-"""Standard deviation of what presses change of the light around, times the interreflection."""
+"""Standard deviation of the change of light around presses, over the interreflection."""
 CORRECTABLE = ("exposure", "led_weak")
 LEAST_SHIFT_PX = 0.5
 """0.6 px cost 10 um."""
@@ -49,7 +48,7 @@ LEAST_BLUR_PX = 1.0
 """A blur of 1.4 px costs 10 um."""
 LED_OFF = -0.8
 FAR_GAIN, FAR_OFFSET = 0.05, 0.005
-"""From here on the depth is off by a third of its value and more."""
+"""Above these, the error of the depth is a third of its value or more."""
 FAR_SHIFT_PX, FAR_BLUR_PX = 10.0, 6.0
 SATURATED_SHARE, MOSTLY_SATURATED = 0.01, 0.3
 DIRT_CHANGE, DIRT_SPREAD, DIRT_RUNS = -0.06, 0.12, 2
@@ -60,7 +59,7 @@ BACKGROUND = tr("set to zero or capture the background again")
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """From where on a change counts.
+    """Limits above which a change is a fault.
 
     Attributes
     ----------
@@ -128,7 +127,7 @@ def light_findings(common: CommonChange, limits: Limits) -> list[Finding]:
 def light_gain(
     common: CommonChange, changes: Sequence[Finding], limits: Limits
 ) -> LightGain | None:
-    """Return what the depth is corrected for; None where the light is the same, or too different.
+    """Return the correction of the light; None if the light is the same, or too different.
 
     Parameters
     ----------
@@ -145,7 +144,7 @@ def light_gain(
     if any(found.key not in CORRECTABLE for found in changes):
         if not any(found.key in CORRECTABLE for found in changes):
             return None
-        # Beside room light, which stays a fault, the gain is what the joint fit leaves of it.
+        # With room light, which remains a fault, the gain is that of the joint fit.
         gain, sd = common.values[:6:2], common.sd[:6:2]
     sure = np.abs(gain) > limits.corrected + SIGMAS * sd
     mean, mean_sd = float(gain.mean()), float(sd.max()) / math.sqrt(3.0)
@@ -155,7 +154,7 @@ def light_gain(
 
 
 def corrected(change: Finding) -> Finding:
-    """Return a change of the light that the depth is corrected for; room light stays as it is."""
+    """Return the finding of a change of the light that is corrected; room light is not."""
     if change.key not in CORRECTABLE:
         return change
     remedy = tr("The depth is corrected for this. {remedy}").format(remedy=change.remedy)
@@ -163,7 +162,7 @@ def corrected(change: Finding) -> Finding:
 
 
 def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:
-    """Return the LED whose channel has changed unlike the others; None where none has."""
+    """Return the LED whose channel has changed differently from the others, or None."""
     middle = float(np.median(gains))
     k = int(np.argmax(np.abs(gains - middle)))
     change = float(gains[k])
@@ -223,7 +222,7 @@ def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> 
     common : CommonChange
         The fit, which follows a pixel or two.
     seen_px : (float, float) or None
-        By a search, where one was made.
+        Result of a search, if there was one.
     """
     if seen_px is not None and math.hypot(*seen_px) > LEAST_SHIFT_PX:
         return far_moved_finding(seen_px)
@@ -252,7 +251,7 @@ def _moved(text: str, size: float, far: bool) -> Finding:
 
 
 def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
-    """Return that the image is blurred; None where it is not, or no texture shows it."""
+    """Return that the image is blurred; None if it is not, or if there is no texture."""
     if not strength.size:
         return None
     seen, sd = float(common.values[BLUR]), float(common.sd[BLUR])
@@ -283,7 +282,7 @@ def saturated_finding(share: float) -> Finding | None:
 
 
 def dirt_finding(samples: Samples, run_change: Array, common: CommonChange) -> Finding | None:
-    """Return that something dark lies on the membrane or in the light's path."""
+    """Return that something dark is on the membrane or in the path of the light."""
     red, green, blue = (
         run_change[k] / samples.run_light[k] - common.values[2 * k] for k in range(3)
     )
@@ -350,7 +349,7 @@ def swapped_finding(order: Sequence[int]) -> Finding:
 
 
 def stranger_finding() -> Finding:
-    """Return that nothing of this sensor's untouched membrane is seen."""
+    """Return that the image does not show this sensor's membrane."""
     return Finding(
         "other_sensor",
         tr("the image does not look like this sensor's membrane"),

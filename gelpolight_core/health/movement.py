@@ -1,7 +1,7 @@
 """Camera movement against the membrane that is too large for the fit.
 
-The samples are looked up beside their places: first on a coarse lattice of shifts, then on finer
-ones about the best. What is left is followed by the fit.
+The samples are compared with shifted positions: first on a coarse lattice of shifts, then on finer
+ones about the best. The fit finds the rest.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ Lattice = tuple[int, int]
 LATTICES: tuple[Lattice, ...] = ((64, 8), (4, 2), (1, 1))
 """Reach and step in px: within 4 px the membrane still looks like itself."""
 FOLLOWED_PX = 1.5
-"""What the fit follows."""
+"""Largest movement that the fit can follow."""
 EXPLAINED_SHARE = 0.4
 """Share of the field that must look as at calibration after the shift."""
 
 
 def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float, float] | None:
-    """Return how far the membrane has moved in the image; None where no shift explains it.
+    """Return the movement of the membrane in the image; None if no shift explains the image.
 
     Parameters
     ----------
@@ -54,13 +54,13 @@ def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float,
     most = np.array(raw.shape[:2], np.int32) - 2
 
     def off(u: int, v: int) -> float:
-        """Return how unlike the background the image is after a shift."""
+        """Return the difference between image and background after a shift."""
         corner = np.clip(samples.corner + np.array([v, u], np.int32), 0, most)
         compare_samples(
             raw, light, np.float32(SATURATED), corner, samples.part, samples.run_cell,
             samples.expected, samples.effects, samples.weight, change, square, full, run_change,
         )  # fmt: skip
-        # Whatever is pressed: most cells decide.
+        # Independent of pressed objects: the majority of cells decides.
         return float(np.median(square / samples.count))
 
     u, v = 0, 0

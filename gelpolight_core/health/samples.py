@@ -1,9 +1,9 @@
 """The sample points of the health check, with their expected values.
 
-The field is parted into cells of about a millimetre. In each, a few short runs of grid nodes are
-sampled from the raw frame, by the same interpolation as the background was. How a change of light,
-room light, a shift and a blur would show is known from the background, so that the least-squares
-sums of each cell need one pass over the samples.
+The field is divided into cells of about a millimetre. In each, a few short runs of grid nodes are
+sampled from the raw frame, by the same interpolation as the background was. The effects of a change
+of light, room light, shift and blur are computed from the background beforehand, so that the
+least-squares sums of each cell need only one pass over the samples.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ Mask = NDArray[np.bool_]
 
 CELL_MM = 1.15
 CELL_NODES = 10
-"""A cell is at least so many nodes wide."""
+"""Least width of a cell in nodes."""
 RUN = 8
 """Neighbouring nodes that are sampled together: they share the camera's rows."""
 RUNS_OF_CELL = 4
 SMOOTH_NODES = 1.5
-"""Over which the background's roughness is taken."""
+"""Smoothing for the roughness of the background."""
 FINE_NODES = 0.7
-"""Over which its slopes are taken: wider, and a shift of specks comes out too large."""
+"""Smoothing for its slopes: with a larger one, the shift of specks would be overestimated."""
 TEXTURE = 20.0
-"""A run shows a blur where it is so many times as rough as most: noise is rough too."""
+"""A run can show a blur if it is rougher than most by this factor, because noise is rough, too."""
 LEAST_TEXTURE_RUNS = 8
 BLURS_PX = (0.5, 1.0, 2.0, 4.0, 8.0)
-"""Blurs (standard deviation) that are tried on the background, to know what they look like."""
+"""Blurs (standard deviation) applied to the background to compute their effect."""
 LEAST_NOISE = 0.4 / 255.0
 """Rounding to 8 bits alone is noise of 0.3 steps."""
 ROUGH = 0.02
-"""Share of the light's change from pixel to pixel that interpolation may get wrong."""
+"""Error of interpolation as a share of the change of light from pixel to pixel."""
 EFFECTS = 5
-"""What may change a channel: gain, offset, shift along u and v, blur."""
+"""Number of effects on a channel: gain, offset, shift along u and v, blur."""
 PARAMETERS = 9
 """Gain and offset of each channel; shift along u, along v; blur."""
 SHIFT_U, SHIFT_V, BLUR = 6, 7, 8
@@ -78,8 +78,8 @@ class Samples:
     run_cell : (runs,) int32
         Cell of each run.
     blur_strength : (1 + blurs,) float64
-        What the fit of the blur gives for no blur and for `BLURS_PX`; empty where the membrane has
-        too little texture to show one.
+        Result of the blur fit for no blur and for `BLURS_PX`; empty if the membrane has too little
+        texture.
     """
 
     corner: Index
@@ -177,8 +177,8 @@ def _runs(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Mask]:
     """Return row, first column and cell of the runs, by cell, and whether they are textured.
 
-    One run of each cell is where the membrane has most texture, for shift and blur show there; the
-    others are anywhere.
+    One run of each cell is at the strongest texture, which shows shift and blur; the others are
+    anywhere.
     """
     size, (rows, columns) = _cell_nodes(table), core.shape
     blocks = columns // RUN
@@ -197,7 +197,7 @@ def _runs(
     starts = np.flatnonzero(np.r_[True, np.diff(cell[order]) != 0]) if row.size else order
     lengths = np.diff(np.r_[starts, row.size])
     rank[order] = np.arange(row.size) - np.repeat(starts, lengths)
-    # A cell with fewer runs lies at the rim.
+    # A cell with fewer runs lies at the boundary.
     few = np.repeat(lengths < RUNS_OF_CELL, lengths)
     keep = order[(rank[order] < RUNS_OF_CELL) & ~few]
     row, block, cell = row[keep], block[keep], cell[keep]
@@ -250,7 +250,7 @@ def compare_samples(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
     light : (3, levels) float32
         Linear light of every number.
     limit : float
-        Light from which on a channel is saturated.
+        Light above which a channel is saturated.
     corner, part, run_cell, expected, effects, weight
         Of :class:`Samples`.
     change : (cells, PARAMETERS) float64

@@ -15,11 +15,11 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 TEXTURE_MM = 0.5
-"""Specks and grain below this size are what a shift is seen by."""
+"""Largest size of specks and grain that show a shift."""
 SMOOTH_PX = 1.5
-"""Nodes that the grain is smoothed over."""
+"""Smoothing of the grain, in nodes."""
 LEAST_PEAK = 8.0
-"""A correlation peak lower than this many times its surroundings' scatter is chance."""
+"""Least height of a correlation peak, as a multiple of the scatter around it."""
 
 
 def texture_shift_px(
@@ -27,7 +27,8 @@ def texture_shift_px(
 ) -> tuple[float, float] | None:
     """Return how far the membrane's texture has moved in the camera's image.
 
-    By phase correlation of the grain, which neither the brightness nor the fall of the light moves.
+    By phase correlation of the grain, which is independent of brightness and distribution of the
+    light.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def texture_shift_px(
     window = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), sigma)
     parts = [rfft2(_texture(light, inside, sigma) * window) for light in (seen, base)]
     product = parts[0] * np.conj(parts[1])
-    # Half whitened: noise alone would decide at the frequencies without texture.
+    # Half whitened: otherwise, noise would dominate at the frequencies without texture.
     product /= np.sqrt(np.maximum(np.abs(product), 1e-20))
     peaks = irfft2(product, usable.shape)
     row, column = np.unravel_index(int(peaks.argmax()), peaks.shape)

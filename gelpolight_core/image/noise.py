@@ -1,7 +1,7 @@
 """Noise-scaled difference between a press and the image without contact.
 
-A difference means something only against the noise and the drift of the light that two images
-of the same membrane always show, so both are measured on the images themselves.
+A difference is significant only if it exceeds the noise and the change of light between any two
+images of the same membrane. Both are therefore measured on the images themselves.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-# Two images taken one after the other repeat to about this share of their brightness (flicker of
-# the light, settling of the membrane); smaller differences are no indentation even without noise.
+# Consecutive images differ by about this share of their brightness (flicker of the light, settling
+# of the membrane). Smaller differences are not an indentation, even without noise.
 REPEATABILITY = 0.01
-# Rounding two 8-bit images leaves this much, however quiet the camera is.
+# Noise by rounding two 8-bit images, for any camera.
 ROUNDING = float(np.sqrt(2.0 / 12.0) / 255.0)
 # Below this brightness a ratio of two images is mostly rounding.
 DARK = 4.0 / 255.0
-# Beyond a quarter, the exposure or a light was changed and not merely warm.
+# Above a quarter, the exposure or a light was changed; warming changes it less.
 LARGEST_GAIN_CHANGE = 0.25
-# Medians of this many pixels are known to about half a percent; more only cost time.
+# Medians of this number of pixels are accurate to about half a percent; more only take more time.
 _ENOUGH = 60_000
 
 
 @dataclass(frozen=True, slots=True)
 class ScaledDifference:
-    """What changed between two images, in units of what changes without a press.
+    """Difference of two images, in units of the usual difference without a press.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class ScaledDifference:
     valid_small : (small rows, small columns) bool
         The working area on that grid.
     factor : int
-        How many pixels of the image make one of `scaled`.
+        Pixels of the image per pixel of `scaled`, along an axis.
     gain : tuple of 3 floats
         Brightness of the press over that of the background where nothing touches, per channel.
     noise : tuple of 3 floats
@@ -84,7 +84,7 @@ def prepare_pair(
     valid : (rows, columns) bool or None
         The working area; without it, the lit part of `background`.
     name, background_name : str, optional
-        What to call the images in messages.
+        Names of the images in messages.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def lit_area(background: Array, name: str = "background") -> Mask:
     background : (rows, columns, 3)
         Image without contact, finite.
     name : str, optional
-        What to call it in messages.
+        Its name in messages.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def lit_area(background: Array, name: str = "background") -> Mask:
     """
     red, green, blue = cv2.split(background)
     light = cv2.GaussianBlur(cv2.max(cv2.max(red, green), blue), (0, 0), 2.0)
-    # Some twentieth of the brightest is where a dark rim begins and a ratio stops to mean anything.
+    # Below about a twentieth of the brightest, there is a dark edge, and ratios are meaningless.
     bright = light > max(0.05 * float(np.quantile(light[::3, ::3], 0.99)), 0.5 * DARK)
     regions, _ = cv2.findContours(bright.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not regions:
@@ -200,7 +200,7 @@ def pixel_noise(difference: Array, inside: Mask) -> Array:
     """Return the standard deviation (3,) of a difference from pixel to pixel.
 
     The checkerboard difference of 2x2 pixels cancels every smooth shading; its median is
-    indifferent to edges and specks.
+    robust against edges and specks.
 
     Parameters
     ----------
@@ -231,13 +231,13 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
         Which pixels count.
     """
     gain = np.ones(3, dtype=np.float32)
-    # Broad means: a ratio of noisy pixels is neither unbiased nor a narrow peak.
+    # Means over many pixels: a ratio of noisy pixels is biased and has a broad peak.
     before, after = (
         np.asarray(cv2.GaussianBlur(p, (0, 0), 3.0), np.float32) for p in (background, press)
     )
     for k in range(3):
         total = before[..., k] + after[..., k]
-        # Chosen by the sum: choosing by one image's noise would bias the ratio.
+        # Chosen by the sum of both: a choice by the noise of one image would bias the ratio.
         lit = inside & (total > max(2.0 * DARK, 0.2 * float(total[inside].max(initial=0.0))))
         if np.count_nonzero(lit) >= 16:
             below = np.maximum(thin_out(before[..., k][lit]), np.float32(0.25 * DARK))
@@ -246,10 +246,10 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
 
 
 def _densest(ratio: Array) -> float:
-    """Return where values crowd most: the shortest fifth, polished by Tukey's biweight.
+    """Return the mode of values: the shortest fifth, refined with Tukey's biweight.
 
-    The undisturbed membrane is a narrow peak, whatever share of the image it is; an indentation
-    spreads over all brightnesses.
+    The untouched membrane is a narrow peak, for any share of the image; an indentation spreads over
+    all brightnesses.
     """
     ordered = np.sort(ratio)
     count = max(2, len(ordered) // 5)
@@ -277,8 +277,8 @@ def scale_difference(
     valid : (rows, columns) bool
         The working area.
     widest_px : int, optional
-        The coarser grid is no larger than this along its longer side: averaging is the cheapest
-        way to lift a faint indentation out of the noise.
+        The coarser grid is no larger than this along its longer side: averaging is the fastest
+        method to make a faint indentation exceed the noise.
     """
     factor = max(1, -(-max(valid.shape) // widest_px))
     press_small, background_small = _shrink(press, factor), _shrink(background, factor)
@@ -286,7 +286,7 @@ def scale_difference(
     gain = match_gain(press_small, background_small, valid_small)
     difference = np.where(valid[..., None], press - gain * background, np.float32(0.0))
     small = np.where(valid_small[..., None], press_small - gain * background_small, np.float32(0.0))
-    # A median over 3x3 takes specks and hot pixels away, where a mean would spread them.
+    # A median over 3x3 removes specks and hot pixels; a mean would spread them.
     smooth = np.asarray(cv2.GaussianBlur(cv2.medianBlur(small, 3), (0, 0), 1.0), np.float32)
     noise = _smooth_noise(smooth, valid_small)
     variance = noise**2 + (REPEATABILITY * background_small) ** 2
@@ -316,7 +316,7 @@ def _relative_change(press: Array, background: Array, valid: Mask) -> Array:
 
 
 def change_where(change: ScaledDifference, background: Array, where: Mask) -> float:
-    """Return the typical change of brightness somewhere, as a share of it; 0 where it is dark.
+    """Return the typical relative change of brightness in an area; 0 if it is dark.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def change_where(change: ScaledDifference, background: Array, where: Mask) -> fl
 
 
 def check_gain(gain: tuple[float, float, float], name: str) -> None:
-    """Refuse a press whose light is not the background's.
+    """Refuse a press whose light differs from that of the background.
 
     Raises
     ------
@@ -370,7 +370,7 @@ def _shrink(image: Array, factor: int) -> Array:
 
 
 def _smooth_noise(smooth: Array, inside: Mask) -> Array:
-    """Return the noise (3,) that smoothing has left.
+    """Return the remaining noise (3,) after smoothing.
 
     Second differences over a few pixels, so that noise which was already correlated (resampling,
     demosaicing) is seen in full; the lower quartile, so that an indentation over half of the

@@ -15,14 +15,14 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 
 MOST_CONTACT = 0.95
-"""Largest contact radius over the ball's: beyond, the slope grows without limit."""
+"""Largest contact radius over ball radius: beyond it, the slope is too large."""
 CENTRE_SHARE = 0.85
-"""Share of the contact radius within which slopes place the centre."""
+"""Share of the contact radius within which slopes determine the centre."""
 CENTRE_ROUNDS = 4
 SLOPE_SCALE = 0.15
-"""Slopes that differ by more count less and less."""
+"""Slopes that differ by more have decreasing weight."""
 DECAYS = (0.08, 0.15, 0.25, 0.4, 0.6, 0.9)
-"""Decay lengths of the membrane around the contact that are tried, in contact radii."""
+"""Tested decay lengths of the membrane around the contact, in contact radii."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Ball:
         return Circle(self.x, self.y, self.contact)
 
     def limited(self) -> Ball:
-        """Return the ball with a contact that its radius allows."""
+        """Return the ball with its contact limited by its radius."""
         return replace(self, contact=min(self.contact, MOST_CONTACT * self.radius))
 
 
@@ -63,7 +63,7 @@ def distances(shape: tuple[int, int], ball: Ball) -> tuple[Map, Map, Map]:
 
 
 def ball_slopes(x: Array, y: Array, radius: float) -> Array:
-    """Return the depth's slopes (N, 2) on a ball at places (N,) from its centre.
+    """Return the depth's slopes (N, 2) on a ball at positions (N,) from its centre.
 
     d = sqrt(R^2 - rho^2) + constant, so that the slope is -(x, y) / sqrt(R^2 - rho^2).
     """
@@ -72,7 +72,7 @@ def ball_slopes(x: Array, y: Array, radius: float) -> Array:
 
 
 def placed_by_slopes(slope_x: Map, slope_y: Map, ball: Ball) -> Ball:
-    """Return the ball with its centre where the slopes inside the contact put it."""
+    """Return the ball with the centre that follows from the slopes inside the contact."""
     x, y = ball.x, ball.y
     reach = CENTRE_SHARE * ball.contact
     for _ in range(CENTRE_ROUNDS):
@@ -93,10 +93,10 @@ def placed_by_slopes(slope_x: Map, slope_y: Map, ball: Ball) -> Ball:
 
 
 def contact_by_slopes(slope_x: Map, slope_y: Map, ball: Ball, *, smoothing: float) -> float:
-    """Return the contact's radius: where the slope ceases to be the ball's.
+    """Return the contact's radius, at which the slope is no longer that of the ball.
 
-    The mean slope towards the centre is compared with the ball's up to the edge, and one that
-    falls off exponentially beyond; both smoothed as the image was.
+    The mean slope towards the centre is compared with that of the ball inside the contact and an
+    exponential decay outside, both smoothed like the image.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def contact_by_slopes(slope_x: Map, slope_y: Map, ball: Ball, *, smoothing: floa
 
 
 def _profiles(ball: Ball, radius: Array, smoothing: float) -> tuple[Array, Array]:
-    """Return the slopes (contacts, decays, radii) of contacts that are tried, and these."""
+    """Return the slopes (contacts, decays, radii) of the tested contacts, and the contacts."""
     most = min(1.35 * ball.contact, 0.97 * ball.radius)
     contacts = np.arange(0.6 * ball.contact, most, 0.5)
     step = 0.5

@@ -1,9 +1,9 @@
 """Calibration of a closed sensor: from a background and ball presses to slopes.
 
-The contacts' edges give a first place for each ball. Then polynomial and places are refined in
-turn: each press is placed by the slopes that the other presses give, half drawn back to its edge,
-because slopes and places could else drift together. Presses that the others do not explain are
-left out and named.
+The edges of the contacts give a first position of each ball. Then polynomial and positions are
+refined alternately. The position of a press is the mean of that from the slopes of the other
+presses and that of its edge; otherwise slopes and positions could drift together. Presses that
+disagree with the others are left out and listed.
 """
 
 from __future__ import annotations
@@ -61,16 +61,16 @@ Map = NDArray[np.float32]
 LEAST_PRESSES = 3
 ROUNDS = 3
 TRUST_SLOPES = 0.4
-"""How far a press follows the slopes, the rest its edge, once there are `MANY_PRESSES`."""
+"""Weight of the slopes against the edge in the position of a press, from `MANY_PRESSES` on."""
 MANY_PRESSES = 20
 DISAGREES = 0.3
-"""Share of the contact radius from which edge and slopes disagree, and the slopes decide."""
+"""Distance of edge and slopes, in contact radii, above which the slopes alone are used."""
 OUTLIER = 3.0
-"""A press is left out whose error is so many times the median's ..."""
+"""A press is left out if its error is this multiple of the median ..."""
 LEAST_OUTLIER = 0.12
 """... and above this root mean square slope."""
 WANDERS = 0.01
-"""Scatter of the images' common brightness from which it is divided out."""
+"""Scatter of the images' common brightness above which it is corrected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,16 +97,16 @@ class PressImage:
 
 @dataclass(frozen=True, slots=True)
 class FoundPress:
-    """A press as the calibration used it.
+    """A press as used by the calibration.
 
     Attributes
     ----------
     name : str
         Its file.
     ball : Ball
-        Place and contact, nodes of the working grid.
+        Position and contact, nodes of the working grid.
     held_out : HeldOutPress
-        What the calibration without it makes of it.
+        Its errors in a calibration without it.
     """
 
     name: str
@@ -127,11 +127,11 @@ class InPlaceResult:
     refused : mapping of str to InputError
         Presses that were left out, with the reason.
     ridge : Ridge
-        Chosen by presses that were left out.
+        Chosen by the errors of presses that were left out.
     learning : tuple of (int, float)
-        Number of balls, and root mean square slope error of other presses with so many.
+        Number of balls, and root mean square slope error of other presses with this number.
     next_position_mm : tuple of 2 floats
-        Where the next ball would help most: farthest from all presses.
+        Best position of the next ball: farthest from all presses.
     """
 
     model: InPlaceModel
@@ -144,7 +144,7 @@ class InPlaceResult:
 
 @dataclass(slots=True)
 class _Work:
-    """The presses while places and polynomial are refined."""
+    """The presses during the refinement of positions and polynomial."""
 
     names: list[str]
     seen: list[ColourChange]
@@ -153,7 +153,7 @@ class _Work:
     refused: dict[str, InputError]
 
     def keep(self, kept: Sequence[bool]) -> None:
-        """Drop the other presses."""
+        """Keep only these presses."""
         self.names = list(compress(self.names, kept))
         self.seen = list(compress(self.seen, kept))
         self.start = list(compress(self.start, kept))
@@ -182,14 +182,14 @@ def calibrate_in_place(
     scale_sd : float, optional
         Relative standard deviation of the scale.
     towards : (terms, 2), optional
-        Coefficients of an earlier calibration that few presses are to correct.
+        Coefficients of an earlier calibration that few presses shall correct.
     progress : callable, optional
         Called with the share done.
 
     Raises
     ------
     InputError
-        If fewer than 3 images show a ball that the others explain, or the background is of
+        If fewer than 3 images show a ball that agrees with the others, or the background is of
         another gel, crop or exposure.
     """
     say = progress or (lambda _share: None)
@@ -236,7 +236,7 @@ def calibrate_in_place(
 
 
 def _wanders(images: Sequence[Map], base: Reference) -> bool:
-    """Return whether the images' common brightness scatters."""
+    """Return whether the common brightness of the images scatters."""
     changes = in_parallel(lambda image: colour_change(image, base, follow_gain=True), images)
     gains = [seen.gain for seen in changes]
     return bool(gains) and float(np.std(gains, axis=0).max()) > WANDERS
@@ -302,7 +302,7 @@ def _sums(work: _Work) -> list[PressSums]:
 
 
 def _place(work: _Work, coefficients: Sequence[Array]) -> None:
-    """Move each ball to where the slopes of the others put it, half drawn back to its edge."""
+    """Move each ball halfway to the position that follows from the slopes of the others."""
     trust = TRUST_SLOPES * min(1.0, len(work.balls) / MANY_PRESSES)
 
     def moved(item: tuple[ColourChange, Ball, Ball, Array]) -> Ball:
@@ -325,7 +325,7 @@ def _place(work: _Work, coefficients: Sequence[Array]) -> None:
 def _explained(
     work: _Work, sums: Sequence[PressSums], coefficients: Sequence[Array]
 ) -> list[PressSums]:
-    """Leave out presses whose slopes the others do not explain; return the others' sums."""
+    """Leave out presses whose slopes disagree with the others; return the sums of the rest."""
     errors = np.sqrt(
         [mean_squared_error(press, c) for press, c in zip(sums, coefficients, strict=True)]
     )
@@ -347,11 +347,11 @@ def _explained(
 
 
 def _seen_colours(work: _Work) -> Map:
-    """Return which changes of colour the presses and the flat membrane have shown."""
+    """Return which changes of colour occur on the presses and the flat membrane."""
     cells = np.zeros((COLOUR_CELLS,) * 3, np.float32)
     for seen, ball in zip(work.seen, work.balls, strict=True):
-        rho = distances((seen.trusted.shape[0], seen.trusted.shape[1]), ball)[2]
-        shown = seen.change[seen.trusted & ((rho < ball.contact) | (rho > 1.4 * ball.contact))]
+        rho = distances((seen.usable.shape[0], seen.usable.shape[1]), ball)[2]
+        shown = seen.change[seen.usable & ((rho < ball.contact) | (rho > 1.4 * ball.contact))]
         cell = colour_cells(shown)
         cells[cell[:, 0], cell[:, 1], cell[:, 2]] = 1.0
     grown = cells.copy()

@@ -1,7 +1,7 @@
-"""Fitting the polynomial to ball presses: sums of each press, ridge, and the choice of the ridge.
+"""Fit of the polynomial to ball presses: sums of each press, ridge, and the choice of the ridge.
 
-Each press is reduced to its normal equations once. Leaving a press out, taking more of them or
-another ridge is then a matter of adding and solving small matrices.
+Each press is reduced to its normal equations once. Leaving out a press, adding presses or changing
+the ridge then only requires adding and solving small matrices.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Mask = NDArray[np.bool_]
 _Totals = tuple[Array, Array, int]
 
 INSIDE = 0.95
-"""Share of the contact radius in which the membrane is the ball's surface."""
+"""Share of the contact radius in which the membrane follows the ball."""
 FLAT_FROM = 1.4
 """Contact radii from the centre, and `FLAT_MARGIN` nodes, from which the membrane is flat."""
 FLAT_MARGIN = 6.0
@@ -36,12 +36,12 @@ RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 GROWTHS = (1.0, 4.0, 16.0)
 MOST_FOLDS = 8
 LOSS_CAP = 0.3
-"""Mean squared slope error from which a press counts no further."""
+"""Largest mean squared slope error that a press can have in the sum."""
 
 
 @dataclass(frozen=True, slots=True)
 class PressSums:
-    """A press in the normal equations of the polynomial.
+    """Contribution of a press to the normal equations of the polynomial.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Ridge:
 
     @property
     def penalty(self) -> Array:
-        """What it costs each term."""
+        """Penalty of each term."""
         return self.strength * penalty(
             position_growth=self.position_growth, colour_growth=self.colour_growth
         )
@@ -92,13 +92,13 @@ FIRST_RIDGE = Ridge(1e-3, 4.0, 4.0)
 
 
 def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
-    """Return a press's part of the normal equations."""
-    shape = seen.trusted.shape
+    """Return the contribution of a press to the normal equations."""
+    shape = seen.usable.shape
     from_x, from_y, rho = distances((shape[0], shape[1]), ball)
     thin = np.zeros(shape, np.bool_)
     thin[::STEP, ::STEP] = True
-    inside = thin & seen.trusted & (rho < INSIDE * ball.contact)
-    flat = thin & seen.trusted & (rho > FLAT_FROM * ball.contact + FLAT_MARGIN)
+    inside = thin & seen.usable & (rho < INSIDE * ball.contact)
+    flat = thin & seen.usable & (rho > FLAT_FROM * ball.contact + FLAT_MARGIN)
     some = np.flatnonzero(flat)
     some = some[:: max(some.size // FLAT_NODES, 1)]
     terms = _terms(seen.change, np.flatnonzero(inside))
@@ -108,7 +108,7 @@ def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
     )
     own = (terms.T @ terms).astype(np.float64)
     rest = (around.T @ around).astype(np.float64)
-    # The flat membrane weighs as much as the contact, times FLAT_WEIGHT squared.
+    # The weight of the flat membrane is that of the contact times FLAT_WEIGHT squared.
     return PressSums(
         own + FLAT_WEIGHT**2 * rest,
         (terms.T @ slopes.astype(np.float32)).astype(np.float64),
@@ -131,11 +131,12 @@ def solve(sums: Iterable[PressSums], ridge: Ridge, *, towards: Array | None = No
     Parameters
     ----------
     sums : iterable of PressSums
-        Of the presses to be fitted, at least one.
+        Sums of the presses to be fitted, at least one.
     ridge : Ridge
-        How much they are held back.
+        Strength of the penalty.
     towards : (terms, 2), optional
-        Coefficients that the ridge draws to, as those of another gel; by default 0.
+        Coefficients towards which the ridge regularises, such as those of another gel; by default
+        0.
     """
     chosen = list(sums)
     squares = sum((press.squares for press in chosen), np.zeros_like(chosen[0].squares))
@@ -146,7 +147,7 @@ def solve(sums: Iterable[PressSums], ridge: Ridge, *, towards: Array | None = No
 def _solved(
     squares: Array, products: Array, nodes: int, ridge: Ridge, towards: Array | None = None
 ) -> Array:
-    # Each term in units of its own size, so that the ridge means the same for all.
+    # Each term in units of its own size, so that the ridge has the same effect on all.
     size = np.sqrt(np.diag(squares) / max(nodes, 1)) + 1e-9
     scaled = squares / size[:, None] / size[None, :]
     held = max(nodes, 1) * ridge.penalty
@@ -166,7 +167,7 @@ def mean_squared_error(press: PressSums, coefficients: Array) -> float:
 
 
 def folds(count: int, most: int = MOST_FOLDS) -> list[list[int]]:
-    """Return which presses are left out together, every one once."""
+    """Return the groups of presses that are left out together; each press occurs once."""
     number = min(count, most)
     return [list(range(first, count, number)) for first in range(number)]
 
@@ -174,7 +175,7 @@ def folds(count: int, most: int = MOST_FOLDS) -> list[list[int]]:
 def left_out(
     sums: Sequence[PressSums], ridge: Ridge, *, towards: Array | None = None
 ) -> list[Array]:
-    """Return for each press the coefficients that were fitted without it."""
+    """Return for each press the coefficients of a fit without it."""
     found: list[Array] = [np.empty(0)] * len(sums)
     whole = _totals(sums)
     for fold in folds(len(sums)):
@@ -196,7 +197,7 @@ def _totals(sums: Sequence[PressSums]) -> _Totals:
 
 
 def choose_ridge(sums: Sequence[PressSums], *, towards: Array | None = None) -> Ridge:
-    """Return the ridge with which presses that were left out are explained best."""
+    """Return the ridge with the smallest error of presses that were left out."""
     whole = _totals(sums)
     parts = []
     for fold in folds(len(sums)):

@@ -22,7 +22,7 @@ from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr
 
 MOST_FRAMES = 80
-"""Of folders with thousands of images of a robot's raster, so many are used, evenly spread."""
+"""Most images used, evenly selected, from folders with thousands of images of a robot's raster."""
 LABEL_LIMIT = 64_000
 TABLE_LIMIT = 20_000_000
 RADIUS_RANGE = (0.05, 500.0)
@@ -161,7 +161,7 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
                 where=where,
                 advice=tr("Each line needs the image and x, y and radius of the circle in pixels"),
             )
-        # The table holds the paths of the computer on which it was made.
+        # The table contains paths of the computer on which it was made.
         name = PureWindowsPath(PurePosixPath(row[0]).name).name
         paths = (folder / name, folder / "images" / name)
         image = next((path for path in paths if path.is_file()), paths[0])

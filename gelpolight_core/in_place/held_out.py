@@ -56,7 +56,7 @@ class HeldOutPress:
 
 
 def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldOutPress:
-    """Compare what coefficients give for a press with its ball.
+    """Compare the result of coefficients for a press with its ball.
 
     Parameters
     ----------
@@ -69,17 +69,17 @@ def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldO
     """
     slope_x, slope_y = evaluate(coefficients, seen.change)
     from_x, from_y, rho = distances(slope_x.shape, ball)
-    inside = (rho < INSIDE * ball.contact) & seen.trusted
+    inside = (rho < INSIDE * ball.contact) & seen.usable
     dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
     wanted = ball_slopes(dx, dy, ball.radius)
-    weight = seen.trusted.astype(np.float32)
+    weight = seen.usable.astype(np.float32)
     depth = depth_of(slope_x, slope_y, pitch_mm=1.0, weight=weight)[0]
     found_x, found_y = surface_slopes(depth, 1.0)
     found = np.stack([found_x[inside], found_y[inside]], axis=-1).astype(np.float64)
     own = np.sqrt(ball.radius**2 - np.minimum(rho, 0.99 * ball.radius) ** 2)
-    top = (rho < TOP * ball.contact) & seen.trusted
-    ring = (rho > RING[0] * ball.contact) & (rho < RING[1] * ball.contact) & seen.trusted
-    far = depth[(rho > FAR * ball.contact) & seen.trusted]
+    top = (rho < TOP * ball.contact) & seen.usable
+    ring = (rho > RING[0] * ball.contact) & (rho < RING[1] * ball.contact) & seen.usable
+    far = depth[(rho > FAR * ball.contact) & seen.usable]
     cap = diameter = np.nan
     if top.any() and ring.any():
         height = float(own[top].mean() - own[ring].mean())
@@ -122,9 +122,9 @@ def held_out_presses(
 def amplitude_of(
     seen: Sequence[ColourChange], balls: Sequence[Ball], coefficients: Sequence[Array]
 ) -> float:
-    """Return the share of the slopes that is found of presses that were left out, median.
+    """Return the median ratio of found to true slopes of presses that were left out.
 
-    Regression on noisy colours finds less than all.
+    Regression on noisy colours underestimates slopes.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def amplitude_of(
         change, ball, fitted = item
         found_x, found_y = evaluate(fitted, change.change)
         from_x, from_y, rho = distances(found_x.shape, ball)
-        inside = (rho < INSIDE * ball.contact) & change.trusted
+        inside = (rho < INSIDE * ball.contact) & change.usable
         dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
         wanted = ball_slopes(dx, dy, ball.radius)
         total = (found_x[inside] * wanted[:, 0] + found_y[inside] * wanted[:, 1]).sum()
@@ -150,7 +150,7 @@ def amplitude_of(
 
 
 def error_curve(presses: Sequence[HeldOutPress], *, pitch_mm: float) -> ErrorCurve:
-    """Return how far slopes and depths of such presses are off.
+    """Return the errors of slopes and depths of presses left out.
 
     Parameters
     ----------

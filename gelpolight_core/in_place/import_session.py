@@ -21,7 +21,7 @@ from gelpolight_core.translation import tr
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What the user states about a folder, each with precedence over the folder.
+    """Values stated by the user about a folder; they have precedence over the folder.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ def _pixels(path: Path) -> tuple[int, int]:
 
 
 def _copy(source: Path, target: Path) -> None:
-    """Copy an image that a session can hold."""
+    """Copy an image of a format that a session can contain."""
     if source.suffix.lower() not in SUFFIXES:
         raise InputError(
             tr("The image is neither PNG nor TIFF"),

@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 
 
 def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, float], ...]:
-    """Return the error of other presses with few, some and most of the presses.
+    """Return the error of the other presses for fits with few, some and most of the presses.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, 
 
 
 def next_position(balls: Sequence[Ball], grid: WorkingGrid, lit: Mask) -> tuple[float, float]:
-    """Return the place (x, y) in mm that is farthest from all presses, a contact off the border.
+    """Return the position (x, y) in mm farthest from all presses, one contact inside the border.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def next_position(balls: Sequence[Ball], grid: WorkingGrid, lit: Mask) -> tuple[
     grid : WorkingGrid
         Nodes and scale.
     lit : (rows, columns) bool
-        Where the membrane is seen.
+        Visible part of the membrane.
     """
     rows, columns = grid.shape
     contact = float(np.median([ball.contact for ball in balls]))

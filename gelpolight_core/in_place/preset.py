@@ -1,4 +1,4 @@
-"""Presets of closed sensors: data of their makers, as start values for in-place calibration."""
+"""Presets of closed sensors: manufacturers' data as start values for in-place calibration."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ FOLDER = Path(__file__).with_name("presets")
 FORMAT, VERSION = "gelpolight-preset", 1
 MOST_PX = 20_000
 SAME_SHAPE = 0.02
-"""Difference of the ratio of the sides up to which an image has a preset's shape."""
+"""Largest relative difference of the aspect ratios of an image and a preset."""
 COLOURED = 3
-"""Colours of light from which slopes can be read in all directions."""
+"""Number of light colours that is necessary for slopes in all directions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Preset:
 
     @property
     def limits(self) -> str:
-        """What the program cannot do with this kind of sensor; empty where there is nothing."""
+        """What the program cannot do with this kind of sensor; empty if there is no limit."""
         if self.light_colours >= COLOURED:
             return ""
         return tr(

@@ -26,7 +26,7 @@ def find_contact(
     ball_radius : float or None
         Of the ball, nodes, where it is known.
     name : str
-        What a message calls the image.
+        Name of the image in messages.
 
     Returns
     -------

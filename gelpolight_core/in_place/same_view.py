@@ -1,7 +1,7 @@
 """Whether a background shows the same membrane, crop and exposure as the ball images.
 
 The median of the ball images, pressed at different places, is nearly the untouched membrane. It
-must be as bright as the background, and its texture must lie where the background has it.
+must be as bright as the background, and its texture must be at the same position.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ Map = NDArray[np.float32]
 
 OFFSET = 0.02
 BRIGHTER = 0.05
-"""Median difference of brightness, beside a common gain of each channel, from which images do not
-belong together; those of one sensor differ by 1 to 3 %, those of another by 30 %."""
+"""Median difference of brightness, after correction of a common gain of each channel, above which
+images are of different sensors. Images of one sensor differ by 1 to 3 %, those of another by 30
+%."""
 BLOCKS = 3
 REACH = 24
-"""Nodes by which a block of texture is looked for."""
+"""Search distance for a block of texture, in nodes."""
 MOVED = 1.5
-"""Nodes from which a block lies elsewhere."""
+"""Displacement in nodes above which a block counts as moved."""
 BETTER, GOOD = 0.15, 0.5
-"""By how much a block's correlation is better there, and how good it is."""
+"""Least increase of the correlation of a moved block, and its least correlation."""
 LEAST_MOVED = 2
 
 
@@ -44,7 +45,7 @@ def refuse_other_view(images: Sequence[Map], background: Map) -> None:
     Raises
     ------
     InputError
-        If it has another brightness nearly everywhere, or its texture lies elsewhere.
+        If its brightness differs nearly everywhere, or its texture is displaced.
     """
     middle = np.asarray(np.median(np.stack(images), axis=0), np.float32)
     seen, there = (cv2.GaussianBlur(a, (0, 0), 2.0) + np.float32(OFFSET)
@@ -74,7 +75,7 @@ def refuse_other_view(images: Sequence[Map], background: Map) -> None:
 
 
 def moved_blocks(image: Map, background: Map) -> list[tuple[float, float]]:
-    """Return by how much (x, y) blocks of texture lie elsewhere, for those that do."""
+    """Return the displacement (x, y) of the blocks of texture that have moved."""
     first, second = _texture(image), _texture(background)
     rows, columns = first.shape
     high, wide = (rows - 2 * REACH) // BLOCKS, (columns - 2 * REACH) // BLOCKS

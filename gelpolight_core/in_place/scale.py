@@ -19,14 +19,14 @@ Map = NDArray[np.float32]
 
 LEAST_PINS = 9
 BLURS_PX = (2.0, 3.0, 4.5, 7.0)
-"""Smoothing of the images before pins are looked for: about half a pin's radius."""
+"""Smoothing of the images for the detection of pins: about half a pin's radius."""
 LEAST_PEAK = 0.25
-"""Share of the strongest pin that a pin has at least."""
+"""Least strength of a pin as a share of the strongest one."""
 OFF_LATTICE = 0.2
-"""Share of the spacing within which a pin belongs to the grid."""
+"""Largest distance of a pin from the grid, as a share of the spacing."""
 LEAST_ON_LATTICE = 0.7
 EDGE_SD_PX = 1.0
-"""How well a single punch's diameter is known."""
+"""Standard deviation of the diameter of a single punch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def scale_from_pins(
     spacing_mm : float
         Between neighbouring pins.
     where : str, optional
-        What a message names.
+        Name of the images in messages.
 
     Raises
     ------

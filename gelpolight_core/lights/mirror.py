@@ -199,7 +199,7 @@ def _describe(
 ) -> Spot:
     left, top, width, height = (int(stat[i]) for i in range(4))
     rows, columns = labels.shape
-    # A margin of two pixels includes the blurred rim, whose light belongs to the centroid.
+    # A margin of two pixels includes the blurred edge, whose light belongs to the centroid.
     box = np.s_[max(top - 2, 0) : top + height + 2, max(left - 2, 0) : left + width + 2]
     near = cv2.dilate((labels[box] == label).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     mine = near & ((labels[box] == label) | (labels[box] == 0))

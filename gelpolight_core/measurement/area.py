@@ -15,7 +15,7 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 Point = tuple[float, float]
 LEAST_NODES = 9
-"""Fewer nodes say nothing of a plane."""
+"""With fewer nodes, a plane cannot be fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Rectangle:
         return self.place(along, across)
 
     def place(self, along_mm: Array, across_mm: Array) -> Array:
-        """Return sensor coordinates (..., 2) of places along and across the first side.
+        """Return sensor coordinates (..., 2) of points along and across the first side.
 
         Parameters
         ----------
@@ -95,9 +95,9 @@ class AreaNodes:
     flags: NDArray[np.uint8]
 
     def thinned(self, most: int) -> AreaNodes:
-        """Return at most so many of them, evenly chosen."""
+        """Return at most this number of nodes, evenly selected."""
         stride = max(math.ceil(self.x_mm.size / most), 1)
-        # A stride that divides the rows' length would choose columns, not nodes.
+        # With a stride that divides the length of the rows, only some columns would be selected.
         chosen = np.random.default_rng(0).permutation(self.x_mm.size)[::stride]
         return AreaNodes(
             self.x_mm[chosen], self.y_mm[chosen], self.depth_mm[chosen], self.flags[chosen]
@@ -120,7 +120,7 @@ def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
         If fewer than nine of them lie in the working area.
     """
     corners = rectangle.outline_mm
-    # Nodes that lie on the edge belong to it, whatever rounding says.
+    # Nodes on the edge belong to the rectangle, in spite of rounding errors.
     slack = 1e-6 * heightmap.pitch_mm
     low, high = corners.min(axis=0) - slack, corners.max(axis=0) + slack
     columns = np.flatnonzero((heightmap.x_mm >= low[0]) & (heightmap.x_mm <= high[0]))

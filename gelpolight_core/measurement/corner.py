@@ -12,22 +12,22 @@ from scipy.special import kv
 Array = NDArray[np.float64]
 
 _WEDGE = 1.5 * np.pi
-"""Angle that the free membrane takes up around a corner of 90 degrees."""
+"""Angle of the free membrane around a corner of 90 degrees."""
 _REACH = 16.0
-"""Decay lengths that the table covers; the drape is below 1e-6 of the height beyond."""
+"""Range of the table, in decay lengths. Beyond it, the drape is below 1e-6 of the height."""
 _RADII, _ANGLES = 161, 99
-"""Table size; the angles step over the ray at pi / 4, on which the integrand is singular."""
+"""Table size. No angle is pi / 4, where the integrand is singular."""
 _FINER = 4
-"""Subdivision of the table by splines, after which linear interpolation errs by less than 1e-5."""
+"""Subdivision of the table by splines. The error of linear interpolation is then below 1e-5."""
 _MARGIN = 8
-"""Nodes past the corner and past the face, so that the spline meets no kink where they lie."""
+"""Nodes beyond the corner and the face, so that the spline has no kink there."""
 _ROUNDING = 0.07
 """Strength of the rounding of a corner whose three edges carry one fillet, from the numerical
 solution of the obstacle problem (the tests solve it again)."""
 
 
 def corner_drape(x: Array, y: Array, *, edge: float = 0.0, rounding: float = 0.0) -> Array:
-    """Return the membrane's depth outside the quarter plane x <= 0, y <= 0 that is pressed to 1.
+    """Return the membrane's depth outside the quarter plane x <= 0, y <= 0, which has depth 1.
 
     The solution of laplacian(w) = w with w = 1 on the two faces; lengths in decay lengths.
     Inside the quarter plane the result is 1.
@@ -37,8 +37,8 @@ def corner_drape(x: Array, y: Array, *, edge: float = 0.0, rounding: float = 0.0
     x, y : arrays of one shape
         Distances beyond the two faces, in decay lengths.
     edge : float, optional
-        Radius of the fillet of the two edges, in decay lengths; nearer to the corner the rounding
-        grows no further.
+        Radius of the fillet of the two edges, in decay lengths. Nearer to the corner, the rounding
+        does not increase any more.
     rounding : float, optional
         Strength of the corner's own rounding, from :func:`fillet_rounding` or from a fit.
 
@@ -49,12 +49,12 @@ def corner_drape(x: Array, y: Array, *, edge: float = 0.0, rounding: float = 0.0
         w(r, t) = 2/pi int_0^inf K_i tau(r) cosh(pi tau / 2) cosh(t tau) / cosh(alpha tau / 2) d tau
 
     with t the angle from the wedge's bisector. It is tabulated once over r**(2/3), the power with
-    which w leaves the corner, so that the table is smooth there. Whatever a corner looks like on a
-    scale below the decay length, farther out it changes only the strength of the one solution that
-    is zero on both faces and falls off outwards, K_2/3(r) cos(2 t / 3).
+    which w leaves the corner, so that the table is smooth there. The shape of a corner on a scale
+    below the decay length changes only the strength of one solution farther out: K_2/3(r) cos(2 t /
+    3), which is zero on both faces and decreases outwards.
     """
     radius = np.hypot(x, y)
-    # Angle from the bisector of the free membrane, which points along (1, 1).
+    # Angle from the bisector of the free membrane. The bisector has the direction (1, 1).
     angle = np.abs(np.arctan2(y - x, x + y))
     row = np.minimum(radius / _REACH, 1.0) ** (2.0 / 3.0) * (_FINER * (_RADII - 1))
     column = np.minimum(angle / (_WEDGE / 2.0), 1.0) * (_FINER * (_ANGLES - 1))
@@ -106,9 +106,10 @@ def _table() -> Array:
 def _wedge_drape(radii: Array, angle: float) -> Array:
     """Return the drape on one ray from the corner.
 
-    With K_i tau(r) written as the integral of exp(-r cosh t) cos(tau t), the integral over tau
-    is closed; what remains decays doubly exponentially in t. Where the ray lies in front of a
-    face, the pole that is crossed leaves exp(-distance to the face), the drape of a straight edge.
+    With K_i tau(r) written as the integral of exp(-r cosh t) cos(tau t), the integral over tau has
+    a closed form. The remaining integrand decays doubly exponentially in t. If the ray lies in
+    front of a face, the residue of the pole adds exp(-distance to the face), the drape of a
+    straight edge.
     """
     # The kernel narrows to a spike at t = 0 where the ray passes a face's end; sinh packs nodes.
     t = 12.0 * np.sinh(np.linspace(0.0, 9.0, 400)) / np.sinh(9.0)

@@ -1,4 +1,4 @@
-"""The membrane around an indenter: in contact it follows it, outside it decays.
+"""The membrane around an indenter: it follows the indenter in contact, and decays outside.
 
 Outside the contact the membrane is a tense sheet on an elastic foundation,
 ``decay**2 * laplacian(w) = w``, and it leaves the indenter tangentially.
@@ -20,10 +20,10 @@ from gelpolight_core.measurement.corner import corner_drape, fillet_rounding
 Array = NDArray[np.float64]
 
 FAR_CORNER = 9.0
-"""Decay lengths beyond which a corner is not felt: exp(-9) is 1e-4 of the height."""
+"""Distance in decay lengths beyond which a corner has no effect: exp(-9) is 1e-4 of the height."""
 SMALL_BLUR_MM = 0.005
-"""Blur below which its effect is taken as its square times that of this blur: it is linear in the
-variance there, and a finer filter would cost time for nothing."""
+"""Below this blur, its effect is computed for this blur and scaled with the variance, in which it
+is linear. A finer filter would only take more time."""
 
 
 def cylinder_depth(
@@ -102,9 +102,9 @@ def cuboid_depth(
 
     Notes
     -----
-    Outside, each edge alone gives exp(-distance / decay) and each corner takes away from it what
-    :func:`~gelpolight_core.measurement.corner.corner_drape` says. The corners are added up as if
-    they did not see each other, which is wrong by about exp(-2 side / decay) of the height.
+    Outside, each edge alone gives exp(-distance / decay), and each corner reduces this according to
+    :func:`~gelpolight_core.measurement.corner.corner_drape`. The corners are added as if they were
+    independent, which causes an error of about exp(-2 side / decay) of the height.
     """
     half = (side_mm[0] / 2.0, side_mm[1] / 2.0)
     edge = min(edge_radius_mm, *half)
@@ -178,7 +178,7 @@ def ball_contact_radius_mm(*, ball_radius_mm: float, height_mm: float, decay_mm:
 
 def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:
     """Return how far a sphere lies above its lowest point at a distance from its axis."""
-    # This form keeps its digits for small radii, where R - sqrt(R**2 - r**2) cancels.
+    # This form is accurate for small radii, where R - sqrt(R**2 - r**2) loses digits.
     square = radius_mm**2
     root = np.sqrt(np.maximum(ball_radius_mm**2 - square, 0.0))
     return np.asarray(square / (ball_radius_mm + root))
@@ -233,7 +233,7 @@ def _rectangle_drape(
     """Return the drape outside a rectangle for x, y >= 0; lengths in decay lengths."""
     dx, dy = x - half[0], y - half[1]
     drape = corner_drape(dx, dy, edge=edge, rounding=rounding)
-    # What the corners at the far ends of the two edges take away; nothing beside the edge itself.
+    # Reduction by the corners at the far ends of the two edges; none beside the edge itself.
     above = (dy > 0.0) & (x + half[0] < FAR_CORNER)
     beside = (dx > 0.0) & (y + half[1] < FAR_CORNER)
     far_x = corner_drape(-x[above] - half[0], dy[above]) - np.exp(-dy[above])
@@ -254,8 +254,8 @@ def _blurred(
 ) -> Array:
     """Return the depth after smoothing across a wall, from the wall's one-dimensional profile.
 
-    The wall is straight on the scale of the blur, so its profile says what happens there. Farther
-    out the drape obeys decay**2 laplacian(w) = w and a Gaussian only multiplies it.
+    The wall is straight on the scale of the blur, so its profile is sufficient there. Farther out
+    the drape obeys decay**2 laplacian(w) = w, so that a Gaussian only multiplies it.
     """
     sigma = max(blur_mm, SMALL_BLUR_MM)
     reach = edge_mm + 5.0 * sigma

@@ -1,11 +1,10 @@
 """Find the edge near a drawn circle or rectangle, and fit the shape to it.
 
-The edge belongs to the steepest place nearby: it is where half of that slope is reached, on the
-deeper side. Where a membrane leaves the face of an object its slope jumps, and a map blurs that
-jump, so that the steepest place itself lies outside the object by a node or two. What is found so
-is the rim of the face, within the rounding of the object's edge: an indenter that is rounded by
-0.05 mm is measured 0.1 mm smaller than it is nominally. The fitted indenters take this into
-account.
+The edge is the position on the deeper side of the steepest slope nearby where half of that slope is
+reached. Where the membrane leaves the face of an object, its slope jumps. A map blurs this jump, so
+that the steepest slope itself is one or two nodes outside the object. The edge found is that of
+the flat face, without the rounding of the object's edge: an indenter with a rounding of 0.05 mm is
+measured 0.1 mm smaller than its nominal size. The fitted indenters account for this.
 """
 
 from __future__ import annotations
@@ -34,17 +33,16 @@ REACH_SHARE = 0.25
 REACH_MM = 1.0
 """The same at most."""
 LINES = 180
-"""Lines across a circle's rim; four sides of a rectangle take a quarter each."""
+"""Number of lines across the edge of a circle. Each side of a rectangle has a quarter of it."""
 MIDDLE = 0.7
 """Share of a rectangle's side that is used: its corners are round."""
 FLAT_SHARE = 0.3
-"""A place less steep than this share of the median is no edge."""
+"""A slope below this share of the median is not an edge."""
 LEAST_SLOPE = 0.02
-"""Nor is any place that is flatter than this (mm per mm)."""
+"""Least slope of an edge (mm per mm)."""
 CENTRE_NODES = 0.1
 """Blur moves an edge equally on all sides: the centre is accurate to this share of a node, the
-radius to
-one."""
+radius to one node."""
 ROUNDS = 3
 """Of a rectangle."""
 LEAST_POINTS = 5
@@ -52,17 +50,17 @@ LEAST_POINTS = 5
 
 @dataclass(frozen=True, slots=True)
 class FittedCircle:
-    """A circle through points of a rim.
+    """A circle through points of an edge.
 
     Attributes
     ----------
     centre_mm : (float, float)
     radius_mm : float
     sd_mm : (float, float, float)
-        Standard deviations of the centre's x and y and of the radius: the points' scatter (zero
-        for three points, which a circle always meets), and the map's blur at the steepest places.
+        Standard deviations of x, y and radius: the scatter of the points (zero for three points,
+        through which there is always a circle), and the blur of the map at the steepest points.
     rms_mm : float
-        Departure of the points from the circle.
+        Deviation of the points from the circle.
     points_mm : (N, 2)
         The points that count.
     """
@@ -130,7 +128,7 @@ def fit_circle(points_mm: Array) -> FittedCircle:
 
 
 def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircle:
-    """Return the circle through the edge at the steepest places near a drawn one.
+    """Return the circle through the edge at the steepest points near a drawn circle.
 
     Raises
     ------
@@ -162,8 +160,8 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
 def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
     """Return the rectangle through the edges at the steepest places near a drawn one's sides.
 
-    A straight line is fitted to each side; the four turn together. It is looked for again from
-    where it was found, since the middle of a side is better seen once the sides are in place.
+    A straight line is fitted to each side; the four lines rotate together. The search is repeated
+    from the result, because the middle of a side is more visible when the sides are correct.
 
     Raises
     ------
@@ -189,7 +187,8 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
         left = found - shift - slope * along[there]
         edge = points_at(offset[:, None])[there, 0]
         shifts.append(sign * shift)
-        # Outwards along +y at growing x turns the rectangle the other way than along +x.
+        # A slope of the +y side rotates the rectangle in the opposite direction to that of the +x
+        # side.
         turns.append(sign * slope * (-1.0 if axis == 0 else 1.0))
         spreads.append(float(np.std(left)) * math.sqrt(_together(edge) / len(edge)))
         points.append(edge)
@@ -206,7 +205,7 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
         sides_mm=sides,
         yaw_deg=drawn.yaw_deg + math.degrees(math.atan(turn)),
     )
-    # Blur moves both edges alike.
+    # Blur moves both edges by the same distance.
     blur = 2.0 * heightmap.pitch_mm
     sd = (math.hypot(*spreads[:2], blur), math.hypot(*spreads[2:], blur))
     return FittedRectangle(fitted, sd, np.concatenate(points))
@@ -235,7 +234,7 @@ def _edge_offsets(
     points = points_at(offsets[None, :])
     depth = depth_at(heightmap, points[..., 0].ravel(), points[..., 1].ravel())
     depth = depth.reshape(points.shape[:2])
-    # Bilinear depths have slopes that jump at the nodes; two steps smooth over one node.
+    # Slopes of bilinear depths jump at the nodes; two steps smooth over one node.
     smooth = gaussian_filter1d(depth, 2.0, axis=1, mode="nearest")
     steep = np.nan_to_num(np.abs(np.gradient(smooth, step, axis=1)))
     # The steepest one, not the end of a slope that continues beyond the search distance.
@@ -272,7 +271,7 @@ def _half_slope(
 
 
 def _robust_line(x: Array, y: Array) -> tuple[float, float]:
-    """Return slope and level of a line that outliers do not move."""
+    """Return slope and level of a line, robust against outliers."""
 
     def distance(p: Array) -> Array:
         return np.asarray(y - p[0] * x - p[1])
@@ -283,14 +282,14 @@ def _robust_line(x: Array, y: Array) -> tuple[float, float]:
 
 
 def _algebraic_circle(points: Array) -> Array:
-    """Return x, y and radius of the circle that is linear in the points' squares (Kasa)."""
+    """Return x, y and radius of the circle by linear least squares (Kasa)."""
     middle = points.mean(axis=0)
     centred = points - middle
     size = float(np.abs(centred).max()) if len(points) else 0.0
     terms = np.concatenate([2.0 * centred, np.ones((len(points), 1))], axis=1)
     if len(points) < 3 or not np.isfinite(points).all() or size <= 0.0:
         raise _no_circle()
-    # Points on one line leave the terms without full rank.
+    # For points on one line, the matrix has no full rank.
     if np.linalg.svd(centred / size, compute_uv=False)[-1] < 1e-6:
         raise _no_circle()
     x, y, rest = np.linalg.lstsq(terms, (centred**2).sum(axis=1))[0].tolist()
@@ -302,7 +301,7 @@ def _scale(left: Array) -> float:
 
 
 def _together(points: Array) -> float:
-    """Return how many neighbouring points of an edge err together: those within the drape."""
+    """Return how many neighbouring points of an edge have a common error (within the drape)."""
     gaps = np.hypot(*np.diff(points, axis=0).T)
     gap = max(float(np.median(gaps)), 1e-9)
     return max(TYPICAL_DECAY_MM / gap, 1.0)

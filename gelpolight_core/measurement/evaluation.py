@@ -22,10 +22,10 @@ SAME, RANDOM, ALL = "same region", "random regions", "all"
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """Where the paper's two series of objects cross.
+    """The object that is in both of the paper's series of objects.
 
-    Planar errors are those of objects of one height, depth errors those of objects of one size: an
-    object of the other series would give its one size or height a weight of many.
+    Planar errors are those of objects of one height, depth errors those of objects of one size.
+    With the other series included, this one size or height would have too much weight.
 
     Attributes
     ----------
@@ -261,7 +261,7 @@ def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]
 
     An object pressed several times in one region belongs to "same region" there; an object pressed
     in several regions enters "random regions", repeats included. A region named ``same`` or
-    ``random`` is taken at its word. Without a region column there is only ``all``.
+    ``random`` belongs to the series of that name. Without a region column there is only ``all``.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def _variances(results: Sequence[PressResult], direction: str) -> tuple[float, f
 
 
 def lengths_by_region(results: Iterable[PressResult], direction: str) -> list[list[float]]:
-    """Return the measured lengths (mm) of an object, a list for each place it was pressed at.
+    """Return the measured lengths (mm) of an object, one list for each position.
 
     Parameters
     ----------
@@ -362,7 +362,7 @@ def lengths_by_region(results: Iterable[PressResult], direction: str) -> list[li
     regions: dict[str, list[float]] = defaultdict(list)
     for result in results:
         value = _measured_mm(result, direction)
-        # "random" names no place: two such presses are not repeats of each other.
+        # "random" is not one position: two such presses are not repeats of each other.
         if math.isfinite(value) and result.press.region:
             name = result.press.region
             key = f"{name} {result.press.file}" if name.lower() == "random" else name

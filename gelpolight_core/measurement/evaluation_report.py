@@ -33,7 +33,7 @@ from gelpolight_core.measurement.evaluation import (
 from gelpolight_core.translation import tr
 
 COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}
-"""Okabe and Ito's: told apart by colour-blind readers too."""
+"""Colours of Okabe and Ito, which colour-blind readers can distinguish."""
 BAR_WIDTH = 0.26
 CSV_COLUMNS = (
     "file",

@@ -91,7 +91,7 @@ def measure_press(
     outcome: Measurement | str
     try:
         outcome = measure(path, shape)
-    except InputError as error:  # a press that fails is a finding of the evaluation, not its end
+    except InputError as error:  # a failed press is a result of the evaluation and does not stop it
         outcome = str(error)
     if ledger is not None and key is not None:
         ledger.keep(key, outcome)

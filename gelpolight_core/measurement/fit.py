@@ -17,15 +17,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 EDGE_POINTS, OTHER_POINTS = 5000, 3000
-"""Points of the fit near the wall and elsewhere: more cost time and teach nothing, since the
-errors of a depth map are alike over many pixels."""
+"""Points of the fit near the wall and elsewhere. More points only take more time, because the
+errors of a depth map are correlated over many pixels."""
 BASELINE = ("offset_mm", "tilt_x", "tilt_y")
-"""Ground level around the object: integration leaves it off by tens of micrometres and tilted."""
+"""Ground level around the object: after integration it is tilted and off by tens of micrometres."""
 HUBER = 2.5
 """Residuals beyond this many sigma lose weight."""
 MODEL_ERROR = 0.001
-"""Share of the height by which the closed forms of the drape may be wrong (near corners); finer
-scales for the residual would only throw out the edges that carry the size."""
+"""Error of the closed forms of the drape (near corners), as a share of the height. A finer scale of
+the residual would only exclude the edges, which determine the size."""
 BLUR_SD_MM = 0.1
 """Root of the sd of the squared blur: camera, denoising and coarse nodes blur a map by 0.02 to
 0.12 mm. If a fit is allowed less blur than there is, it finds a rounder edge instead: with 0.2 mm
@@ -33,31 +33,33 @@ instead of 0.1 mm, a press of 0.5 mm is measured 0.1 mm too wide."""
 CORNER_SD = 0.05
 """Strength of a corner's rounding, either sign: a sharp corner holds the membrane further out."""
 CORNER_MM = 0.6
-"""Pixels this near to a corner are not used: there, the strength alone is no description."""
+"""Pixels closer to a corner are not used: the strength alone does not describe the shape there."""
 MOST_ROUNDS = 6
-"""Rounds of reweighting before a fit counts as not coming to an end."""
+"""Rounds of reweighting before a fit counts as not converged."""
 CORRELATION_SIZE = 250
-"""Pixels along a side of the map that residuals are correlated on."""
+"""Pixels along a side of the map for the correlation of residuals."""
 FIT_TOLERANCE = 1e-4
-"""Share by which the cost changes when a round's fit ends; later rounds start from there."""
+"""Relative change of the cost at which the fit of a round ends. The next round starts from
+there."""
 SETTLED = 0.3
 """Rounds stop when no parameter moves by more than this share of its sd."""
 
 
 @dataclass(frozen=True, slots=True)
 class EdgePrior:
-    """What is known of an edge's roundness before the map is seen.
+    """Prior knowledge of the rounding of an edge.
 
     The fillet of the object and the blur of the map both round the wall's upper end, but only the
-    fillet moves the wall inwards. A map that resolves it decides; where it does not, this does.
+    fillet moves the wall inwards. If the map resolves the rounding, the map decides; otherwise this
+    prior does.
 
     Attributes
     ----------
     edge_radius_mm, edge_radius_sd_mm : float
         Fillet of the object.
     blur_mm : float
-        Scale of the map's blur (sigma of a Gaussian), if nothing but the grid blurs it. The fit
-        uses its square, in which the map is linear.
+        Sigma of the map's blur if only the grid blurs it. The fit uses its square, in which the map
+        is linear.
     """
 
     edge_radius_mm: float
@@ -80,7 +82,7 @@ class WindowData:
     seen_share : float
         Share of the first 1.5 mm of the drape that is on the map.
     reach_mm : float
-        Length over which the map's errors hang together at least; 0 where they may be white.
+        Least correlation length of the map's errors; 0 if they can be white noise.
     """
 
     x_mm: Array
@@ -100,18 +102,18 @@ class FitResult:
     Attributes
     ----------
     values, sd : dict
-        Parameters and their standard deviations (mm, radians), baseline included, as the residual
-        shows them: noise and whatever the shape does not explain.
+        Parameters and their standard deviations (mm, radians), with the baseline. They follow from
+        the residual: noise and everything that the shape does not explain.
     chosen : (rows, columns) bool
         The N pixels that were fitted.
     gain : (parameters, N)
-        What each parameter is moved by where the depth of these pixels changes by 1.
+        Change of each parameter per unit change of the depth of these pixels.
     residual_mm : (rows, columns)
         Map minus model over the window; NaN where not used.
     residual_rms_mm : float
         Root of the weighted mean square.
     correlated_pixels : float
-        How many neighbouring pixels err together.
+        How many neighbouring pixels have a common error.
     converged : bool
         Whether the solver converged.
     """
@@ -158,8 +160,8 @@ def fit_indenter(
 ) -> FitResult:
     """Fit position, size, yaw, depth and drape of an indenter together.
 
-    Weighted least squares with Huber weights; the edge's fillet and the map's blur enter with
-    `edge` as prior, set against the data by the number of independent errors in them.
+    Weighted least squares with Huber weights. `edge` is the prior of the edge's fillet and the
+    map's blur. Its weight depends on the number of independent errors in the data.
 
     Parameters
     ----------
@@ -208,7 +210,8 @@ def fit_indenter(
         actual = 1.0 + (together - 1.0) * density
         covariance = _covariance(jacobian, inflation, actual, len(prior))
         sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        # The first round's sd follow from a guess of the residual's scale.
+        # The standard deviations of the first round follow from an estimate of the residual's
+        # scale.
         settled = n > 0 and bool(np.all(np.abs(vector - before) <= SETTLED * sd + 1e-5))
         if settled:
             break
@@ -225,7 +228,7 @@ def fit_indenter(
 
 
 def _clear_of_corners(problem: _Problem, vector: Array) -> Array:
-    """Return 1 for points that the corners' shape does not reach, 0 for the others."""
+    """Return 1 for points outside the reach of the corners, 0 for the others."""
     clear = np.ones(problem.x_mm.shape)
     for x, y in problem.model.corners(dict(zip(problem.names, vector, strict=True))):
         clear[np.hypot(problem.x_mm - x, problem.y_mm - y) < CORNER_MM] = 0.0
@@ -242,7 +245,7 @@ def correlated_pixels(residual_mm: Array) -> float:
     residual_mm : (rows, columns)
         Residuals; NaN where there are none.
     """
-    # A stride spares most of the time; what is correlated at all is so over many pixels.
+    # A stride saves most of the time; correlations extend over many pixels.
     stride = max(1, round(max(residual_mm.shape) / CORRELATION_SIZE))
     residual_mm = residual_mm[::stride, ::stride]
     there = np.isfinite(residual_mm)
@@ -275,8 +278,8 @@ def correlated_pixels(residual_mm: Array) -> float:
 def _chosen_points(window: WindowData) -> tuple[Mask, float]:
     """Return the pixels of the fit and which share of the usable ones they are.
 
-    A regular decimation would beat against walls that lie along the grid; this one is random, with
-    a fixed seed, so that a map always gives the same result.
+    A regular decimation would alias with walls along the grid. This one is random with a fixed
+    seed, so that a map always gives the same result.
     """
     usable = window.weight > 0.0
     draw = np.random.default_rng(0).random(usable.shape)

@@ -14,16 +14,17 @@ from gelpolight_core.translation import tr
 GOOD_RESIDUAL = 0.005
 """Residual, as a share of the height, up to which no other shape is tried."""
 EDGED_RESIDUAL = 0.02
-"""The same for a cuboid as the other shape: its corners alone leave several times as much."""
+"""The same with a cuboid as the other shape: its corners alone cause a residual several times as
+large."""
 POOR_RESIDUAL = 0.06
-"""Residual, as a share of the height, beyond which the map is not this object: a wall that is
-moved by a tenth of the decay length over its whole length leaves as much."""
+"""Residual, as a share of the height, beyond which the map does not show this object. A wall that
+is displaced by a tenth of the decay length causes this residual."""
 BETTER_SHAPE = 0.75
-"""Another shape is named when it leaves less than this share of the residual."""
+"""Another shape is suggested if its residual is less than this share."""
 LARGEST_SD = 0.05
 """Relative standard deviation beyond which a size is not measured."""
 SMALLEST_GROUND = 0.8
-"""Share of the object's surroundings that must be usable for the drape to be seen."""
+"""Share of the object's surroundings that must be usable to show the drape."""
 
 
 def describe_fit_problems(
@@ -59,7 +60,7 @@ def describe_fit_problems(
 
 
 def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> str:
-    """Return why an object's height means nothing; an empty text where its map has an anchor.
+    """Return why the height of an object is meaningless; an empty text if its map has an anchor.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def fit_residual(heightmap: HeightMap, measurement: Measurement) -> NDArray[np.f
     Returns
     -------
     residual_mm : (rows, columns) float32
-        Known in the object's bounding box and 3 mm around it, which is what the fit sees.
+        Finite in the object's bounding box and 3 mm around it, the area of the fit.
     """
     left, top = measurement.outline_mm.min(axis=0) - MARGIN_MM
     right, bottom = measurement.outline_mm.max(axis=0) + MARGIN_MM

@@ -56,8 +56,8 @@ class GaugeRow:
     random : Series
         One value for each of several regions: its press, or the mean of its repeats.
     reproducibility_mm : float
-        Standard deviation that going to another region adds to the repeatability; NaN where one
-        of the two is not known.
+        Standard deviation between regions, in addition to the repeatability; NaN if one of the two
+        is not known.
     """
 
     direction: str

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 TYPICAL_DECAY_MM = 0.7
-"""Where the fit of the decay length starts; the fit is free to leave it."""
+"""Start value of the fitted decay length."""
 SMALLEST_SIZE_MM = 0.1
 """No fitted diameter or side is smaller."""
 
@@ -43,7 +43,7 @@ class IndenterModel:
     outline : callable (values) -> (N, 2)
         The contact region's outline, (x, y) in mm.
     corners : callable (values) -> (N, 2)
-        Its corners, (x, y) in mm. What they look like in detail is not known.
+        Its corners, (x, y) in mm. Their exact shape is not known.
     """
 
     shape: str
@@ -129,7 +129,7 @@ def _no_corners(_: Values) -> Array:
 def _start_ball(region: PressedRegion) -> dict[str, float]:
     start = _shared_start(region)
     half_radius = _sharp(2.0 * float(np.sqrt(region.area_mm2 / np.pi))) / 2.0
-    # The sphere is down by half its depth about where the drape takes over.
+    # At about half of its depth, the sphere ends and the drape begins.
     drop = start["height_mm"] / 2.0
     return start | {"diameter_mm": (half_radius**2 + drop**2) / drop}
 

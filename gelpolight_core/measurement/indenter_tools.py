@@ -29,7 +29,7 @@ def measure_heightmap(
     Parameters
     ----------
     heightmap : HeightMap
-        Reconstructed with its uncertainty, where the result shall hold noise and calibration.
+        Reconstructed with its uncertainty if the result shall contain noise and calibration.
     shape : {"auto", "ball", "cylinder", "cuboid"}
         What is pressed; ``auto`` fits all three.
     seed_mm : (float, float), optional
@@ -76,12 +76,12 @@ def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:
 
 
 def mode_error(heightmap: HeightMap) -> ModeError:
-    """Return what the model and effort of a height map leave of a press.
+    """Return the remaining error of the model and effort of a height map.
 
     Parameters
     ----------
     heightmap : HeightMap
-        Where it does not say at which effort it was made, the fastest is assumed.
+        If it does not state its effort, the fastest is assumed.
     """
     if heightmap.model == "paper":
         return replace(MODE_ERRORS["paper"], lateral_per_mm=heightmap.lateral_per_mm)

@@ -1,8 +1,8 @@
 """Finished measurements, one line each, so that no press is measured twice.
 
-A line is found by what its result depends on: the image's bytes, the shape, and the name that
-the ledger was opened for (the calibration, the model, the program's version). So an image that
-was taken again, or another calibration, never meets an old result.
+The key of a line contains everything that its result depends on: the bytes of the image, the shape,
+and the name of the ledger (calibration, model, program version). An image that was captured again,
+or another calibration, therefore never gets an old result.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from gelpolight_core.translation import tr
 SIZE_LIMIT = 100_000_000
 PAIRS = ("side_mm", "centre_mm")
 SPREADS = ("sd", "noise_sd", "calibration_sd")
-"""Fields of a measurement that are no plain values, and that hold some."""
+"""Fields of a measurement that are arrays, and those that contain several values."""
 
 
 class Ledger:
-    """A file of measurements; a line is on the disk before the next one is begun.
+    """A file of measurements. Each line is on the disk before the next one begins.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Ledger:
     def __init__(self, path: Path | None, name: str) -> None:
         self._path, self._name = path, name
         self._known: dict[str, Measurement | str] = {}
-        # A line that a crash cut short is no line; the next one begins on a line of its own.
+        # A line that a crash cut off is ignored; the next entry begins on a new line.
         self._torn = False
         if path is None:
             return
@@ -64,7 +64,7 @@ class Ledger:
         """Return what an image's result is found by; None where the image cannot be read."""
         try:
             content = image.read_bytes()
-        except OSError:  # the measurement itself says so in its own words
+        except OSError:  # the measurement itself reports this error
             return None
         digest = hashlib.sha256(content)
         digest.update(f"\n{shape}\n{self._name}".encode())
@@ -111,7 +111,7 @@ def _damaged(path: Path) -> InputError:
 
 
 def _as_json(measurement: Measurement) -> dict[str, Any]:
-    """Return every field; numbers keep their last bit, as JSON writes them shortest and exact."""
+    """Return all fields; JSON writes numbers so that they are read back exactly."""
     return {**asdict(measurement), "outline_mm": measurement.outline_mm.tolist()}
 
 

@@ -21,10 +21,11 @@ Counts = NDArray[np.int64]
 Point = tuple[float, float]
 LEAST_NODES = 3
 MOST_NEAR_LINE = 1e-3
-"""Area of the triangle of three points as a share of its longest side squared: less is a line."""
+"""Least area of the triangle of three points, relative to its longest side squared; below it, the
+points lie on a line."""
 LARGEST_MEDIAN = 15
 ROUNDS = 3
-"""Of the levelling without the object: each leaves out what lies far from the plane before."""
+"""Rounds of levelling without the object: each excludes points far from the previous plane."""
 FAR = 3.0
 """Standard deviations."""
 
@@ -107,12 +108,12 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     plane = level + slope_x * x + slope_y * y
     level = _without(heightmap, plane, tr("Levelled by three points."))
-    # The errors of the three depths tilt the whole map; they are not followed.
+    # The errors of the three depths tilt the whole map; they are not propagated.
     return _without_errors(level)
 
 
 def smooth_gaussian(heightmap: HeightMap, *, sigma_mm: float) -> HeightMap:
-    """Smooth a height map with a Gaussian. Places without depth neither count nor change.
+    """Smooth a height map with a Gaussian. Points without depth are ignored and do not change.
 
     Parameters
     ----------
@@ -140,7 +141,7 @@ def smooth_gaussian(heightmap: HeightMap, *, sigma_mm: float) -> HeightMap:
 def smooth_median(heightmap: HeightMap, *, nodes: int) -> HeightMap:
     """Replace each depth by the median around it.
 
-    Places without depth count as their nearest neighbour with one, and do not change.
+    Points without depth count as their nearest neighbour with depth, and do not change.
 
     Parameters
     ----------

@@ -30,14 +30,14 @@ def measurable_depth(
     name : str
         Of the image, kept in the result.
     where : str, optional
-        What a message names; by default the image's name.
+        Name of the image in messages; by default `name`.
     despite_faults : bool, optional
-        Whether an image whose depth means nothing is reconstructed all the same.
+        Whether an image with a fault that makes its depth meaningless is reconstructed, too.
 
     Raises
     ------
     InputError
-        If the depth would mean nothing, or as :meth:`Reconstructor.depth`.
+        If the depth would be meaningless, or as :meth:`Reconstructor.depth`.
     """
     health = reconstructor.health(frame, name=name)
     if not despite_faults:

@@ -45,7 +45,8 @@ OUTSIDE_FLAG = 1
 DOUBTFUL_WEIGHT = 0.1
 """Weight of a flagged pixel: an error about three times that of its neighbours."""
 MARGIN_MM = 3.0
-"""Ground around the half-height outline that the fit sees: four decay lengths of 0.7 mm."""
+"""Width of the ground around the half-height outline that is fitted: four decay lengths of 0.7
+mm."""
 OTHER_REACH_MM = 2.5
 """How far the drape of another object reaches into the ground around this one."""
 DRAPE_MM = 1.5
@@ -72,7 +73,7 @@ def measure_object(
     reach_mm: float = 0.0,
     edge_radius_mm: float = EDGE_RADIUS_MM,
 ) -> Measurement:
-    """Measure the object that is pressed into the membrane, its drape fitted with it.
+    """Measure the object that is pressed into the membrane; its drape is fitted, too.
 
     Parameters
     ----------
@@ -87,21 +88,21 @@ def measure_object(
     flags : (rows, columns) uint8, optional
         Bit 1: outside the working area, left out; any other bit: doubtful, weighted down.
     depth_sd_mm : (rows, columns), optional
-        Standard deviation of each pixel; it weights the pixels against each other. One number for
-        all of them would change nothing, and is refused.
+        Standard deviation of each pixel, used as its relative weight. A single number would have no
+        effect and is refused.
     noise_mm : (examples, rows / 4, columns / 4), optional
-        Errors that the map's noise could have made, as a height map holds them: with them the
-        result says what repeats would scatter by.
+        Examples of the errors by the map's noise, as stored in a height map. With them, the result
+        contains the scatter of repeated measurements.
     depth_scale_sd, lateral_scale_sd : float, optional
         Relative standard deviations of the calibration's depths and lengths; part of the sd.
     mode : ModeError, optional
         What the map's model and effort leave; part of the sd.
     reach_mm : float, optional
-        Length over which the map's errors hang together at least. Errors of maps that were
-        integrated from slopes hang together over the drape; 0 where they may be white.
+        Least correlation length of the map's errors. Errors of maps that were integrated from
+        slopes are correlated over the drape; 0 if they can be white noise.
     edge_radius_mm : float, optional
-        Fillet of the object's edge where the map does not show it, known to about half of
-        itself. Edges of printed and machined indenters are broken by 0.05 to 0.1 mm.
+        Fillet of the object's edge if the map does not show it; its uncertainty is about half of
+        it. Edges of printed and machined indenters have a fillet of 0.05 to 0.1 mm.
 
     Raises
     ------
@@ -238,7 +239,7 @@ def _checked(
     if depth_sd_mm is not None:
         usable = (weight > 0.0) & np.isfinite(depth_sd_mm) & (depth_sd_mm > 0.0)
         typical = float(np.median(depth_sd_mm[usable])) if usable.any() else 1.0
-        # A pixel that claims to be far better than its neighbours must not decide alone.
+        # A pixel with a much smaller standard deviation than its neighbours must not decide alone.
         share = np.divide(typical, depth_sd_mm, out=np.zeros_like(depth), where=usable)
         weight *= np.minimum(share, 2.0) ** 2
     return np.where(weight > 0.0, depth, 0.0), x, y, weight
@@ -324,7 +325,7 @@ def _window(
 def _seen_share(core: Mask, weight: Array, own_mm: Array, pitch: float) -> float:
     """Return which share of the ground within 1.5 mm of the half-height outline is usable."""
     wide = int(np.ceil(DRAPE_MM / pitch)) + 1
-    # On padding, so that ground beyond the map's edge counts as missing.
+    # With padding, so that ground beyond the map's edge counts as missing.
     rows, columns = np.nonzero(core)
     part = core[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     padded = ndimage.distance_transform_edt(~np.pad(part, wide)) * pitch
@@ -347,10 +348,10 @@ def _face(shape: str, fit: FitResult, window: WindowData) -> Mask | None:
 
 
 def _plateau_shift_mm(fit: FitResult, face: Mask | None) -> float:
-    """Return how far the plateau's median lies above the fitted one.
+    """Return the median height of the plateau minus the fitted height.
 
-    The fit ties the plateau to its rim, where a reconstruction is worst; the object's height is
-    that of its face.
+    The fit uses the edge of the plateau, where a reconstruction is least accurate. The height of
+    the object is that of its face.
     """
     if face is None or not face.any():
         return 0.0
@@ -365,7 +366,7 @@ def _measurement(
     reason: str,
 ) -> Measurement:
     values, (noise, scale, of_mode) = fit.values, parts
-    # Rim and face disagree by the shift: their height is known to no better than half of it.
+    # Edge and face differ by the shift: the height is not more accurate than half of it.
     fitted = {**fit.sd, "height_mm": math.hypot(fit.sd["height_mm"], 0.5 * shift_mm)}
     diameter, side, yaw = None, None, None
     if shape == "cuboid":
@@ -406,7 +407,7 @@ def _spread(shape: str, values: Mapping[str, float], sd: Mapping[str, float]) ->
     }
     if shape == "cuboid":
         first, second = _side_keys(values)
-        # Neither calibration nor mode turns anything.
+        # Neither calibration nor mode changes an angle.
         spread |= {
             "side_mm": (sd[first], sd[second]),
             "yaw_deg": float(np.degrees(sd.get("yaw", 0.0))),

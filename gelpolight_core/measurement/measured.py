@@ -18,10 +18,10 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 
 MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
-"""Over which the model's own errors of the depth hang together: errors of slopes do so over lengths
-like the drape's, and what is integrated from them over twice that."""
+"""Correlation length of the model's depth errors: errors of slopes are correlated over about the
+decay length of the drape, and their integral over twice that."""
 WAVES = 24
-"""Waves that one smooth example of the model's errors is made of."""
+"""Number of waves in one smooth example of the model's errors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,8 @@ class Measured:
         In `unit`.
     sd : float or None
         Standard deviation: the image's noise, the model and the calibration together. None
-        where the height map states none. Points that a person placed count as known to one node;
-        how well lines, rectangles and rims were placed is no part of it.
+        where the height map states none. Points placed by a person have an uncertainty of one node.
+        Errors of placing lines, rectangles and circles are not part of it.
     unit : str
         ``mm``, ``um`` or ``deg``.
     name : str
@@ -58,7 +58,7 @@ class Measured:
 
 
 def figure_labels() -> dict[str, str]:
-    """Return what people read for each name of a figure."""
+    """Return the label of each figure by its name."""
     return {
         "distance": tr("distance in the plane"),
         "distance_3d": tr("distance in space"),
@@ -92,14 +92,14 @@ def figure_labels() -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class MapErrors:
-    """Errors that the depths at some places could as well have had.
+    """Possible errors of the depths at some points.
 
     Attributes
     ----------
     depth_mm : (examples, N)
         Each row is one set of errors that belong together: noise and model.
     depth_scale_sd, lateral_scale_sd : float
-        Relative standard deviations of depths, and of lengths across, common to all places.
+        Relative standard deviations of depths and of lateral lengths, common to all points.
     """
 
     depth_mm: Array
@@ -115,8 +115,8 @@ class MapErrors:
 def map_errors(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> MapErrors | None:
     """Return errors at places of a height map; None where it does not state any.
 
-    The noise is that of the map's own examples. Of the model's errors the map says how large they
-    are; they are taken as smooth over the drape's length, and are the same for every tool on a map.
+    The noise comes from the examples in the map. The map states the size of the model's errors.
+    They are assumed to be smooth over the drape's length, and are the same for all tools on a map.
 
     Parameters
     ----------
@@ -145,14 +145,14 @@ def measured(
     depth_mm: Array,
     errors: MapErrors | None,
 ) -> Measured:
-    """Measure, and repeat it with every error that the depths could as well have had.
+    """Measure, and repeat the measurement with each possible error of the depths.
 
     Parameters
     ----------
     name, unit : str
         As in :class:`Measured`.
     compute : callable (depth_mm, stretch) -> value
-        What is measured, from depths (N,) and a factor on all lengths across.
+        The measurement, from depths (N,) and a factor on all lateral lengths.
     depth_mm : (N,)
         The depths.
     errors : MapErrors or None

@@ -29,16 +29,16 @@ EDGES: tuple[Edge, ...] = ("steepest", "plain")
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A circle through three or more points of a rim.
+    """A circle through three or more points of an edge.
 
     Attributes
     ----------
     points_mm : tuple of (float, float)
-        Of the rim.
+        On the edge.
     edge : {"steepest", "plain"}
-        ``steepest``: the points only say where to look, the circle goes through the edge of what
-        is steepest near it, all around: where half of that slope is reached on the deeper side;
-        ``plain``: through the points themselves.
+        ``steepest``: the points are only the start. The circle goes through the steepest edge near
+        them, at the point on the deeper side where half of that slope is reached; ``plain``:
+        through the points themselves.
     """
 
     name: ClassVar[str] = "circle"
@@ -52,7 +52,7 @@ class Circle:
         if self.edge == "steepest":
             found = circle_at_steepest(heightmap, found)
         turns = np.linspace(0.0, 2.0 * np.pi, 121)
-        rim = np.array(found.centre_mm) + found.radius_mm * np.stack(
+        circle = np.array(found.centre_mm) + found.radius_mm * np.stack(
             [np.cos(turns), np.sin(turns)], axis=1
         )
         share = heightmap.lateral_scale_sd
@@ -69,7 +69,7 @@ class Circle:
             Measured(found.rms_mm, None, "mm", "roundness"),
         )
         x, y = found.points_mm.T
-        return tool_result(self, figures, (rim,), flags_at(heightmap, x, y))
+        return tool_result(self, figures, (circle,), flags_at(heightmap, x, y))
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class RectangleTool:
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         _check_edge(self.edge)
-        # A side as drawn lies between two edges, each placed to one node.
+        # A drawn side lies between two edges, each with an uncertainty of one node.
         by_hand = math.sqrt(2.0) * heightmap.pitch_mm
         area, spread = self.rectangle, (by_hand, by_hand)
         if self.edge == "steepest":

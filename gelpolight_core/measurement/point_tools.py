@@ -140,7 +140,7 @@ class Angle:
         Raises
         ------
         InputError
-            If two of the places are one, or one lies outside the map.
+            If two of the points are the same, or one lies outside the map.
         """
         positions = np.array([self.first_mm, self.apex_mm, self.second_mm])
         arms = positions[[0, 2]] - positions[1]
@@ -187,10 +187,10 @@ def with_placing(
     positions_mm: Array,
     heightmap: HeightMap,
 ) -> tuple[Measured, ...]:
-    """Return figures with what placing adds: nobody places a point better than to one node.
+    """Add the uncertainty of placing points by hand, one node, to figures.
 
-    Each place is moved by a node in x and in y, with the depth that the surface has there, and
-    the changes count as independent. Figures without a standard deviation keep none.
+    Each point is moved by a node in x and in y on the surface, and the changes count as
+    independent. Figures without a standard deviation remain without one.
 
     Parameters
     ----------

@@ -28,9 +28,9 @@ Point = tuple[float, float]
 STEP = 0.5
 """Distance of the profile's points, as a share of the map's pitch."""
 ERROR_STEP = 4.0
-"""The same for the errors, which the map has at every fourth node."""
+"""The same for the errors: the map has them at every fourth node."""
 MOST_POINTS = 20_000
-"""Of a line; the map's diagonal has about 3000."""
+"""Most points of a line; the map's diagonal has about 3000."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Profile:
     slope_model_sd : (n,) or None
         Standard deviation of slopes from what the model does not explain.
     errors : MapErrors or None
-        Errors of `depth_mm` that belong together, for figures read off the profile.
+        Correlated errors of `depth_mm`, for figures of the profile.
     """
 
     start_mm: Point
@@ -160,7 +160,7 @@ def _strip(start_mm: Point, end_mm: Point, along: Array, across: Array) -> tuple
 def _profile_errors(
     heightmap: HeightMap, start_mm: Point, end_mm: Point, along: Array, width_mm: float
 ) -> MapErrors | None:
-    """Return the errors of a profile, from fewer points: they are smooth."""
+    """Return the errors of a profile. Fewer points are enough because errors are smooth."""
     step = ERROR_STEP * heightmap.pitch_mm
     few = np.linspace(0.0, along[-1], math.ceil(along[-1] / step) + 1)
     x, y = _strip(start_mm, end_mm, few, _across(width_mm, step))
@@ -198,26 +198,25 @@ def step_height(profile: Profile, *, first_mm: Point, second_mm: Point) -> Measu
 def width_at(
     profile: Profile, level_mm: float | None = None, *, between: Point | None = None
 ) -> Measured:
-    """Return the distance between the outermost places at which a profile crosses a level.
+    """Return the distance between the outermost points at which a profile crosses a level.
 
     Parameters
     ----------
     profile : Profile
         From :func:`take_profile`.
     level_mm : float, optional
-        A depth; left out, it is half way between the least and the greatest depth.
+        A depth. Default: half way between the least and the greatest depth.
     between : (float, float), optional
-        The range of `along_mm` to look at; left out, all of it.
+        The range of `along_mm` to use. Default: all of it.
 
     Raises
     ------
     InputError
-        If the range holds no point of the map, or the profile does not cross the level and come
-        back.
+        If the range contains no point of the map, or the profile does not cross the level twice.
 
     Notes
     -----
-    A map shows a wall no sharper than its nodes: each end is taken to be known to one of them.
+    A map cannot show a wall sharper than its nodes: each end has an uncertainty of one node.
     """
     left, right, _ = _crossings(profile, level_mm, between)
 
@@ -234,7 +233,7 @@ def width_at(
 def width_ends(
     profile: Profile, level_mm: float | None = None, *, between: Point | None = None
 ) -> tuple[float, float, float]:
-    """Return the two places (along the profile) that a width lies between, and its level in mm.
+    """Return the two ends of a width (along the profile), and its level in mm.
 
     Parameters and errors are those of :func:`width_at`.
     """
@@ -292,7 +291,7 @@ def angle_between(profile: Profile, first_mm: Point, second_mm: Point) -> Measur
 
 
 def _with_model(found: Measured, profile: Profile, *parts: Mask) -> Measured:
-    """Add what the model leaves open of the slopes, which hang together over such ranges."""
+    """Add the uncertainty of the slopes by the model. It is correlated over such ranges."""
     model = profile.slope_model_sd
     if found.sd is None or model is None:
         return found
@@ -308,7 +307,7 @@ def _with_model(found: Measured, profile: Profile, *parts: Mask) -> Measured:
 
 @dataclass(frozen=True, slots=True)
 class _Crossing:
-    """Where a profile crosses a level, and how that place moves with depths and level."""
+    """The crossing of a profile with a level, and how it moves with depths and level."""
 
     index: int
     """Of the point before the crossing."""
@@ -319,7 +318,7 @@ class _Crossing:
     """Points of least and greatest depth."""
 
     def position(self, depth: Array, level_mm: float) -> float:
-        """Return the crossing's place, the profile's slope there taken as it was found."""
+        """Return the position of the crossing, with the present slope of the profile there."""
         return self.along_mm + (level_mm - float(depth[self.index])) * self.length_mm / self.rise_mm
 
 

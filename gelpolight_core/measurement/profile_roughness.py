@@ -21,7 +21,7 @@ SECTIONS = 5
 ALPHA = math.sqrt(math.log(2.0) / math.pi)
 """Of the Gaussian filter: it passes half of a wave as long as the cut-off (ISO 16610-21)."""
 LEAST_PITCHES = 5.0
-"""A shorter cut-off would measure the grid of the map."""
+"""With a shorter cut-off, the result would show the grid of the map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +61,9 @@ class ProfileRoughness:
 def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> ProfileRoughness:
     """Return the roughness of a profile.
 
-    The least-squares line is taken off, then the Gaussian filter separates roughness from waviness.
-    Half a cut-off at each end, where the filter lacks neighbours, is not used. No filter for the
-    shortest waves (Nis) is used: the camera's resolution plays its part.
+    The least-squares line is subtracted, then the Gaussian filter separates roughness from
+    waviness. Half a cut-off at each end is not used, because the filter has too few neighbours
+    there. There is no filter for the shortest waves (Nis): the camera's resolution replaces it.
 
     Parameters
     ----------

@@ -24,15 +24,15 @@ class Proposal:
     Attributes
     ----------
     shape : str
-        ``ball``, ``cylinder`` or ``cuboid``; ``unclear`` where the best two are alike.
+        ``ball``, ``cylinder`` or ``cuboid``; ``unclear`` if the best two fit equally well.
     candidates : tuple of str
-        The shapes that come into question, the best first: one, or the two that are alike.
+        The possible shapes, the best first: one, or the two that fit equally well.
     at_mm : (float, float)
         Where it is, (x, y): the centroid of its upper half.
     height_mm : float
         Its approximate height.
     residual_mm : mapping of str to float
-        What each shape leaves unexplained, root mean square.
+        Root mean square residual of each shape.
     """
 
     shape: str
@@ -45,21 +45,21 @@ class Proposal:
 def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None) -> Proposal | None:
     """Return the pressed indenter; None if there is none, or another shape.
 
-    All three are fitted with their drape. The best one counts when it leaves no more than 6 % of
-    the height, and less than three quarters of what the next one leaves; the limits are those by
-    which a measurement is called doubtful.
+    All three are fitted with their drape. The best one is returned if its residual is at most 6 %
+    of the height and less than three quarters of the next one's. These are the limits at which a
+    measurement becomes doubtful.
 
     Parameters
     ----------
     heightmap : HeightMap
         The map.
     seed_mm : (float, float), optional
-        A point on the object; left out, the tallest object counts.
+        A point on the object. Default: the tallest object.
 
     Raises
     ------
     InputError
-        If a seed is given and no object is there, or nothing of the map is usable.
+        If a seed is given and no object is there, or no part of the map is usable.
     """
     region = _tallest(heightmap)
     if region is None or (seed_mm is None and region.cut):

@@ -25,8 +25,8 @@ from gelpolight_core.translation import tr
 SHAPES = ("cylinder", "cuboid")
 SAME_REGION = "same"
 ROOM_MM = 2.0
-"""Ground that is seen around every object: three decay lengths of 0.7 mm, where the membrane has
-come to rest to a twentieth of the height."""
+"""Visible ground around every object: three decay lengths of 0.7 mm, where the drape has decreased
+to a twentieth of the height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +38,9 @@ class PressWanted:
     truth : Truth
         The object: shape, size and height.
     position_mm : (float, float)
-        Where its middle goes, (x, y) in the sensor frame.
+        Position of its middle, (x, y) in the sensor frame.
     yaw_deg : float
-        How a cuboid is turned, from x to y; 0 for a cylinder.
+        Rotation of a cuboid, from x to y; 0 for a cylinder.
     region : str
         ``same``, or a random region's name such as ``r07``.
     repeat : int
@@ -55,7 +55,7 @@ class PressWanted:
 
     @property
     def file(self) -> str:
-        """The image's name, which no other press of a protocol has."""
+        """The name of the image, unique in the protocol."""
         t = self.truth
         return (
             f"{t.shape}_s{round(100 * t.size_mm):03d}_h{round(100 * t.height_mm):03d}"
@@ -70,7 +70,7 @@ class PressWanted:
 
 @dataclass(frozen=True, slots=True)
 class Protocol:
-    """What is pressed; the default is the paper's, and any part of it may be left out.
+    """The presses of an evaluation. The default is the paper's; any part can be left out.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Protocol:
     heights_mm : tuple of float
         Heights that are pressed at the size `at_size_mm`.
     at_size_mm, at_height_mm : float
-        Where the two series cross.
+        Size and height of the object that is in both series.
     repeats : int
         Presses of each object in one and the same region.
     regions : int
@@ -118,7 +118,7 @@ class Protocol:
     def presses(self) -> tuple[PressWanted, ...]:
         """Return every press: object by object, first in the same region, then in the random ones.
 
-        So an object is mounted once, and pressed until it is done with.
+        Each object is mounted only once.
         """
         return tuple(press for truth in self.objects for press in self._presses_of(truth))
 
@@ -134,7 +134,7 @@ class Protocol:
         return wanted
 
     def _random_position(self, truth: Truth, region: str) -> tuple[tuple[float, float], float]:
-        """Return a place that is equally likely anywhere with room, and a turn for a cuboid."""
+        """Return a random position with enough room, and a random rotation of a cuboid."""
         name = f"{truth.shape} {truth.size_mm:.3f} {truth.height_mm:.3f} {region}"
         rng = np.random.default_rng([self.seed, zlib.crc32(name.encode())])
         away = room_mm(truth, self.reach_mm) * math.sqrt(rng.random())
@@ -146,7 +146,7 @@ class Protocol:
 
 
 def room_mm(truth: Truth, reach_mm: float) -> float:
-    """Return how far from the origin an object's middle may lie; not positive: it has no room.
+    """Return the largest distance of an object's middle from the origin; <= 0: it has no room.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def room_mm(truth: Truth, reach_mm: float) -> float:
 
 
 def protocol_reach_mm(calibration: AnyCalibration) -> float:
-    """Return the radius about the origin in which every point of the membrane is seen."""
+    """Return the radius about the origin within which the whole membrane is visible."""
     table = calibration.table
     grid = table.grid
     away = np.hypot(grid.x_mm[None, :], grid.y_mm[:, None])
@@ -170,7 +170,7 @@ def protocol_reach_mm(calibration: AnyCalibration) -> float:
 
 
 def check_protocol(protocol: Protocol, *, where: str = "protocol") -> Protocol:
-    """Refuse a protocol that nobody can press; return it otherwise.
+    """Check that a protocol can be pressed, and return it.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def check_protocol(protocol: Protocol, *, where: str = "protocol") -> Protocol:
     Raises
     ------
     InputError
-        If nothing is to be pressed, a shape is unknown, a number is out of range or stands twice,
+        If there is nothing to press, a shape is unknown, a number is out of range or occurs twice,
         or an object has no room.
     """
 

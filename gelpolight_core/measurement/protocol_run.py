@@ -123,11 +123,11 @@ class ProtocolRun:
         return RunProgress(len(self._rows), len(self.wanted), self._refused, here, len(of_object))
 
     def next(self) -> PressWanted | None:
-        """Return what to press next; None at the end."""
+        """Return the next press; None at the end."""
         return next((press for press in self.wanted if press.file not in self._rows), None)
 
     def image(self, press: PressWanted) -> Path:
-        """Return where a press's image is, or shall be."""
+        """Return the path of a press's image, which may not exist yet."""
         return self.presses / press.file
 
     def accept(self, press: PressWanted, frames: Sequence[NDArray[Any]]) -> Path:
@@ -143,14 +143,14 @@ class ProtocolRun:
         Raises
         ------
         InputError
-            If the disk refuses it; the press is then requested again.
+            If it cannot be written; the press is then requested again.
         """
         write_image(average_frames(frames), self.image(press))
         self.record(press)
         return self.image(press)
 
     def record(self, press: PressWanted) -> None:
-        """Count a press whose image is in its place already.
+        """Count a press whose image exists already.
 
         Raises
         ------
@@ -158,7 +158,7 @@ class ProtocolRun:
             If ``truth.csv`` cannot be written.
         """
         order = {wanted.file: k for k, wanted in enumerate(self.wanted)}
-        # Rows that another program added to the same run meanwhile are kept.
+        # Rows that another program has added to the same run are kept.
         there = {
             row[0]: row
             for row in _read_rows(self.presses / TRUTH)
@@ -182,12 +182,12 @@ class ProtocolRun:
         self._refused += 1
 
     def take_back(self, press: PressWanted) -> Path | None:
-        """Make a press again: its image goes to ``discarded``; return its place there.
+        """Mark a press to be repeated: move its image to ``discarded`` and return the new path.
 
         Raises
         ------
         InputError
-            If the press is not done, or the disk refuses it.
+            If the press is not done, or a file cannot be written.
         """
         if press.file not in self._rows:
             raise InputError(
@@ -195,7 +195,7 @@ class ProtocolRun:
                 where=press.file,
                 advice=tr("Choose a finished press"),
             )
-        # The row first: without it the image is only an image, and nothing is lost.
+        # The row first: without its row, the image does not count, and no data are lost.
         rows = {file: row for file, row in self._rows.items() if file != press.file}
         _write_rows(list(rows.values()), self.presses)
         self._rows = rows
@@ -218,7 +218,7 @@ def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str
     Parameters
     ----------
     folder : Path
-        To be made; it may be there, but hold no run.
+        The folder. It may exist, but must not contain a run.
     protocol : Protocol
         What is pressed.
     serial : str
@@ -247,12 +247,12 @@ def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str
 
 
 def open_run(folder: Path) -> ProtocolRun:
-    """Go on with a run where it was left.
+    """Open a run to continue it.
 
     Raises
     ------
     InputError
-        If there is none, or ``protocol.toml`` or ``truth.csv`` is damaged or of another protocol.
+        If there is no run, or ``protocol.toml`` or ``truth.csv`` is damaged or of another protocol.
     """
     content = read_protocol_file(folder)
     presses = folder / PRESSES
@@ -280,7 +280,7 @@ def presses_folder(folder: Path) -> Path:
 
 
 def crossing_of(presses: Path) -> Crossing | None:
-    """Return where the series of a folder's presses cross; None where it is no protocol's.
+    """Return the crossing of the series of a folder; None if the folder has no protocol.
 
     Parameters
     ----------

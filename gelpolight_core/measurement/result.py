@@ -36,8 +36,8 @@ class Measurement:
     drape_decay_mm : float
         Decay length of the membrane around the object.
     sd : dict
-        Standard deviation under the same names, of the same form: the fit's residual, or the
-        noise where that is larger, together with calibration and mode.
+        Standard deviations with the same names and form: the larger of the fit's residual and the
+        noise, combined with calibration and mode.
     edge_radius_mm, blur_mm : float or None
         Fillet of the object and blur of the map as fitted; None for a ball.
     baseline_mm : float
@@ -45,7 +45,7 @@ class Measurement:
     residual_rms_mm : float
         Map minus fit around the object.
     correlated_pixels : float
-        How many pixels err together; the sd count each such group once.
+        How many pixels have a common error; the standard deviations count such a group once.
     outline_mm : (N, 2)
         Contact region, (x, y), closed, for an overlay.
     verdict : str
@@ -53,14 +53,13 @@ class Measurement:
     reason : str
         Why doubtful; empty when ok.
     noise_sd : dict or None
-        The part that repeats of the image scatter by; None where the map's noise is not known.
+        The part by noise, the scatter of repeated images; None if the map's noise is not known.
     calibration_sd : dict or None
-        The part that is common to all measurements with this calibration; None where it is not
-        known.
+        The part by the calibration, common to all its measurements; None if it is not known.
     mode_sd : dict or None
-        The part that the model and effort leave with any calibration; None where it is not known.
+        The part by model and effort, which remains with any calibration; None if it is not known.
     corner_rounding : float or None
-        How strongly a cuboid's corners were rounded, as fitted; None for the other shapes.
+        Fitted rounding of a cuboid's corners; None for the other shapes.
 
     Examples
     --------
@@ -105,7 +104,7 @@ class Measurement:
     def size_sd_mm(self) -> float:
         """Standard deviation of `size_mm`."""
         if self.side_mm is not None:
-            # One baseline and one edge move both sides alike: no averaging out is claimed.
+            # Baseline and edge move both sides by the same amount, so errors do not average out.
             return float(np.mean(self.sd["side_mm"]))
         return float(self.sd["diameter_mm"])
 
@@ -215,7 +214,7 @@ def compare(measurement: Measurement, truth: Truth) -> Comparison:
     Raises
     ------
     InputError
-        Another shape was measured than the truth speaks of, or a true size is not positive.
+        If the shape differs from that of the truth, or a true size is not positive.
     """
     if truth.shape != measurement.shape:
         raise InputError(

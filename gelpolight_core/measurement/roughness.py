@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Levelled = Literal["plane", "none"]
 UM = 1e3
 ERROR_NODES = 2000
-"""Nodes that the errors are followed on: more are alike and only cost time."""
+"""Nodes at which errors are propagated. More nodes give the same result and take more time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +37,8 @@ class Roughness:
     sd_um : (float, float, float) or None
         Standard deviations of Sa, Sq and Sz; None where the height map states none.
     noise_sq_um : float or None
-        The Sq that the map's errors alone would show on a smooth surface; a measured Sq near it
-        says nothing of the surface.
+        The Sq of a smooth surface by the map's errors alone. A measured Sq near this value contains
+        no information on the surface.
     """
 
     sa_um: float

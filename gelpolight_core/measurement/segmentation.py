@@ -13,10 +13,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NOISE_FACTOR = 8.0
-"""A press must rise this many times the ground's scatter: 5 sigma would pass one pixel in 1e6, a
-map has 1e6 of them and its offsets are not Gaussian."""
+"""Least height of a press as a multiple of the ground's scatter. With 5 sigma, one pixel of 1e6
+would exceed the limit; a map has 1e6 pixels, and its offsets are not Gaussian."""
 SMALLEST_AREA_MM2 = 0.2
-"""Half-height area below which a bump is a speck: a pin of 0.5 mm diameter."""
+"""Bumps with a smaller half-height area are ignored: a pin of 0.5 mm diameter."""
 SECONDARY_SHARE = 0.25
 """Bumps lower than this share of the tallest are ripples of the reconstruction, not objects."""
 
@@ -53,7 +53,7 @@ class PressedRegion:
 
 
 def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
-    """Return the level of the membrane that is not touched, and its scatter (1 sigma).
+    """Return the level of the untouched membrane, and its scatter (1 sigma).
 
     Parameters
     ----------
@@ -66,12 +66,12 @@ def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
     low = values[: np.searchsorted(values, np.median(values) + 0.2 * np.ptp(values), "right")]
     level = float(np.median(low))
     if np.median(values) > values[0] + 0.05 * np.ptp(values):
-        # An object and its drape cover most of the map: the ground is where depths lie densest.
+        # An object and its drape can cover most of the map: the ground is the most frequent depth.
         low = values[: max(values.size // 2, 1)]
         half = max(low.size // 2, 1)
         start = int(np.argmin(low[half - 1 :] - low[: low.size - half + 1]))
         level = float(np.median(low[start : start + half]))
-    # Drape tails only raise the ground, so the scatter is taken from below the level.
+    # The drape only raises the ground, so the scatter is computed from values below the level.
     below = level - low[low <= level]
     return level, 1.4826 * float(np.median(below)) if below.size else 0.0
 
@@ -91,7 +91,7 @@ def find_pressed_regions(
         Where the map may be used.
     """
     pitch = _pitch_mm(x_mm, y_mm)
-    # Smoothing over a tenth of a millimetre takes the pixel noise away and no object with it.
+    # Smoothing over a tenth of a millimetre removes pixel noise, but no object.
     smooth = _smoothed_over_gaps(depth_mm, valid, 0.1 / pitch)
     level, scatter = ground_level_mm(smooth, valid)
     # Missing pixels within the map are gaps, not its border.
@@ -122,7 +122,7 @@ def _smoothed_over_gaps(depth_mm: Array, valid: Mask, sigma_px: float) -> Array:
 
 
 def _half_height_cores(lift: Array, threshold: float, least_pixels: float) -> list[Mask]:
-    """Return the half-height area of every bump; bumps joined by their drapes come apart."""
+    """Return the half-height area of every bump; bumps joined by their drapes are separated."""
     labels, count = ndimage.label(lift > threshold)
     cores: list[Mask] = []
     for label in range(1, count + 1):

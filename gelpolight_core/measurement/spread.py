@@ -1,17 +1,17 @@
 """Standard deviations of measured sizes: noise, calibration, mode, and residual of the fit.
 
-``noise`` is what repeats of the image scatter by: examples of the depth map's noise pass through
-the fit's last step. The fit's weights move with the noise too, which that step does not show: where
-the shape is not quite what was pressed, as at a cuboid's corners, widths scatter by two to three
-times as much, about the whole at worst. ``calibration`` is common to all measurements with one
-calibration, ``mode`` to all in one mode (model and effort). The fit's own standard deviation holds
-the noise and whatever the shape does not explain (drape, edges, the ground's waves), with pixels
-that err together counted once; the whole is the larger of it and the noise, together with
-calibration and mode.
+``noise`` is the scatter of repeated images: examples of the depth map's noise are propagated
+through the last step of the fit. This does not contain that the weights of the fit change with the
+noise, too. If the shape does not fit exactly, as at a cuboid's corners, widths scatter two to three
+times as much, in the worst case about as much as the total standard deviation. ``calibration`` is
+common to all measurements with one calibration, ``mode`` to all in one mode (model and effort). The
+standard deviation of the fit contains the noise and everything that the shape does not explain
+(drape, edges, waves of the ground), with correlated pixels counted once. The total is the larger of
+it and the noise, combined with calibration and mode.
 
-Depth errors of a share s at the walls also move the size: the drape's tail is still right and its
-upper end is cut off at (1 - s) of the height, where ``h exp(-x / decay)`` has come down by s. The
-wall seems to lie s * decay further out.
+A relative depth error s at the walls also changes the size: the outer drape is still correct, but
+its upper end is cut off at (1 - s) of the height, where ``h exp(-x / decay)`` has decreased by s.
+The wall seems to be s * decay farther out.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ Mask = NDArray[np.bool_]
 Spread = dict[str, Any]
 
 BALL_SLOPE = 0.85
-"""Steepest slope that ball presses show a calibration, 40 degrees. What is wrong with the membrane
-there grows in proportion on steeper walls."""
+"""Steepest slope of the ball presses of a calibration, 40 degrees. On steeper walls, the errors of
+the membrane model increase in proportion."""
 LENGTHS = ("side_a_mm", "side_b_mm", "diameter_mm")
 
 
 @dataclass(frozen=True, slots=True)
 class ModeError:
-    """What a model and effort leaves of a press even with an exact calibration.
+    """Errors of a model and effort that remain even with an exact calibration.
 
     Attributes
     ----------
     depth : float
         Relative error of heights.
     depth_per_slope : float
-        The same for each unit of the wall's slope, height over decay length.
+        The same per unit of the wall's slope, height over decay length.
     lateral_per_mm : float
         Relative error of lengths across, for each mm of depth.
     node_mm : float
-        Distance between the nodes that were solved: wide ones round the upper end of walls.
+        Distance between the solved nodes: a large distance rounds the upper end of walls.
     """
 
     depth: float
@@ -60,8 +60,9 @@ class ModeError:
 
 
 WIDTH_BY_NODES = 0.7
-"""Width that is added by rounding, times the drape's decay length over the square of `node_mm`: on
-virtual and rendered sensors 26 to 52 um with nodes of 0.2 mm, 8 to 15 um with nodes of 0.1 mm."""
+"""Additional width by rounding, as a factor of `node_mm` squared over the drape's decay length. On
+virtual and rendered sensors it is 26 to 52 um with nodes of 0.2 mm, 8 to 15 um with nodes of 0.1
+mm."""
 MODE_PITCH_MM = 0.025
 MODE_ERRORS: Mapping[str, ModeError] = MappingProxyType(
     {
@@ -73,8 +74,8 @@ MODE_ERRORS: Mapping[str, ModeError] = MappingProxyType(
 )
 """Chosen by hand to cover the errors of flat presses of 3 to 7 mm, 0.3 to 1.5 mm deep, into virtual
 and rendered sensors, on grids of `MODE_PITCH_MM`: coarse nodes round the upper end of walls, with
-the square of the pitch. The paper's model freezes its lights and leaves each point where its ray
-meets the undeformed surface."""
+the square of the pitch. The paper's model uses the lights of the undeformed surface, and the point
+where a ray meets that surface."""
 
 
 def noise_of_fit(
@@ -94,7 +95,8 @@ def noise_of_fit(
     window : WindowData
         What it was fitted to.
     face : (rows, columns) bool or None
-        The window's pixels whose median the height is taken from, where it is.
+        Pixels of the window whose median is the height; None if the height does not come from a
+        median.
     noise_mm : (examples, map rows / factor, map columns / factor)
         Examples of the map's noise, averages over blocks of pixels.
     x_mm, y_mm : (map columns,), (map rows,)
@@ -118,7 +120,7 @@ def noise_of_fit(
 
     moved = dict(zip(fit.values, sums(fit.chosen, fit.gain).T, strict=True))
     if face is not None and face.any():
-        # A median scatters as the mean does where errors hang together over the whole face.
+        # If errors are correlated over the whole face, a median scatters like the mean.
         mean = np.full((1, int(face.sum())), 1.0 / face.sum())
         moved["height_mm"] = sums(face, mean)[:, 0] - moved["offset_mm"]
     return {name: float(np.sqrt(np.mean(change**2))) for name, change in moved.items()}
@@ -127,7 +129,7 @@ def noise_of_fit(
 def _bilinear(
     row: Array, column: Array, maps: NDArray[np.float32]
 ) -> tuple[NDArray[np.intp], Array]:
-    """Return which four nodes (4, P) of a map make the value at each place, and their shares."""
+    """Return the four nodes (4, P) of a map around each point, and their bilinear weights."""
     rows, columns = maps.shape[1:]
     row, column = np.clip(row, 0.0, rows - 1.0), np.clip(column, 0.0, columns - 1.0)
     above = np.minimum(row.astype(np.intp), max(rows - 2, 0))
@@ -144,7 +146,7 @@ def _bilinear(
 def calibration_sd(
     shape: str, values: Mapping[str, float], depth_scale_sd: float, lateral_scale_sd: float
 ) -> dict[str, float]:
-    """Return what the calibration leaves open of the fit's parameters.
+    """Return the standard deviations of the fit's parameters by the calibration.
 
     Parameters
     ----------
@@ -162,7 +164,7 @@ def calibration_sd(
 
 
 def mode_sd(shape: str, values: Mapping[str, float], mode: ModeError) -> dict[str, float]:
-    """Return what the mode leaves open of the fit's parameters.
+    """Return the standard deviations of the fit's parameters by the mode.
 
     Parameters
     ----------
@@ -187,13 +189,13 @@ def _wall_slope(values: Mapping[str, float]) -> float:
 def _systematic(
     shape: str, values: Mapping[str, float], depth: float, lateral: float
 ) -> dict[str, float]:
-    """Return standard deviations from relative ones of depths and of lengths across."""
+    """Return standard deviations of the parameters from those of depths and lateral lengths."""
     decay = values["drape_decay_mm"]
     found = {name: lateral * abs(values[name]) for name in ("x_mm", "y_mm")}
     found["height_mm"] = depth * abs(values["height_mm"])
     found["drape_decay_mm"] = math.hypot(lateral, depth) * decay
     if shape == "ball":
-        # A ball's radius is a width squared over a depth.
+        # The radius of a ball is proportional to a width squared over a depth.
         found["diameter_mm"] = math.hypot(2.0 * lateral, depth) * values["diameter_mm"]
         return found
     for name in LENGTHS:

@@ -30,7 +30,7 @@ LEAST_FRAMES = 2
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """What an image shows that the bare membrane does not.
+    """The change of an image relative to the bare membrane.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class PressJudgement:
-    """Whether frames show a press that may be kept.
+    """Whether frames show a press that can be used.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class PressJudgement:
 
     @property
     def moved(self) -> bool:
-        """Whether it was moving; false where that could not be seen."""
+        """Whether it was moving; false if this is unknown."""
         return self.moving_share > MOVING_SHARE
 
 
@@ -94,7 +94,7 @@ def find_contact(bare: Frame, now: Frame) -> Contact:
     if rows.size == 0:
         return Contact(0.0, (math.nan, math.nan))
     middle = 0.5 * (BLOCK_PX - 1)
-    # The middle of the extent, which the shadow on one side draws less than the centroid.
+    # The middle of the extent: a shadow on one side moves it less than the centroid.
     u, v = (
         float(BLOCK_PX * 0.5 * (np.percentile(c, 2) + np.percentile(c, 98)) + middle)
         for c in (columns, rows)
@@ -130,7 +130,7 @@ def judge_press(
     if any(f.shape != bare.shape or f.dtype != bare.dtype for f in frames):
         reason = tr("The camera image and the image of the bare membrane have different sizes.")
         return PressJudgement(False, reason, math.nan, nowhere)
-    # The first and the last too: a slow creep is no movement from one frame to the next.
+    # Also the first and the last frame: between consecutive frames, slow creep is not visible.
     pairs = [*pairwise(frames), (frames[0], frames[-1])]
     moving = max(moving_share(*pair) for pair in pairs)
     contact = find_contact(bare, frames[-1])

@@ -78,7 +78,7 @@ class Tool(Protocol):
         Raises
         ------
         InputError
-            Where the map has nothing to measure there.
+            If there is nothing to measure at this position of the map.
         """
         ...
 
@@ -97,7 +97,7 @@ def tool_result(
     tool, figures, drawing, profile
         As in :class:`ToolResult`.
     flags : (N,) uint8
-        Of all places that the figures rest on.
+        Of all points that the figures are computed from.
     """
     flagged = (flags & UNKNOWN) != 0
     share = float(np.mean(flagged)) if flagged.size else 0.0

@@ -59,7 +59,7 @@ TOOLS: Mapping[str, type[Tool]] = MappingProxyType(
 )
 """Every tool by its name."""
 RESULT_KEYS = ("figures", "verdict", "reason")
-"""What a result adds to its tool."""
+"""Keys that a result adds to its tool."""
 
 
 def tool_as_dict(tool: Tool) -> dict[str, Any]:
@@ -101,12 +101,12 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
 
 
 def tools_from_json(content: Any) -> tuple[Tool, ...]:
-    """Return the tools of a file: one tool, a list of them, or results that hold them.
+    """Return the tools of a file with one tool, a list of tools, or results with their tools.
 
     Raises
     ------
     InputError
-        If there is none, or one of them is not right.
+        If there is no tool, or one of them is invalid.
     """
     if isinstance(content, Mapping):
         content = content.get("results", [content])

@@ -26,22 +26,22 @@ def judged(result: Result, height_map: HeightMap) -> Result:
     Parameters
     ----------
     result : Measurement or ToolResult
-        Judged by its depths alone.
+        Its verdict is based on the depths alone.
     height_map : HeightMap
-        That was measured.
+        The measured height map.
 
     Returns
     -------
     Measurement or ToolResult
-        Doubtful, with the reason, where the calibration's verdict is "fail", the image has a fault,
-        or a calibration in place has seen no walls as the object's; unchanged otherwise.
+        Doubtful, with the reason, if the calibration's verdict is "fail", the image has a fault, or
+        a shape with walls was measured with an in-place calibration; unchanged otherwise.
     """
     faults = [height_map.calibration_fault]
     if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
         faults.append(
             tr(
-                "the balls of this in-place calibration have no walls: heights are about "
-                "10 % too small and sizes 2 to 10 % too large"
+                "the balls of this in-place calibration have no walls: on the virtual sensor, "
+                "heights are 7 to 10 % too small and sizes 2 to 11 % too large"
             )
         )
     if height_map.health is not None:

@@ -28,7 +28,7 @@ class PressTruth:
     truth : Truth
         Nominal sizes.
     region, repeat : str
-        Where on the sensor, and which repeat; empty where the file does not say.
+        Position on the sensor, and number of the repeat; empty if the file does not state it.
     """
 
     file: str

@@ -9,7 +9,7 @@ import numpy as np
 
 
 def variance_within(groups: Sequence[Sequence[float]]) -> float:
-    """Return the variance (mm**2) of repeats at one place, pooled; NaN without repeats.
+    """Return the pooled variance (mm**2) of repeats at one position; NaN without repeats.
 
     Parameters
     ----------
@@ -22,15 +22,15 @@ def variance_within(groups: Sequence[Sequence[float]]) -> float:
 
 
 def variance_between(groups: Sequence[Sequence[float]], within: float) -> float:
-    """Return the variance (mm**2) that going to another place adds, below 0 where it adds none.
+    """Return the variance (mm**2) between positions; below 0 if there is none.
 
     Parameters
     ----------
     groups : sequence of sequences of float
-        Lengths (mm) of one object, of two places or more.
+        Lengths (mm) of one object, for two or more positions.
     within : float
         Variance (mm**2) of repeats at one place.
     """
-    # The means of few repeats scatter by themselves; only what exceeds that is due to the place.
+    # The means of few repeats scatter, too; only the excess is due to the position.
     share = float(np.mean([1.0 / len(values) for values in groups]))
     return float(np.var([np.mean(values) for values in groups], ddof=1)) - share * within

@@ -109,7 +109,7 @@ def fit_figures(fit: LensFit, held_out_rms: float, sd: Array, camera: Camera) ->
     centre = float(np.hypot(sd[2], sd[3]))
     steady = tr("Use a flat board, hold it still, and focus; check the views with large errors")
     return (
-        # A good print is accurate to 0.1 px; half a pixel at the rim is 0.05 mm on the membrane.
+        # A good print is accurate to 0.1 px; half a pixel at the edge is 0.05 mm on the membrane.
         judge("reprojection_rms", tr("Reprojection error"), fit.rms_px, "px",
               warn=0.3, fail=1.0, advice=steady),
         judge("held_out_rms", tr("Error on held-out views"), held_out_rms, "px",

@@ -28,7 +28,7 @@ def seen_at(table: ResamplingTable, nodes: Array) -> Array:
     return np.stack([u, v], axis=-1).astype(np.float64)[whole > 0.999]
 
 
-def rim_px(table: ResamplingTable) -> Array:
+def boundary_px(table: ResamplingTable) -> Array:
     """Return the border of the working area (N, 2), in raw pixels."""
     borders, _ = cv2.findContours(
         table.valid.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
@@ -40,7 +40,7 @@ def rim_px(table: ResamplingTable) -> Array:
 def working_area(table: ResamplingTable, shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Return the working area as a mask (rows, columns) of the raw image."""
     area = np.zeros(shape, np.uint8)
-    rim = rim_px(table)
-    if len(rim) > 2:
-        cv2.fillPoly(area, [np.round(rim).astype(np.int32)], (1.0,))
+    boundary = boundary_px(table)
+    if len(boundary) > 2:
+        cv2.fillPoly(area, [np.round(boundary).astype(np.int32)], (1.0,))
     return area > 0

@@ -163,9 +163,10 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
 
 
 def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the area of the whiteboard: the elastomer's rim may lie inside the working circle.
+    """Return the area of the whiteboard.
 
-    Dark specks on the board belong to it; a few mixed pixels along its rim do not.
+    It can be smaller than the working circle. Dark specks on the board belong to it; a few mixed
+    pixels along its edge do not.
     """
     lit = (valid & (image.max(axis=2) > LEAST_LIGHT)).astype(np.uint8)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15))
@@ -216,7 +217,7 @@ def _smooth_robustly(
     deviation = _mean_of_good(deviation, good)
     noise = _noise_by_light(deviation, good, weight)
     outliers = good & (np.abs(deviation) > np.maximum(DUST_SIGMAS * noise, LEAST_DUST))
-    # The rim of a speck is soft: neighbours of an outlier are rejected too.
+    # The edge of a speck is blurred, so the neighbours of an outlier are rejected, too.
     outliers = cv2.dilate(outliers.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     weight[outliers] = 0.0
     return _weighted_blur(ratio, weight, sigma_px), outliers & good

@@ -32,27 +32,27 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 TOUCHED_SHARE = 0.08
-"""A contact changes the light of its walls by tens of percent; a shift of the background is even
+"""A contact changes the light of its walls by tens of percent; a shift of the background is uniform
 over the field."""
 TOUCHED_AREA_MM2 = 0.3
-"""Less area is a speck that came or went."""
+"""A smaller area is a speck of dust."""
 QUIET_MM = 0.25
-"""Over which the light is averaged before it is compared."""
+"""Length over which the light is averaged before the comparison."""
 TOUCH_REACH_MM = 4.0
-"""Over which a change counts as even: wider than a contact, narrower than the field."""
+"""Length over which a change counts as uniform: wider than a contact, narrower than the field."""
 DIFFERS = 0.03
-"""A change of the light by this share counts as different; it tilts a normal by a degree or so."""
+"""Relative change of the light that counts as different; it tilts a normal by about a degree."""
 
 
 @dataclass(frozen=True, slots=True)
 class BackgroundShift:
-    """How far an untouched image is from the calibration's background.
+    """Difference between an untouched image and the calibration's background.
 
     Attributes
     ----------
     shift_px : (float, float) or None
-        How far the membrane's texture has moved in the camera's image, (u, v); None where the
-        membrane shows too little of it.
+        How far the membrane's texture has moved in the camera's image, (u, v); None if the membrane
+        has too little texture.
     brightness_percent : (float, float, float)
         Change of red, green and blue, median over the field.
     differs_percent : float
@@ -60,7 +60,7 @@ class BackgroundShift:
     touched : bool
         Something is pressed, so the shift is not known.
     quality : QualityTable
-        The same as judged figures with advice; fails when touched.
+        The same as judged figures with advice; the verdict is fail if touched.
     """
 
     shift_px: tuple[float, float] | None
@@ -102,7 +102,7 @@ def background_shift(frame: NDArray[Any], calibration: AnyCalibration) -> Backgr
     middle = np.median(coarse[there], axis=0)
     pitch = COARSE * calibration.table.grid.pitch_mm
     touched = _touched(coarse, there, pitch)
-    # Over a quarter of a millimetre the noise of one image is below what counts.
+    # Averaged over a quarter of a millimetre, the noise of one image is negligible.
     quiet = cv2.GaussianBlur(np.where(there[..., None], coarse, 1.0), (0, 0), QUIET_MM / pitch)
     differs = 100.0 * float((np.abs(quiet[there] - 1.0) > DIFFERS).any(axis=1).mean())
     change = 100.0 * (middle - 1.0)
@@ -115,23 +115,23 @@ def background_shift(frame: NDArray[Any], calibration: AnyCalibration) -> Backgr
 def zeroed(
     calibration: AnyCalibration, frames: Sequence[NDArray[Any]], *, operator: str, made: str
 ) -> AnyCalibration:
-    """Return the calibration with the present background in the place of its own (tare).
+    """Return the calibration with its background replaced by the present one (tare).
 
-    The full model compares a press with its background, which is replaced. The paper's model has it
-    in its reflectance factors (Eq. 9), which are computed again with the table and radiance as they
-    are. Lights, lens and membrane stay; where they have changed, zero hides it on the bare membrane
-    only.
+    The full model compares a press with the background, which is replaced. The paper's model uses
+    it in the reflectance factors (Eq. 9), which are computed again with the same table and
+    radiance. Lights, lens and membrane are not changed. If they have changed, zero hides this on
+    the bare membrane only.
 
     Parameters
     ----------
     calibration : Calibration
-        To be changed; the result is another.
+        The calibration. It is not changed; the result is a new one.
     frames : sequence of (height, width, 3)
         Images of the untouched sensor, to be averaged; as for :func:`background_shift`.
     operator : str
-        Who did it.
+        The operator.
     made : str
-        When: ISO 8601 time with zone.
+        Date: ISO 8601 time with zone.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def _on_grid(frames: Sequence[NDArray[Any]], calibration: AnyCalibration) -> Map
 
 
 def _coarse(ratio: Map, usable: Mask) -> tuple[Map, Mask]:
-    """Return averages over blocks of nodes, and which blocks are known whole."""
+    """Return averages over blocks of nodes, and which blocks are completely known."""
     rows, columns = (n // COARSE for n in usable.shape)
     cut = ratio[: rows * COARSE, : columns * COARSE]
     mean = cut.reshape(rows, COARSE, columns, COARSE, 3).mean(axis=(1, 3))
@@ -204,7 +204,7 @@ def _coarse(ratio: Map, usable: Mask) -> tuple[Map, Mask]:
 
 
 def _touched(coarse: Map, there: Mask, pitch_mm: float) -> bool:
-    """Return whether the light has changed somewhere as only a contact changes it."""
+    """Return whether a local change of the light shows a contact."""
     sigma = TOUCH_REACH_MM / pitch_mm
     share = cv2.GaussianBlur(there.astype(np.float32), (0, 0), sigma)
     known = np.where(there[..., None], coarse, 0.0)

@@ -24,15 +24,17 @@ BOUNDARY_MM = 1.0
 BOUNDARY_NODES = 720
 CONDITION_POINTS = 2000
 HELD_DOWN_MM, HELD_DOWN_SHARE = 0.03, 0.2
-"""Depth there, and share of the deepest, that shows a contact across the boundary although depth 0
-is held: more than the drape of one that ends 2 mm before it, and than the paper's model errs by."""
+"""Depth there, and share of the deepest, that shows a contact across the boundary although the
+boundary is fixed at depth 0. It is more than the drape of a contact that ends 2 mm inside, and more
+than the error of the paper's model."""
 PRESSED_SHARE = 0.1
 """Nodes deeper than this share of the deepest are pressed or draped."""
 ONE_DARK_SHARE = 0.25
 """Share of the pressed nodes in the shadow of an LED. Faces of 1 mm with a drape of 0.7 mm have
 0.16; walls of 71 degrees 0.34 and 3 % of the height, of 84 degrees 0.31 and 7 %."""
 FROZEN_SHARE = 0.25
-"""Depth over the height of the lowest LED: at 0.3 frozen lights cost 5 % of the depth."""
+"""Depth over the height of the lowest LED: at 0.3, the lights of the flat membrane cause an error
+of 5 % of the depth."""
 THIN = 4
 MOST_CONDITION = 39.0
 """Condition number of the light directions: above it, depths scatter more than their standard
@@ -59,7 +61,7 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     frame : array
         Any numbers.
     name : str
-        What a message calls it.
+        Its name in messages.
 
     Raises
     ------
@@ -96,7 +98,7 @@ def held_boundary_note() -> str:
 
 
 def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float) -> tuple[str, ...]:
-    """Return the notes on a map of the paper's model outside of what the model assumes.
+    """Return the notes on a map that violates the assumptions of the paper's model.
 
     It assumes three lights, with the directions at the undeformed surface.
 
@@ -134,7 +136,7 @@ def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float)
 
 
 def condition_note(calibration: Calibration, leds_mm: NDArray[np.float64]) -> str:
-    """Return the note on lights that lie nearly in one plane somewhere; empty where none do."""
+    """Return the note on light directions that are nearly coplanar somewhere; otherwise empty."""
     table = calibration.table
     points = table.grid.points_mm()[table.valid]
     if not points.size:

@@ -45,10 +45,10 @@ FLAG_NAMES = MappingProxyType({str(flag.name).lower(): flag.value for flag in Fl
 """Name of each flag in files, and its value in `HeightMap.flags`."""
 
 SD_MAPS = ("slope_sd", "depth_sd_mm", "slope_model_sd", "depth_model_sd_mm")
-"""The maps of standard deviations that a height map may hold."""
+"""The maps of standard deviations that a height map can contain."""
 
 SENSOR_NUMBERS = ("depth_scale_sd", "lateral_scale_sd", "visible_depth_mm")
-"""The numbers of the sensor that a height map may hold."""
+"""The numbers of the sensor that a height map can contain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class HeightMap:
     flags : (rows, columns) uint8
         Sums of :class:`Flag`.
     calibration_id : str
-        Of the calibration that the depth was made with.
+        Sensor of the calibration.
     model : str
         ``paper`` or ``full``.
     source : str
@@ -90,8 +90,8 @@ class HeightMap:
         Relative standard deviations, from the calibration and the lengths stated for it, of
         depths and slopes, and of lengths across. They are common to all pixels and all images of
         a calibration: the standard deviation of a depth is the root of the sum of squares of
-        `depth_sd_mm`, `depth_model_sd_mm`, and `depth_scale_sd` times the depth. None where the
-        calibration does not say.
+        `depth_sd_mm`, `depth_model_sd_mm`, and `depth_scale_sd` times the depth. None if the
+        calibration does not state it.
     visible_depth_mm : float or None
         Smallest depth of a pressed flat face that is visible above the noise; a shallower face has
         depth 0. None for the paper's model, which does not detect contacts.
@@ -100,15 +100,15 @@ class HeightMap:
     calibration_fault : str
         Why no measurement with the calibration is reliable; empty if the calibration did not fail.
     health : Health or None
-        The faults of the frame that it was made of.
+        The faults of its frame.
     lateral_per_mm : float
-        Relative error of the width of an object per mm of its depth: the paper's model leaves each
-        point where its ray meets the undeformed surface. 0 for the full model.
+        Relative error of the width of an object per mm of its depth: the paper's model uses the
+        point where the ray meets the undeformed surface. 0 for the full model.
 
     Raises
     ------
     ValueError
-        Where the shapes do not fit each other.
+        If the shapes do not match.
 
     Examples
     --------
@@ -143,7 +143,7 @@ class HeightMap:
     lateral_per_mm: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check that the shapes fit each other."""
+        """Check that the shapes match."""
         rows, columns = self.depth_mm.shape
         expected = {"x_mm": (columns,), "y_mm": (rows,), "flags": (rows, columns)}
         if self.normals is not None:

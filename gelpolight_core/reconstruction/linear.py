@@ -11,7 +11,7 @@ from gelpolight_core.image.response import CameraResponse
 
 
 def as_linear(frame: NDArray[Any]) -> NDArray[np.float32]:
-    """Return a frame of linear light as float32, 0..1, whatever its numbers."""
+    """Return a frame of linear light as float32, 0..1, from any number type."""
     scale = 1.0 if frame.dtype.kind == "f" else 1.0 / np.iinfo(frame.dtype).max
     return np.asarray(frame, np.float32) * np.float32(scale)
 

@@ -1,10 +1,9 @@
-"""How well a solved surface explains the image that it was solved from.
+"""How well a reconstructed surface explains its image.
 
 Three brightnesses determine two slopes. The remaining one shows whether the model is
-valid. The paper's
-model solves for a normal of any length (Eq. 10), and its length less 1 is what is over. The full
-model's normals have length 1; there it is the image that the surface would give beside the one
-that was taken.
+valid. The paper's model solves for a normal of any length (Eq. 10); the misfit is its length minus
+1. The normals of the full model have length 1; the misfit is the difference between the measured
+image and the image of the surface.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """What is left over at each node, on a thinned grid.
+    """Misfit at each node, on a thinned grid.
 
     Attributes
     ----------
@@ -42,7 +41,7 @@ class Misfit:
         less the brightness explained, in units of the flat membrane's; ``in-place``: slope seen
         less slope of the depth.
     values : (rows, columns) float32
-        NaN where nothing is known.
+        NaN where it is not known.
     """
 
     model: str
@@ -57,13 +56,13 @@ def solve_misfit(
     Parameters
     ----------
     reconstructor : Reconstructor
-        Which the height map came from.
+        The reconstructor of the height map.
     frame : (height, width, 3)
         The raw image, as given to :meth:`Reconstructor.depth`.
     heightmap : HeightMap
-        With normals, where the model is the full one.
+        With normals for the full model.
     largest : int, optional
-        No more nodes than this a side.
+        Most nodes per side.
 
     Raises
     ------
@@ -83,7 +82,7 @@ def solve_misfit(
     elif heightmap.normals is None:
         raise ValueError("the full model's misfit needs the normals")
     else:
-        # A node of the thinned grid stands for its neighbours: so does its brightness.
+        # A node of the thinned grid represents its neighbours, and so does its brightness.
         linear = as_linear(reconstructor.linearise(frame))
         seen = np.asarray(cv2.blur(linear, (step, step)), np.float32)
         light = None if heightmap.health is None else heightmap.health.light
@@ -93,7 +92,7 @@ def solve_misfit(
 
 
 def _slope_misfit(heightmap: HeightMap, thin: tuple[slice, slice]) -> Map:
-    """Return how far the slopes that were seen are from those of the depth."""
+    """Return the difference between the measured slopes and those of the depth."""
     if heightmap.normals is None:
         raise ValueError("the misfit of calibration in place needs the normals")
     down, across = np.gradient(heightmap.depth_mm, heightmap.pitch_mm)
@@ -111,12 +110,12 @@ def _image_misfit(
     thin: tuple[slice, slice],
     inside: NDArray[np.bool_],
 ) -> Map:
-    """Return the full model's misfit at the nodes `thin`; 0 where no channel is of use."""
+    """Return the full model's misfit at the nodes `thin`; 0 where no channel is usable."""
     assert heightmap.normals is not None
     table, depth = calibration.table, heightmap.depth_mm[thin].astype(np.float64)
     ray_slope = table.ray_slope[thin].astype(np.float64)
     x, y = (g[thin].astype(np.float64) for g in np.meshgrid(heightmap.x_mm, heightmap.y_mm))
-    # The surface is seen where its ray crosses the flat membrane.
+    # A point of the surface appears where its ray crosses the flat membrane.
     index = [
         (part - offset * depth - first) / heightmap.pitch_mm
         for part, offset, first in (
@@ -171,13 +170,13 @@ def direct_light(
     full : FullModel
         Lights and membrane.
     positions_mm : (..., 2)
-        Where the surface is.
+        Position of the surface.
     depth_mm : (...)
-        How deep.
+        Its depth.
     normals : (..., 3)
         Its unit normals.
     ray_slope : (..., 2)
-        Sideways move of the ray per mm of depth.
+        Lateral displacement of the ray per mm of depth.
     """
     shape = depth_mm.shape
     there = np.concatenate([positions_mm, -depth_mm[..., None]], axis=-1).reshape(-1, 1, 3)

@@ -1,4 +1,4 @@
-"""The modes of reconstruction, and how accurate each was found to be."""
+"""The modes of reconstruction, and their measured accuracy."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Mode:
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """Its name for the user."""
         if self.model == PAPER:
             return tr("Paper's model")
         if self.model == IN_PLACE:
@@ -68,5 +68,5 @@ FOUND: Mapping[Mode, FoundError] = MappingProxyType(
         Mode(PAPER, "best"): FoundError(2.0, 2.6),
     }
 )
-"""On a matt sensor rendered at 50 dB by a path tracer that is not ours, calibrated from its
+"""Measured on a matt sensor rendered at 50 dB by an independent path tracer and calibrated from its
 images alone: eight presses, 3 to 7 mm wide and 0.5 to 1.5 mm deep."""

@@ -326,7 +326,7 @@ class Reconstructor:
         # Small images need a finer scale; standard deviations are those of effort best.
         effort = "best" if uncertainty else self.near_light.effort_for(self.effort)
         if effort == "best":
-            # One way for a camera's numbers and for light, so that both give the same depth.
+            # Camera values and linear light use the same code, so that both give the same depth.
             frame = self.linearise(frame)
         found = self.near_light.depth(
             frame,
@@ -374,7 +374,7 @@ class Reconstructor:
             slope_model_sd=found.slope_model_sd,
             depth_model_sd_mm=found.depth_model_sd_mm,
             noise_mm=found.noise_mm,
-            # A slope is a length of the ball over another; a height is a slope times a length.
+            # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
             depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
             lateral_scale_sd=model.scale_sd,
             trace=found.trace,

@@ -1,4 +1,4 @@
-"""A frozen height map integrated again, so that steep walls stay steep."""
+"""Integrate a frozen height map again so that steep walls remain steep."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ LEAST_NZ = 0.05
 def keep_steep_walls(height_map: HeightMap) -> HeightMap:
     """Return a height map whose depth is integrated from its normals by bilateral weights.
 
-    Least squares bends what is beside a wall that the image does not show; this breaks the surface
-    at the wall. It takes seconds and is for frozen images of objects with steep walls; on smooth
-    objects the depth of the height map is the better one.
+    Least squares deforms the surface beside a wall that is not visible in the image; this method
+    separates the surface at the wall. It takes seconds and is intended for frozen images of objects
+    with steep walls. On smooth objects, the depth of the height map is more accurate.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def keep_steep_walls(height_map: HeightMap) -> HeightMap:
     Raises
     ------
     InputError
-        If the height map holds no normals.
+        If the height map contains no normals.
 
     Examples
     --------

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Terms:
     """The effects that the full model includes in a frame; by default all.
 
-    A term is switched off to measure its worth. Terms of the membrane and the LEDs belong to the
+    A term is switched off to measure its effect. Terms of the membrane and the LEDs belong to the
     calibration (:class:`~gelpolight_core.calibration.terms.CalibrationTerms`).
 
     Attributes

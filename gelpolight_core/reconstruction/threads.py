@@ -42,6 +42,6 @@ class RowWorkers:
         others = [self._pool.submit(work) for _ in range(self.count - 1)]
         work()
         for other in others:
-            # One that has not begun by now finds nothing left to do, and need not be waited for.
+            # A thread that has not started by now finds no block left, so it need not be awaited.
             if not other.cancel():
                 other.result()

@@ -27,7 +27,7 @@ class TraceStep:
     milliseconds : float or None
         Its time; None where it was left out or not timed.
     bytes : int
-        That it must read and write once, whatever the program; 0 where that was not counted.
+        Bytes that the step must at least read and write; 0 if not counted.
     """
 
     name: str

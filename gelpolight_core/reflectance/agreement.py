@@ -1,8 +1,8 @@
-"""Compare each ball press with the others: does its stated radius agree with them.
+"""Compare each ball press with the others, to find wrong stated radii.
 
-The other presses give the membrane's curve (brightness over the light's cosine, Eq. 6); with that
-curve the radius and the centre of a press follow from its own shading. A press whose radius comes
-out as stated agrees with the others. The joint refinement finds an error that all presses share.
+The other presses give the membrane's curve (brightness over the light's cosine, Eq. 6). With this
+curve, the radius and the centre of a press follow from its own shading. If the radius is as stated,
+the press agrees with the others. The joint refinement finds an error that all presses share.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 15.0, 25.0
 ODD_CHANGE = 0.2
 ODD_WARN_PERCENT = 15.0
 MOVED_SHARE = 0.25
-"""Share of the contact radius by which a circle that is in its place is never moved."""
+"""A correct circle is never moved by more than this share of the contact radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +49,13 @@ class PressAgreement:
     stated_radius_mm, radius_mm : float
         Of the ball: as stated, and as fitted to the shading of the press.
     moved_share : float
-        How far the shading moves the centre, of the contact radius.
+        Displacement of the centre by the shading, as a share of the contact radius.
     misfit : float
         Relative misfit (robust) of the shading with the stated radius.
     odd_share : float
-        Share of the contact that differs by more than a fifth from that best fit.
+        Share of the contact that differs by more than a fifth from the best fit.
     usual_odd_share : float
-        Its median over all presses.
+        The median of this share over all presses.
     """
 
     name: str
@@ -68,13 +68,13 @@ class PressAgreement:
 
     @property
     def radius_off_percent(self) -> float:
-        """How much larger or smaller the stated radius is, the larger over the smaller."""
+        """Difference between stated and fitted radius in percent: the larger over the smaller."""
         ratio = self.stated_radius_mm / self.radius_mm
         return 100.0 * (max(ratio, 1.0 / ratio) - 1.0)
 
     @property
     def fault(self) -> str:
-        """The most likely cause, with the remedy; empty where the press agrees."""
+        """The most probable cause, with the remedy; empty if the press agrees."""
         limit = ODD_WARN_PERCENT / 100.0
         if self.usual_odd_share > limit:
             return tr(
@@ -134,7 +134,7 @@ def compare_presses(
     Returns
     -------
     tuple of PressAgreement
-        In the order of the presses; empty with fewer than four, which say nothing of each other.
+        In the order of the presses; empty with fewer than four, which cannot be compared.
     """
     if len(presses) < LEAST_PRESSES:
         return ()
@@ -153,7 +153,7 @@ def compare_presses(
 
 
 def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Figure, ...]:
-    """Judge the press that agrees least; nothing where the presses could not be compared."""
+    """Judge the press that agrees least; no figures if the presses could not be compared."""
     if not agreements:
         return ()
     odd = max(agreements, key=lambda a: a.radius_off_percent)
@@ -165,8 +165,8 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Figure, ...
             odd.radius_off_percent,
             "%",
             warn=RADIUS_WARN_PERCENT,
-            # Where no press follows a curve, as under a glossy membrane, the curve proves no radius
-            # wrong; the joint refinement compares the presses again.
+            # If no press follows a curve, as with a glossy membrane, the curve cannot show a wrong
+            # radius. The joint refinement compares the presses again.
             fail=None if odd.usual_odd_share > ODD_WARN_PERCENT / 100.0 else RADIUS_FAIL_PERCENT,
             advice=_sentence(odd.fault),
         ),
@@ -209,7 +209,7 @@ def _gather(
 
 
 def _curve(press: BallPress, pixels: _PressPixels) -> Array:
-    """Return the median value (3, bins) of a press over the light's cosine; NaN where unseen."""
+    """Return the median value (3, bins) of a press for each cosine bin; NaN without data."""
     cosines = pixels.cosines(np.zeros(2), 1.0 / press.pose.radius_mm)
     curve = np.full((3, len(BINS) - 1), np.nan)
     for k in range(3):
@@ -224,7 +224,7 @@ def _curve(press: BallPress, pixels: _PressPixels) -> Array:
 
 
 def _median(curves: Array) -> Array:
-    """Return the median of curves (presses, 3, bins), held beyond its ends."""
+    """Return the median of curves (presses, 3, bins), constant beyond its ends."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a bin that no press has seen
         middle = np.nanmedian(curves, axis=0)
@@ -245,7 +245,7 @@ def _agreement(press: BallPress, pixels: _PressPixels, curve: Array) -> PressAgr
         expected = np.stack([np.interp(cosines[:, k], centres, curve[k]) for k in range(3)], 1)
         return np.asarray(((pixels.value - expected) / scale)[pixels.known])
 
-    # In units of the contact radius: the centre's move, and contact radius over ball radius.
+    # Displacement of the centre in contact radii, and contact radius over ball radius.
     start = np.array([0.0, 0.0, contact / press.pose.radius_mm])
     stated = error(start)
     fits = [

@@ -1,4 +1,4 @@
-"""The ball: where each camera ray meets it, its normals there, and its centre from the shading."""
+"""The ball: where camera rays meet it, its normals there, and its centre from the shading."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def ball_depth_from_contact(
 ) -> float:
     """Return a ball's indentation depth from its contact radius.
 
-    Eq. (8) gives the height of the contact ring above the ball's lowest point. The ring itself
-    lies deep, as the membrane leaves the ball tangentially and decays as on an elastic foundation:
-    ``slope = w K1(a / decay) / (decay K0(a / decay))``.
+    Eq. (8) gives the height of the contact ring above the ball's lowest point. The ring itself is
+    below the undeformed surface, because the membrane leaves the ball tangentially and decays as on
+    an elastic foundation: ``slope = w K1(a / decay) / (decay K0(a / decay))``.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def ball_surface(points_mm: Array, ray_slope: Array, pose: BallPose) -> tuple[Ar
     points_mm : (..., 2)
         Where the rays meet the undeformed top surface.
     ray_slope : (..., 2)
-        Sideways move of the ray per mm of depth.
+        Lateral displacement of the ray per mm of depth.
     pose : BallPose
         The ball.
 
@@ -96,7 +96,7 @@ def ball_surface(points_mm: Array, ray_slope: Array, pose: BallPose) -> tuple[Ar
     b = (start * along).sum(-1)
     c = (start**2).sum(-1) - pose.radius_mm**2
     root = np.sqrt(np.where(b * b - a * c > 0.0, b * b - a * c, np.nan))
-    # The camera looks along growing z: the seen side is the root nearest to it, the larger depth.
+    # The camera looks along +z: the visible side is the nearer root, with the larger depth.
     depth = (-b + root) / a
     seen = start + depth[..., None] * along
     return seen + centre, seen / pose.radius_mm
@@ -125,11 +125,11 @@ class ShadedPixels:
 def refine_centre(
     pixels: ShadedPixels, start: BallPose, led_positions_mm: Array
 ) -> tuple[BallPose, float, float]:
-    """Move the ball so that its shading explains the image.
+    """Refine the position of the ball so that its shading explains the image.
 
     The light's direction, inverse square and lobe are those at the ball's surface. The membrane is
-    taken as a blend of ``cos^m`` and a glossy lobe about the half vector between light and view:
-    leaving the glossy share out pushes the centre outward, as the image's shading then leans
+    modelled as a blend of ``cos^m`` and a glossy lobe about the half vector between light and view.
+    Without the glossy share, the centre would be too far outside, because gloss shifts the shading
     towards the viewer.
 
     Parameters

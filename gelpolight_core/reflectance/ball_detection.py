@@ -1,11 +1,11 @@
 """Find the indentation of a ball in an image automatically.
 
-Four steps, none of which needs the lights, the camera or the scale; everything is in pixels of the
-image given, raw or resampled. (1) Markers printed on the membrane are found in the background and
+Four steps. None of them needs the lights, the camera or the scale; all lengths are in pixels of the
+given image, raw or resampled. (1) Markers printed on the membrane are found in the background and
 filled. (2) The noise-scaled difference to the background gives the region. (3) The shading of a
-ball, fitted to all of it, gives a circle that neither texture nor shadows move far. (4) The kink
-of the shading at the contact's edge makes the circle exact where it is sharp and agrees with the
-shading; where it is not, the circle of the shading stays, with its larger uncertainty.
+ball, fitted to the whole region, gives a circle that is robust against texture and shadows. (4) The
+kink of the shading at the contact's edge gives the exact circle if it is sharp and agrees with the
+shading. Otherwise the circle of the shading is used, with its larger uncertainty.
 """
 
 from __future__ import annotations
@@ -54,14 +54,14 @@ Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 _BLUR_PX = 0.8
-# A clean edge scatters by 1 to 3 % of its radius; texture, shadows and markers scatter it more,
-# and then the strongest kink need not be the edge.
+# The points of a clean edge scatter by 1 to 3 % of its radius. With texture, shadows and markers
+# they scatter more, and the strongest kink may not be the edge.
 _CLEAN_EDGE = 0.04
 _AGREES = 0.12
-# What was filled is smooth, so its kink lies anywhere.
+# Filled areas are smooth, so that their kink can be anywhere.
 _MOST_HIDDEN_EDGE = 0.1
-# Systematic errors of the two circles. How far they lie apart is the best measure of both: on
-# rendered sensors 0.01 of the radius and less, on textured gels 0.04, with shadows 0.15.
+# Systematic errors of the two circles. Their distance is the best measure of both: on rendered
+# sensors 0.01 of the radius or less, on textured gels 0.04, with shadows 0.15.
 _APART_OF_EDGE, _RESIDUAL_OF_EDGE = 0.7, 0.7
 _MODEL_OF_SHADING, _APART_OF_SHADING = 0.09, 0.35
 
@@ -73,10 +73,10 @@ class BallDetection:
     Attributes
     ----------
     indentation : Indentation or None
-        What was found; None where the image shows no ball that can be used.
+        The indentation; None if the image shows no ball that can be used.
     reason : Reason
-        Why the image is refused, or what is wrong with it: ``OK`` for a whole ball; ``CUT`` comes
-        with an indentation, as the part in view is a ball's.
+        Why the image is refused: ``OK`` for a whole ball; ``CUT`` together with an indentation, if
+        the visible part is that of a ball.
     refusal : InputError or None
         The reason as a sentence with its advice; None for a whole ball.
     markers : Markers
@@ -128,7 +128,7 @@ def detect_ball(
     name: str = "press",
     background_name: str = "background",
 ) -> BallDetection:
-    """Find the one ball indentation in an image, or say why there is none.
+    """Find the one ball indentation in an image, or the reason why there is none.
 
     The step "Contour -> centre o1 and radius r of the contact" before Eq. (8) of the paper. Never
     raises for what an image shows.
@@ -139,13 +139,13 @@ def detect_ball(
         Image with the ball and image without contact, RGB, 0..1; pixels that are not finite
         are left out.
     markers : Markers, optional
-        The membrane's markers, if they are known; by default they are looked for in `background`.
+        The membrane's markers, if they are known; by default they are detected in `background`.
     ball_radius_px : float, optional
         Radius of the ball over the pixel's size, if both are known; a contact cannot be larger.
     valid : (rows, columns) bool, optional
         The working area; without it, the lit part of `background`.
     name, background_name : str, optional
-        What to call the images in messages, such as their files.
+        Names of the images in messages, such as their files.
     """
     known = markers
     try:
@@ -181,7 +181,7 @@ def find_indentation(
     InputError
         If the images differ in size, are black or saturated; if the light changed between them
         or they are swapped; if there is no indentation, more than one, one that is cut by the
-        border, or one that is not a ball's.
+        border, or one that is not that of a ball.
     """
     detection = detect_ball(
         press,
@@ -252,7 +252,7 @@ def _fit_shading(
         )
         usable = usable & (hidden < 0.5)
     small = Circle((start.x - half) / f, (start.y - half) / f, start.radius / f)
-    # The fit takes the drape's steep beginning into the contact, so it may end a little larger.
+    # The fit includes the steep beginning of the drape, so the circle can be a little too large.
     largest = np.inf if ball_radius_px is None else 1.2 * ball_radius_px / f
     noise = change.relative_noise
     fit = fit_shading(change.relative, usable, small, noise=noise, largest_px=largest)
@@ -296,7 +296,7 @@ def _check_one(
 
 
 def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple[Contour, str]:
-    """Return the kink's contour where it is clean and agrees with the shading, else the latter."""
+    """Return the kink's contour if it is clean and agrees with the shading, else the shading's."""
     rough, radius = shading.circle, shading.circle.radius
     contour = fit_edge(sharp, area, rough)
     apart = float(np.hypot(contour.circle.x - rough.x, contour.circle.y - rough.y))
@@ -347,7 +347,7 @@ def _locate(change: ScaledDifference, name: str) -> tuple[Mask, Circle]:
 def _core_circle(change: ScaledDifference, region: Mask) -> Circle:
     """Return a circle about the strongest part of a region; drape and shadow are fainter.
 
-    A ball is seen as a ring, often a broken one: gaps are closed, and the hull taken.
+    A ball is visible as a ring, often with gaps: gaps are closed, and the hull is used.
     """
     top = float(np.quantile(change.scaled[region], 0.98))
     core = (region & (change.scaled > max(DETECTION, 0.4 * top))).astype(np.uint8)

@@ -1,11 +1,11 @@
 """The shading of a pressed ball, fitted as a whole: where it is and whether it is a ball.
 
-Around a ball the membrane's slopes run through all directions: they grow from the middle to the
-contact's edge and die away in the drape. Whatever the lights, a channel's brightness is a smooth
-function of slope, here a polynomial of degree 2 whose coefficients are free for each channel. So
-the only shape in the fit is the ball's: centre, contact radius and decay length. All pixels take
-part, none of them alone decides, and pixels without a value are simply left out. The residual of
-this fit distinguishes a ball from other objects.
+Around a ball, the slopes of the membrane have all directions. They increase from the middle to the
+contact's edge and decrease in the drape. Whatever the lights, a channel's brightness is a smooth
+function of slope, here a polynomial of degree 2 whose coefficients are free for each channel. The
+only shape parameters of the fit are those of the ball: centre, contact radius and decay length. All
+pixels contribute, and pixels without a value are left out. The residual of this fit distinguishes a
+ball from other objects.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ Array32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 BALL_EXPLAINED = 0.55
-"""A ball's shading explains 0.66 to 0.99 of the change around it, texture and shadows included."""
+"""The shading of a ball explains 0.66 to 0.99 of the change around it, including texture and
+shadows."""
 _MOST_PIXELS = 1500
 _REACH = 2.2
 _STEPS = 12
@@ -47,7 +48,7 @@ class ShadingFit:
     axis_ratio : float
         Shorter over longer axis, if the ball is fitted as an ellipse.
     explained : float
-        Share of the change of brightness that the ball's shading explains, 0..1, noise taken out.
+        Share of the change of brightness that the ball's shading explains, 0..1, without noise.
     inner_change : float
         Change of brightness across the inner half over that of the fit: 1 for a ball, near 0 for
         a flat face.
@@ -95,14 +96,14 @@ def fit_shading(
     scale = _ROBUST * float(np.sqrt(np.mean(values**2))) + 1e-9
     fitted = _fit_best(_Pixels(x, y, values, scale, largest_px, False), start, noise)
     if fitted.explained < BALL_EXPLAINED:
-        # Sensors with light from all sides measure by darkness, which is a matter of depth.
+        # On sensors with light from all sides, brightness depends on depth, too.
         dark = _fit_best(_Pixels(x, y, values, scale, largest_px, True), start, noise)
         return dark if dark.explained > BALL_EXPLAINED else fitted
     return fitted
 
 
 def _fit_best(pixels: _Pixels, start: Circle, noise: float) -> ShadingFit:
-    """Fit from a large and a small circle, carry on with the better one, then as an ellipse."""
+    """Fit from a large and a small circle, continue with the better one, then as an ellipse."""
     radius = start.radius
     first = [_descend(pixels, _first(pixels, start, *s), radius, 4, _COARSE) for s in _STARTS]
     best = min((_reweighted(pixels, f) for f in first), key=lambda f: f.cost)
@@ -155,7 +156,8 @@ def _gather(change: Array32, usable: Mask, start: Circle) -> tuple[Array, Array,
 def _basis(x: Array, y: Array, shape: Array, by_depth: bool) -> Array:
     """Return (N, 5): slope x and y and their products, or (N, 6) with depth; 1 at the edge."""
     dx, dy = x - shape[0], y - shape[1]
-    # Slopes keep their direction in the stretched frame: enough to tell how oval the ball is.
+    # Slopes keep their direction in the stretched frame, which is accurate enough for the axis
+    # ratio.
     dx, dy = (1.0 + shape[4]) * dx + shape[5] * dy, shape[5] * dx + (1.0 - shape[4]) * dy
     radius, decay = np.exp(shape[2]), np.exp(shape[3])
     r = np.sqrt(dx * dx + dy * dy)
@@ -233,7 +235,7 @@ def _ridge(design: Array) -> Array:
 
 
 def _jacobian(pixels: _Pixels, now: _Solution, free: int) -> Array:
-    """Return how the residuals follow the shape, coefficients solved for (Kaufman, 1975)."""
+    """Return the derivatives of the residuals by the shape (variable projection, Kaufman, 1975)."""
     radius = float(np.exp(now.shape[2]))
     steps = np.array([1e-3 * radius, 1e-3 * radius, 1e-3, 1e-3, 1e-3, 1e-3])
     weighted = now.design[None] * now.root[..., None]
@@ -257,8 +259,8 @@ def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -
     signal = max(float((values**2).sum()) - floor, 1e-12)
     left = max(float((raw**2).sum()) - floor, 0.0)
     stretch = min(float(np.hypot(oval.shape[4], oval.shape[5])), 0.9)
-    # Residuals of a smooth misfit hang together over a fraction of the radius: there are far
-    # fewer independent ones than pixels.
+    # Residuals of a smooth misfit are correlated over a fraction of the radius: there are far fewer
+    # independent residuals than pixels.
     spacing = np.sqrt(np.pi * (_REACH * circle.radius) ** 2 / len(values))
     share = min(1.0, (spacing / (0.25 * circle.radius)) ** 2)
     variance = float((best.residual**2).mean()) / max(share, 1e-6)
@@ -276,7 +278,7 @@ def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -
 
 
 def _inner_change(pixels: _Pixels, best: _Solution) -> float:
-    """Return the slope of what is seen over what is fitted, within the inner half."""
+    """Return the slope of the measured over the fitted change, within the inner half."""
     radius = float(np.exp(best.shape[2]))
     inner = np.hypot(pixels.x - best.shape[0], pixels.y - best.shape[1]) < _INNER * radius
     if np.count_nonzero(inner) < 12:

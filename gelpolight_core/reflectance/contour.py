@@ -1,9 +1,9 @@
 """The edge of a ball's contact, found where the shading has its kink.
 
-The membrane leaves the ball along a tangent: the slope is continuous at the contact's edge and
-largest there, and its derivative along the radius jumps. Whatever the light and the reflectance,
-brightness is a smooth function of slope, so every colour channel has a kink at the same radius.
-A filter that responds to a kink but not to a parabola finds it without a brightness threshold.
+The membrane leaves the ball tangentially: the slope is continuous and largest at the contact's
+edge, and its radial derivative jumps. Whatever the light and the reflectance, brightness is a
+smooth function of slope, so every colour channel has a kink at the same radius. A filter that
+responds to a kink but not to a parabola finds it without a brightness threshold.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Circle:
 
 @dataclass(frozen=True, slots=True)
 class KinkTable:
-    """How strongly the shading kinks, along rays from a centre.
+    """Strength of the kink of the shading, along rays from a centre.
 
     Attributes
     ----------
@@ -49,18 +49,18 @@ class KinkTable:
         Directions of the rays, from x towards y.
     radii_px : (steps,)
         Distances from the centre.
-    answer : (rays, steps, 3) float32
-        Response of the filter per channel, positive where darkness ends in a cusp.
+    response : (rays, steps, 3) float32
+        Response of the filter per channel, positive at a cusp towards dark.
     strength : (rays, steps)
-        Root of the summed squares of `answer`; NaN where the filter would look beyond the working
-        area.
+        Root of the summed squares of `response`; NaN where the filter would extend beyond the
+        working area.
     wedge_deg : float
         Standard deviation of the average over neighbouring directions.
     """
 
     angles_rad: Array
     radii_px: Array
-    answer: Array32
+    response: Array32
     strength: Array
     wedge_deg: float
 
@@ -131,16 +131,18 @@ def kink_table(
     polar = np.asarray(cv2.remap(scaled, x, y, cv2.INTER_LINEAR), np.float32)
     inside = cv2.remap(valid.astype(np.uint8), x, y, cv2.INTER_NEAREST, borderValue=0)
     polar = _smooth_over_angle(polar, wedge_deg)
-    answer = cv2.filter2D(polar, -1, _kink_filter(half)[None])
-    strength = np.sqrt((answer.astype(np.float64) ** 2).sum(axis=2))
+    response = cv2.filter2D(polar, -1, _kink_filter(half)[None])
+    strength = np.sqrt((response.astype(np.float64) ** 2).sum(axis=2))
     whole = cv2.erode(inside, np.ones((1, 2 * half + 1), np.uint8), borderValue=1) > 0
     keep = slice(half, len(radii) - half)
     seen = np.where(whole, strength, np.nan)[:, keep]
-    return KinkTable(angles, radii[keep], np.asarray(answer[:, keep], np.float32), seen, wedge_deg)
+    return KinkTable(
+        angles, radii[keep], np.asarray(response[:, keep], np.float32), seen, wedge_deg
+    )
 
 
 def _kink_filter(half: int) -> Array32:
-    """Return unit-norm |x| with its mean and parabola taken out."""
+    """Return |x| without its mean and parabola, with unit norm."""
     x = np.arange(-half, half + 1) / half
     smooth = np.stack([np.ones_like(x), x * x], axis=1)
     bend = np.abs(x)
@@ -168,9 +170,9 @@ def search_circle(
 ) -> Circle:
     """Return the circle along which the kink is strongest, of a grid of circles.
 
-    Along a contact's edge the kink changes with direction as the light does, smoothly; noise,
-    specks and texture do not. So each channel's answers along a circle are reduced to their mean
-    and first two harmonics, and the energy of these is compared.
+    Along a contact's edge the kink changes smoothly with direction, like the light; noise, specks
+    and texture do not. Therefore the responses of each channel along a circle are reduced to their
+    mean and first two harmonics, whose energy is compared.
 
     Parameters
     ----------
@@ -190,33 +192,34 @@ def search_circle(
     dx, dy, size = (a.ravel() for a in np.meshgrid(moves, moves, sizes, indexing="ij"))
     # Averaged neighbours only take more time.
     rays = slice(None, None, 3 if table.wedge_deg > 3.0 else 1)
-    angles, answer = table.angles_rad[rays], np.ascontiguousarray(table.answer[rays])
+    angles, response = table.angles_rad[rays], np.ascontiguousarray(table.response[rays])
     seen = np.isfinite(table.strength[rays])
-    # One very dark flank or speck must not outvote the rest of the circle.
+    # One very dark flank or speck must not dominate the rest of the circle.
     cap = 2.0 * float(np.median(np.where(seen, np.nan_to_num(table.strength[rays]), 0.0).max(1)))
-    answer = np.where(seen[..., None], np.clip(answer, -cap, cap), np.float32(0.0))
+    response = np.where(seen[..., None], np.clip(response, -cap, cap), np.float32(0.0))
     along = np.outer(dx, np.cos(angles)) + np.outer(dy, np.sin(angles))
     across2 = (dx**2 + dy**2)[:, None] - along**2
     radius = along + np.sqrt(np.maximum(size[:, None] ** 2 - across2, 0.0))
     column = (radius - table.radii_px[0]) / (table.radii_px[1] - table.radii_px[0])
-    best = int(_coherent_energy(answer, column, angles).argmax())
+    best = int(_coherent_energy(response, column, angles).argmax())
     return Circle(float(around.x + dx[best]), float(around.y + dy[best]), float(size[best]))
 
 
 def kink_along(table: KinkTable, radius_px: float) -> float:
     """Return the energy of the kink along a circle about the table's own centre."""
-    answer = np.where(np.isfinite(table.strength)[..., None], table.answer, np.float32(0.0))
+    response = np.where(np.isfinite(table.strength)[..., None], table.response, np.float32(0.0))
     step = table.radii_px[1] - table.radii_px[0]
     column = np.full((1, len(table.angles_rad)), (radius_px - table.radii_px[0]) / step)
-    return float(_coherent_energy(answer, column, table.angles_rad)[0])
+    return float(_coherent_energy(response, column, table.angles_rad)[0])
 
 
 def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
-    """Walk from a circle near the contact's edge to the edge.
+    """Find the contact's edge from a circle near it.
 
-    First the circle with the strongest kink near it. Then, where the kink is clear, its place in
-    every direction and the circle through these: the narrower the filter, the less is it drawn by
-    the curvature of the drape. Where noise scatters the places, the strongest circle itself stays.
+    The first step finds the circle with the strongest kink. If the kink is clear, the second step
+    finds its position in every direction and the circle through these points; a narrow filter is
+    less biased by the curvature of the drape. If noise scatters the points, the circle of the first
+    step is the result.
 
     Parameters
     ----------
@@ -225,7 +228,7 @@ def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
     valid : (rows, columns) bool
         The working area.
     start : Circle
-        A circle near the edge; a kink farther off is another one.
+        A circle near the edge; kinks farther away are ignored.
     """
 
     def table(around: Circle, half_width: float, wedge_deg: float = 4.0) -> KinkTable:
@@ -241,7 +244,8 @@ def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
     contour = trace_contour(table(contour.circle, 0.25), contour.circle)
     if contour.residual_px > 0.06 * contour.circle.radius:
         smooth = trace_contour(table(circle, 0.35, 12.0), circle, margin=0.25)
-        # So much noise may favour a wrong ring, which the scatter about that ring cannot show.
+        # With this much noise, a wrong ring can be found. The scatter about that ring cannot show
+        # this.
         sd_px = max(contour.centre_sd_px, smooth.residual_px)
         return replace(smooth, circle=circle, centre_sd_px=sd_px)
     if contour.residual_px < 0.01 * contour.circle.radius:
@@ -256,12 +260,12 @@ def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Array32:
     return np.asarray(np.hypot(dx[None, :], dy[:, None]), dtype=np.float32)
 
 
-def _coherent_energy(answer: Array32, column: Array, angles: Array) -> Array:
+def _coherent_energy(response: Array32, column: Array, angles: Array) -> Array:
     """Return, per row of `column`, the energy of the smooth part of the responses along it.
 
     Parameters
     ----------
-    answer : (rays, steps, 3)
+    response : (rays, steps, 3)
         Responses of the filter.
     column : (circles, rays)
         Where each circle crosses each ray, in steps.
@@ -271,11 +275,11 @@ def _coherent_energy(answer: Array32, column: Array, angles: Array) -> Array:
     turns = np.outer(angles, [1.0, 2.0])
     waves = [np.full((len(angles), 1), np.sqrt(0.5)), np.cos(turns), np.sin(turns)]
     smooth = np.concatenate(waves, axis=1).astype(np.float32)
-    steps = answer.shape[1]
+    steps = response.shape[1]
     low = np.clip(np.floor(column), 0, steps - 2)
     part = np.clip(column - low, 0.0, 1.0).astype(np.float32)[..., None]
     inside = ((column >= 0.0) & (column <= steps - 1))[..., None]
-    flat = answer.reshape(-1, 3)
+    flat = response.reshape(-1, 3)
     index = low.astype(np.intp) + steps * np.arange(len(angles))
     along = flat.take(index, axis=0) * (1.0 - part)
     along += flat.take(index + 1, axis=0) * part
@@ -294,7 +298,7 @@ def trace_contour(table: KinkTable, around: Circle, *, margin: float = 0.2) -> C
     around : Circle
         Circle near the edge.
     margin : float, optional
-        The edge is looked for within this share of the radius.
+        The edge is searched within this share of the radius.
     """
     near = np.abs(table.radii_px - around.radius) <= margin * around.radius
     radii, strength = table.radii_px[near], table.strength[:, near]
@@ -311,7 +315,7 @@ def trace_contour(table: KinkTable, around: Circle, *, margin: float = 0.2) -> C
     on = seen & (weight > 0.0)
     direction = np.stack([np.cos(table.angles_rad), np.sin(table.angles_rad)], axis=1)
     points = np.array([around.x, around.y]) + position[on, None] * direction[on]
-    # Neighbouring directions share their average; a Gaussian is as wide as 2 sqrt(pi) of its sigma.
+    # Neighbouring directions are averaged; the width of a Gaussian is 2 sqrt(pi) times its sigma.
     independent = float(on.mean()) * 360.0 / (2.0 * np.sqrt(np.pi) * table.wedge_deg)
     return Contour(
         circle,
@@ -340,14 +344,14 @@ def _fit_harmonics(
 ) -> tuple[Array, Array, float]:
     """Fit radius over angle by harmonics with Tukey's weights.
 
-    The first harmonic is a shift of the centre, the second an ellipse. On an arc the two are hard
-    to tell apart, so the circle is fitted with the first alone.
+    The first harmonic is a shift of the centre, the second an ellipse. On an arc they are hard to
+    distinguish, so the circle is fitted with the first alone.
     """
     turns = np.outer(angles, np.arange(1, order + 1))
     waves = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(len(angles), -1)
     design = np.column_stack([np.ones_like(angles), waves])[seen]
     value = position[seen]
-    # The median keeps the first round from being drawn by the far outliers.
+    # With the median, far outliers do not affect the first round.
     away = value - np.median(value)
     weight, spread = np.ones(len(value)), 0.0
     coefficients = np.zeros(1 + 2 * order)

@@ -15,7 +15,7 @@ ROUNDS = 6
 def draped_ball(
     points_mm: Array, ray_slope: Array, pose: BallPose, *, decay_mm: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return what each ray sees of a pressed ball and of the drape around it.
+    """Return the point and normal where each ray meets a pressed ball or its drape.
 
     Inside the contact the membrane is the ball; outside it decays as on an elastic foundation,
     ``w = w_a K0(r / decay) / K0(a / decay)``, and leaves the ball tangentially.
@@ -23,7 +23,8 @@ def draped_ball(
     Parameters
     ----------
     points_mm, ray_slope : (N, 2)
-        Where the rays meet the undeformed top surface, and their sideways move per mm of depth.
+        Intersections of the rays with the undeformed top surface, and their lateral displacement
+        per mm of depth.
     pose : BallPose
         The ball.
     decay_mm : float

@@ -1,11 +1,11 @@
 """Light from one part of the membrane to another, gathered over a given surface.
 
-Each facet of the surface sends out what the camera sees of it, turned into the other direction by
-the glossy lobe. A point receives all facets through its own response, so that light that one wall
-reflects onto another is counted with its direction. What the camera sees holds all earlier
-reflections and all shadows, so that one gathering is enough. The diffuse share is Lambertian.
-What the elastomer's lower face returns (Fresnel, and totally beyond the critical angle) comes from
-the facets' mirror images in it.
+Each facet of the surface emits the light that the camera sees, converted to the other direction by
+the glossy lobe. A point receives the light of all facets with its own response, so that the
+direction of light from one wall to another is included. The light that the camera sees contains all
+earlier reflections and shadows, so that one gathering is sufficient. The diffuse share is
+Lambertian. The light that the elastomer's lower face returns (Fresnel; total reflection beyond the
+critical angle) comes from the mirror images of the facets.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
 
 Map = NDArray[np.float32]
 WIDE = 4
-"""Facets to a wide one, along an axis, and wide ones to a widest one."""
+"""Facets per wide facet along an axis, and wide facets per widest facet."""
 NEAR = 1
-"""A point gathers facets from its own next larger one and so many around it; what is further away
-comes from the larger ones, and from all of the field: walls mirror even distant membrane."""
+"""A point gathers the facets of its own larger facet and of this number of larger facets around it.
+Light from farther away comes from the larger facets of the whole field: walls mirror even distant
+membrane."""
 
 _single = np.float32
 _0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
@@ -38,7 +39,7 @@ _TINY = _single(1e-6)
 _POINT, _NORMAL, _AREA, _LIGHT = 0, 3, 6, 7
 _PLANES = 25
 _DOWN = (_POINT + 2, _NORMAL + 2, _LIGHT + 2, _LIGHT + 8, _LIGHT + 14)
-"""Planes of z components, which a mirror image has reversed."""
+"""Planes of z components, which have the opposite sign in a mirror image."""
 
 _part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
 _whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
@@ -92,7 +93,7 @@ class Receivers(NamedTuple):
     points_mm, normals, view : (N, 3)
         Sensor frame; unit normals, and unit directions to the camera.
     place : (N, 2)
-        Row and column of the facet that is next.
+        Row and column of the nearest facet.
     """
 
     points_mm: NDArray[np.floating]
@@ -108,14 +109,14 @@ class Receivers(NamedTuple):
 
 
 def ratio_thrown(ratio: NDArray[np.floating], known: NDArray[np.bool_], throwing: Map) -> Map:
-    """Return press over background (rows, columns, 3) as facets throw it onto others.
+    """Return press over background (rows, columns, 3) of the light that facets reflect onto others.
 
     Parameters
     ----------
     ratio : (rows, columns, 3)
         As the camera sees it.
     known : (rows, columns, 3) or (rows, columns, 1) bool
-        Where it is known; elsewhere facets throw as much as untouched ones.
+        Where the ratio is known; elsewhere facets reflect as much as untouched ones.
     throwing : (rows, columns) float32
         Share of each facet that reflects light.
     """
@@ -125,12 +126,12 @@ def ratio_thrown(ratio: NDArray[np.floating], known: NDArray[np.bool_], throwing
 def facets(
     surface: Surface, leds_mm: NDArray[np.float64], membrane: Membrane, side_mm: float
 ) -> Map:
-    """Return what a surface's facets send out, (planes, rows, columns), for :func:`gather_rows`.
+    """Return the light that facets emit, (planes, rows, columns), for :func:`gather_rows`.
 
     Parameters
     ----------
     surface : Surface
-        Of facets that lie `side_mm` apart.
+        The surface, with facets at a distance of `side_mm`.
     leds_mm : (3, 3)
         Sensor frame.
     membrane : Membrane
@@ -142,7 +143,7 @@ def facets(
     made = np.empty((_PLANES, *seen.shape[:2]), np.float32)
     made[_POINT : _POINT + 3] = np.moveaxis(points, -1, 0)
     made[_NORMAL : _NORMAL + 3] = np.moveaxis(normals, -1, 0)
-    # Seen along its ray, a facet covers the same part of the flat membrane however it is tilted.
+    # Along its ray, a facet covers the same part of the flat membrane for any tilt.
     facing = np.maximum(np.einsum("ijc,ijc->ij", view, normals), 0.1)
     made[_AREA] = side_mm**2 * -view[..., 2] / facing
     a2 = membrane.roughness**2
@@ -158,7 +159,7 @@ def facets(
         power = membrane.gloss * a2 / pi * c / (c + np.sqrt(a2 + (1.0 - a2) * c * c) + _TINY)
         to_camera = power * width**2 / (s + np.sqrt(a2 + (1.0 - a2) * s * s))
         expected = (1.0 - membrane.gloss) / pi * np.maximum(c, LEAST_COSINE) + to_camera
-        # Light by its strength: what is missing is shadow, what is too much is not from the LED.
+        # Share of the expected light: less is shadow, more does not come from the LED.
         strength = -to_led[..., 2] / distance**3
         lit = np.clip(seen[..., k] / np.maximum(expected * strength, 1e-9), 0.0, 1.0) * strength
         at = _LIGHT + 6 * k
@@ -179,14 +180,14 @@ def gathered(
     slab: Slab | None = None,
     run: Callable[..., None] | None = None,
 ) -> Map:
-    """Return what points receive of a surface, to the camera, (N, 3) as `Surface.seen`.
+    """Return the light from a surface via points to the camera, (N, 3), as `Surface.seen`.
 
     The membrane absorbs nothing; multiply by its reflectance.
 
     Parameters
     ----------
     surface : Surface
-        Facets of the whole field; what is beyond whole multiples of `WIDE` squared is left out.
+        Facets of the whole field; those beyond whole multiples of `WIDE` squared are left out.
     at : Receivers
         The points.
     leds_mm : (3, 3)
@@ -196,10 +197,10 @@ def gathered(
     side_mm : float
         Distance between facets.
     slab : Slab, optional
-        Its lower face returns light; by default none does.
+        Slab whose lower face returns light; by default no light is returned.
     run : callable, optional
-        Calls a compiled function over parts of the points, as `RowWorkers.run` does; by default
-        one thread does all.
+        Calls a compiled function for parts of the points, like `RowWorkers.run`; by default one
+        thread.
     """
     near = facets(surface, leds_mm, membrane, side_mm)
     wide = widened(surface)
@@ -220,7 +221,7 @@ def gathered(
 
 
 def _mirrored(sent: Map, depth_mm: float) -> Map:
-    """Return the mirror images of facets in a face so far below the membrane."""
+    """Return the mirror images of facets in a face at a distance below the membrane."""
     image = sent.copy()
     image[list(_DOWN)] *= -1.0
     image[_POINT + 2] -= _single(2.0 * depth_mm)
@@ -236,7 +237,7 @@ def returned_to_flat(
     side_mm: float,
     slab: Slab,
 ) -> Map:
-    """Return what the flat membrane receives by the lower face, (rows, columns, 3) as `flat`.
+    """Return the light that the lower face returns to the flat membrane, (rows, columns, 3).
 
     The membrane absorbs nothing. It changes slowly, and is computed on some of the facets.
 
@@ -288,7 +289,7 @@ def _lobe(c, s, between, a2):  # type: ignore[no-untyped-def]  # pragma: no cove
 
 @_part
 def _gather(sent, i, left, right, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return what a point receives of a row of facets, to the camera."""
+    """Return the light of a row of facets via a point to the camera."""
     r_sum, g_sum, b_sum = _0, _0, _0
     for j in range(left, right):
         dx, dy, dz = sent[0, i, j] - p[0], sent[1, i, j] - p[1], sent[2, i, j] - p[2]
@@ -324,7 +325,7 @@ def _gather(sent, i, left, right, p, n, v, s, gloss):  # type: ignore[no-untyped
 
 @_part
 def _around(sent, window, hole, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return what a point receives of a window of facets (top, bottom, left, right) but a hole."""
+    """Return the light of a window of facets (top, bottom, left, right) without a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
     for i in range(max(window[0], 0), min(window[1], sent.shape[1])):
         left, right = max(window[2], 0), min(window[3], sent.shape[2])
@@ -346,7 +347,7 @@ def _window(row, column):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 
 @_part
 def _returned_share(up, index2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return what the lower face returns of light at an angle of cosine `up` to its normal."""
+    """Return the share of light that the lower face returns, with cosine `up` to its normal."""
     out2 = _1 - index2 * (_1 - up * up)
     out = sqrt(out2 if out2 > _0 else _0)
     index = sqrt(index2)
@@ -357,7 +358,7 @@ def _returned_share(up, index2):  # type: ignore[no-untyped-def]  # pragma: no c
 
 @_part
 def _returned(sent, index2, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return what a point receives of the facets' mirror images."""
+    """Return the light that a point receives from the mirror images of the facets."""
     r_sum, g_sum, b_sum = _0, _0, _0
     for i in range(sent.shape[1]):
         for j in range(sent.shape[2]):
@@ -370,7 +371,7 @@ def _returned(sent, index2, p, n, v, s, gloss):  # type: ignore[no-untyped-def] 
 
 @_whole
 def gather_rows(first, last, at, fields, gloss, index2, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Gather what points receive, points `first` to `last`.
+    """Gather the light of the points `first` to `last`.
 
     Parameters
     ----------

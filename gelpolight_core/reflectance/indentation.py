@@ -32,7 +32,7 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-# A careful hand on a magnified image.
+# Accuracy of a careful person on a magnified image.
 PLACED_SD_PX = 0.5
 LEAST_PLACED_INSIDE = 0.9
 
@@ -42,9 +42,9 @@ class Indentation:
     """One ball's indentation in an image.
 
     The circle is the image of the contact's edge: where the membrane leaves the ball, marked by
-    the kink of the shading and not by a threshold. Its centre is the image of the edge's centre,
-    which lies at the edge's depth; the ball's lowest point is deeper and is therefore seen a few
-    pixels nearer to the image's foot point where the view is oblique.
+    the kink of the shading and not by a threshold. Its centre is the image of the edge's centre, at
+    the depth of the edge. The lowest point of the ball is deeper. With an oblique view, it
+    therefore appears a few pixels nearer to the foot point of the image.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Indentation:
     coverage : float
         Share of the directions in which the edge was seen, 0..1.
     disturbed : (rows, columns) bool
-        Where the image differs from the background around the contact: contact, drape, shadow.
+        Area around the contact that differs from the background: contact, drape, shadow.
     noise : tuple of 3 floats
         Standard deviation of the difference of the two images per channel, 0..1.
     gain : tuple of 3 floats
@@ -117,7 +117,7 @@ def indentation_at(
     Returns
     -------
     Indentation
-        With the placed circle as its contour and a centre that is as sure as a hand is.
+        With the placed circle as its contour, and the uncertainty of placing by hand.
 
     Raises
     ------

@@ -1,7 +1,6 @@
-"""Whether what was found in an image is one whole ball's indentation, and how good it is.
+"""Checks whether a detected indentation is that of one whole ball, and how accurate it is.
 
-Where something can be refused outright it is, by its reason; the rest becomes judged figures with
-the same limits.
+Clear cases are refused with the reason; the others become judged figures with the same limits.
 """
 
 from __future__ import annotations
@@ -27,22 +26,22 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-# Five standard deviations over three channels: one false pixel in about 60 000, and single pixels
-# are opened away.
+# Five standard deviations over three channels: one false pixel in about 60 000. Morphological
+# opening removes single pixels.
 DETECTION = 5.0
 SMALLEST_RADIUS_PX = 6.0
-# A circle seen through a lens at the field's rim stays above 0.95; two touching presses fall below
+# A circle at the boundary of the field has more than 0.95; two touching presses have less than
 # 0.75.
 _LEAST_AXIS_RATIO = 0.8
-# A square's edge scatters by 0.08 to 0.1 of its mean radius.
+# The edge of a square scatters by 0.08 to 0.1 of its mean radius.
 LARGEST_RESIDUAL = 0.07
 ALLOWED_RESIDUAL_PX = 1.5
 LEAST_COVERAGE = 0.35
-# 12 % of a usual contact are 4 degrees; more is no place to start a refinement from.
+# 12 % of a usual contact are 4 degrees; with more, a refinement cannot start.
 LARGEST_SD = 0.12
 LARGEST_LIGHT_CHANGE = 0.1
-# The inner half of a ball changes as the whole does: 0.9 to 1.6 on all sensors seen. Flat faces
-# give 0.2 and less, domed ones 0.5.
+# The inner half of a ball changes like the whole: 0.9 to 1.6 on all tested sensors. Flat faces give
+# 0.2 or less, domed faces 0.5.
 _LEAST_INNER_CHANGE = 0.7
 _LEAST_VISIBLE = 0.4
 # Behind markers the image is estimated: above the first limit no object can be recognised, above
@@ -89,7 +88,7 @@ class BallRefusal(InputError):
 
 
 def reaches_border(region: Mask, valid: Mask) -> bool:
-    """Whether a region touches the border of the image or of the working area.
+    """Return whether a region touches the border of the image or of the working area.
 
     Parameters
     ----------
@@ -121,7 +120,7 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
         If any of the edge lies outside, or most of it was not seen and the
         region touches the border.
     """
-    # A kink shows only with some membrane on its far side.
+    # A kink is visible only with some membrane outside it.
     outside = 1.0 - share_in_view(contour.circle, area, margin_px=1.0)
     unclear = reaches and contour.coverage < LEAST_COVERAGE
     if outside > 0.0 or unclear:
@@ -147,7 +146,7 @@ def share_in_view(circle: Circle, area: Mask, *, margin_px: float = 0.0) -> floa
 
 
 def check_visible(circle: Circle, area: Mask, name: str) -> None:
-    """Refuse an indentation of which so little is in view that its centre is a guess.
+    """Refuse an indentation with too small a visible part to find its centre.
 
     Parameters
     ----------
@@ -209,8 +208,8 @@ def check_shading(
     Raises
     ------
     InputError
-        If the shading is not a ball's, the contact is too small or larger than the ball, or
-        markers hide so much of it that nobody can tell.
+        If the shading is not that of a ball, the contact is too small or larger than the ball, or
+        markers hide too much of it.
     """
     if circle.radius < SMALLEST_RADIUS_PX:
         _refuse_small(circle.radius, name)
@@ -239,7 +238,7 @@ def check_shading(
 
 
 def refuse_unfitted(hidden: float, name: str) -> NoReturn:
-    """Refuse a disturbance with too few pixels for a fit, because of markers or of its size."""
+    """Refuse a disturbance with too few pixels for a fit, because of markers or its size."""
     if hidden > 0.3:
         _refuse_hidden(hidden, name)
     _refuse_shape(Reason.TOO_SMALL, tr("the changed area is too small for a ball"), name)
@@ -274,7 +273,7 @@ def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
     Returns
     -------
     list of (small rows, small columns) bool
-        On the grid of `change`, the largest of each threshold; empty if the contact stands alone.
+        On the grid of `change`, the largest of each threshold; empty if there is only one contact.
     """
     f, half = change.factor, 0.5 * (change.factor - 1)
     rows, columns = np.indices(change.scaled.shape)
@@ -286,7 +285,7 @@ def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
     least = np.pi * max(0.4 * circle.radius, SMALLEST_RADIUS_PX) ** 2 / f**2
     found = []
     for share in (0.35, 0.5, 0.7):
-        # The first contact's own drape and shadow hang together with it; another press does not.
+        # Drape and shadow of the first contact are connected with it; another press is not.
         hot = (change.scaled > max(DETECTION, share * top)) | (distance < 1.3)
         _, labels, stats, _ = cv2.connectedComponentsWithStats(hot.astype(np.uint8))
         areas = stats[:, cv2.CC_STAT_AREA].copy()
@@ -307,7 +306,7 @@ def refuse_several(name: str) -> NoReturn:
 
 
 def check_round(contour: Contour, name: str) -> None:
-    """Refuse an edge that is not a ball's.
+    """Refuse an edge that is not that of a ball.
 
     Parameters
     ----------
@@ -366,7 +365,7 @@ def check_order(
     """
     tables = [kink_table(p, area, circle, half_width=0.25) for p in (press, background)]
     before, after = (kink_along(table, circle.radius) for table in reversed(tables))
-    # Texture and noise are alike in both images, so a narrow lead proves nothing.
+    # Texture and noise are the same in both images, so a small difference proves nothing.
     if before > 4.0 * after:
         raise BallRefusal(
             Reason.SWAPPED,

@@ -1,8 +1,8 @@
 """Markers printed on the membrane: found by their regular pattern, excluded, and filled.
 
-Many gels carry a grid of dark dots. A dot moves with the membrane when something is pressed in, so
-it differs from the background on both sides of its old place, more strongly than the shading
-does. Every step that compares an image with the background has to leave the dots out.
+Many gels carry a grid of dark dots. A dot moves with the membrane when something is pressed in. It
+then differs from the background at its old and its new position, more strongly than the shading.
+Every step that compares an image with the background has to leave the dots out.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def find_markers(background: Array, valid: Mask | None = None) -> Markers:
     """Find the markers printed on a membrane.
 
     Dark spots count as markers only where there are a dozen or more of about one size and in
-    rows. So dust, scratches and the membrane's texture are none.
+    rows. Dust, scratches and the texture of the membrane are therefore not markers.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
         return None
     if spots.area[alike].sum() > _LARGEST_SHARE * spots.labels.size:
         return None
-    # A print's outermost dots may be cut or merged; they hide the membrane all the same.
+    # The outermost dots of a print can be cut or merged; they hide the membrane, too.
     print_like = (spots.area > 0.2 * typical) & (spots.area < 6.0 * typical)
     keep = np.concatenate([[False], print_like])[spots.labels]
     offset = 0.5 * (factor - 1)
@@ -219,8 +219,8 @@ def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | No
 def _lattice_pitch(centres: NDArray[np.float64]) -> float | None:
     """Return the typical distance to the nearest spot if the spots lie in rows, else None.
 
-    In a row, the nearest spot has a counterpart at the same distance on the other side. Among
-    spots at random hardly one in ten has.
+    In a row, the nearest spot has a counterpart at the same distance on the other side. Of random
+    spots, fewer than one in ten has one.
     """
     to_others = centres[None] - centres[:, None]
     apart = np.hypot(to_others[..., 0], to_others[..., 1])

@@ -2,8 +2,8 @@
 
 The glossy share is a microfacet lobe (GGX distribution, Smith's masking) about the half vector
 between light and view; the diffuse share is a power of the cosine, or a curve for each channel.
-Both together form one curve of brightness that depends on the viewing side, as a real membrane's
-does; curves without gloss are the paper's one-dimensional table (Eq. 6).
+Together they give a brightness that depends on the viewing direction, like that of a real membrane.
+Curves without gloss are the paper's one-dimensional table (Eq. 6).
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from gelpolight_core.reflectance.membrane_kernel import brightness_of_points
 
 Array = NDArray[np.float64]
 MEMBRANES = ("two-lobe", "one-dimensional")
-# Between so many even cosines a straight line is within 1e-5 of any curve a fit or a hand makes.
+# With this number of even cosines, linear interpolation is accurate to 1e-5 for any fitted or
+# edited curve.
 CURVE_NODES = 257
 
 
@@ -35,10 +36,10 @@ class Membrane:
         GGX alpha of the glossy lobe.
     interreflection : float
         Reflectance for light from other parts of the membrane, in units of the reflectance that
-        :meth:`response` describes; 0: it gives none to itself.
+        :meth:`response` describes; 0: no such light.
     diffuse : tuple of 3 tuples of `CURVE_NODES` floats
         The diffuse share of each channel at even cosines from 0 to 1, instead of
-        ``cosine**exponent``; empty where the power stands.
+        ``cosine**exponent``; empty if the power is used.
     """
 
     exponent: float = 1.0
@@ -49,7 +50,7 @@ class Membrane:
 
     @property
     def curves(self) -> Array:
-        """The diffuse curves, (3, `CURVE_NODES`); (3, 0) where the power of the cosine stands."""
+        """The diffuse curves, (3, `CURVE_NODES`); (3, 0) if the power of the cosine is used."""
         return np.array(self.diffuse, np.float64).reshape(3, -1)
 
     def diffuse_share(self, cosine: Array) -> Array:

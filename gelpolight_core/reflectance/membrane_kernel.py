@@ -1,4 +1,4 @@
-"""The membrane's response to light, compiled: as its class, a point and a light at a time."""
+"""The membrane's response to light as compiled functions, one point and one light at a time."""
 
 from __future__ import annotations
 

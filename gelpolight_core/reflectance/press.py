@@ -62,9 +62,10 @@ class BallPress:
     quality: QualityTable
 
     def seen_centre_mm(self, ray_slope: Array) -> Array:
-        """Return where the contact's centre is seen on the undeformed top surface, (2,).
+        """Return the position of the contact's centre as seen on the undeformed top surface, (2,).
 
-        The rays meet the contact ring below the surface and further in, by `ray_slope` per mm.
+        The rays meet the contact ring below the surface and nearer to the middle, by `ray_slope`
+        per mm.
         """
         sagitta = self.pose.radius_mm - np.sqrt(self.pose.radius_mm**2 - self.contact_radius_mm**2)
         centre: Array = np.asarray(self.pose.centre_mm, np.float64)
@@ -113,7 +114,7 @@ def find_ball(
     name : str
         The image's file, for messages.
     usable : (rows, columns) bool, optional
-        Nodes with light; by default all that the camera sees.
+        Nodes with light; by default all visible ones.
     placed : PlacedContact, optional
         The contact placed by the user; by default it is detected. Its centre is refined
         on the shading either way.
@@ -200,7 +201,8 @@ def _shaded_pixels(
     value = image[rows, columns].astype(np.float64)
     base = background[rows, columns].astype(np.float64)
     known = (value > LEAST_VALUE) & (value < SATURATED) & (base > LEAST_VALUE)
-    # The ratio's noise: the model's own few per cent, and the image's over the base.
+    # Noise of the ratio: a few per cent of the model, and the noise of the image over the
+    # background.
     weight = np.where(known, 1.0 / (GAIN_NOISE + VALUE_NOISE / np.maximum(base, LEAST_VALUE)), 0.0)
     points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
     return ShadedPixels(

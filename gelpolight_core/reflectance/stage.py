@@ -65,8 +65,8 @@ def ball_scatter(
 ) -> list[tuple[Array, Array]]:
     """Return (cosines, processed values) of all ball pixels, one pair per channel.
 
-    As in the paper, light and view are those of the flat membrane: the ball's normals are taken
-    straight above each node, about the place where the contact's centre is seen.
+    As in the paper, light and view are those of the flat membrane: the ball's normals are those
+    straight above each node, relative to the seen centre of the contact.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def ball_scatter(
         inside = contact_mask(press, table) & radiance.usable
         rows, columns = np.nonzero(inside)
         if rows.size == 0:
-            continue  # its whole contact lies where the whiteboard gave no light
+            continue  # its whole contact is in an area without light on the whiteboard
         points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
         centre = press.seen_centre_mm(
             table.ray_slope[rows, columns].mean(axis=0).astype(np.float64)

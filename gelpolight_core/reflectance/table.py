@@ -1,4 +1,4 @@
-"""The reflectance table: how bright the membrane is at each angle of light (Eq. 6, 7)."""
+"""The reflectance table: brightness of the membrane over the angle of light (Eq. 6, 7)."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class ReflectanceTable:
     cosines : tuple of 3 (nodes,) arrays
         cos(theta), strictly increasing from 0 to 1.
     values : tuple of 3 (nodes,) arrays
-        Processed pixel values I / (rho |L|) at those cosines, strictly increasing; the first is
-        what stray light leaves in a shadow.
+        Processed pixel values I / (rho |L|) at those cosines, strictly increasing; the first is the
+        stray light in a shadow.
     coverage : (3, 2)
-        Lowest and highest cosine that the ball presses have shown; beyond it is extrapolated.
+        Lowest and highest cosine of the ball presses; beyond them, the table is extrapolated.
     """
 
     cosines: tuple[Array, Array, Array]
@@ -74,7 +74,7 @@ class ReflectanceTable:
         table : (3, size) float32
             Cosines at `size` even steps of the processed value, from 0 to each channel's last node.
         scale : (3,) float32
-            Multiply a processed value by this to get its place in the table.
+            Factor from a processed value to its index in the table.
         """
         table = np.stack(
             [self.cosine(k, np.linspace(0.0, self.values[k][-1], size)) for k in range(3)]
@@ -116,8 +116,8 @@ class ChannelFit:
 def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     """Fit one channel's monotone curve to a scatter of ball pixels.
 
-    The cosine is known from the ball's shape and the noise is in the image, so the value is
-    averaged at given cosine (robustly, by the median), made monotone and then inverted.
+    The cosine is known from the ball's shape, and the noise is in the image. Therefore the value is
+    averaged at given cosine (by the median), made monotone and then inverted.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     Raises
     ------
     InputError
-        If there are too few points, or they do not grow with the cosine.
+        If there are too few points, or they do not increase with the cosine.
     """
     from scipy.interpolate import PchipInterpolator  # slow to import
     from scipy.optimize import isotonic_regression
@@ -175,7 +175,7 @@ def _poor(name: str, text: str, *, n: int) -> InputError:
 
 
 def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Array]:
-    """Return each bin's mean cosine and the value there, sigma-clipped about its own line."""
+    """Return the mean cosine of each bin and the value there, sigma-clipped about a line."""
     which = np.digitize(cosines, edges) - 1
     rows = []
     for i in range(edges.size - 1):
@@ -195,8 +195,8 @@ def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Arr
 def _close_ends(cosines: Array, values: Array) -> tuple[Array, Array]:
     """Extend the curve to no light and to full light; no flat steps.
 
-    The value at cos = 0 is where the low end's line leads, not zero by decree: what is left there
-    is stray light and crosstalk, which a shadow shows too.
+    The value at cos = 0 is extrapolated from the low end, not set to zero: the rest is stray light
+    and crosstalk, as in a shadow.
     """
     low = cosines <= cosines[0] + 0.2 * (cosines[-1] - cosines[0])
     first = values[0] - _slope(cosines[low], values[low]) * cosines[0]

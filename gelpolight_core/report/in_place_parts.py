@@ -20,7 +20,7 @@ Facts = list[tuple[str, str]]
 
 
 def in_place_facts(c: InPlaceCalibration) -> Facts:
-    """Return what is known of a closed sensor, and what cannot be."""
+    """Return the known and the unknown quantities of a closed sensor."""
     grid, errors = c.in_place.grid, c.in_place.errors
     return [
         (tr("Image"), f"{c.camera.width} \N{MULTIPLICATION SIGN} {c.camera.height} px"),
@@ -46,7 +46,7 @@ def in_place_parts(c: InPlaceCalibration, result: InPlaceResult | None = None) -
     c : InPlaceCalibration
         The calibration.
     result : InPlaceResult, optional
-        Of the run that made it; a file does not hold the presses' own figures.
+        Of the run that made it; a file does not contain the figures of the presses.
     """
     balls = Parts((_draw_places(c),), _refused(result) if result else ())
     drawings = [_draw_errors(c)]

@@ -33,7 +33,7 @@ PUNCH_RANGE = (0.1, 100.0)
 
 @dataclass(frozen=True, slots=True)
 class PressedScale:
-    """What is pressed in the images of ``scale/``.
+    """The object in the images of ``scale/``.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class ClosedSession(SessionImages):
     mm_per_px_sd : float or None
         Its standard deviation, where that is stated.
     pressed_scale : PressedScale
-        What the images of ``scale/`` show.
+        The object in the images of ``scale/``.
     ball_radii_mm, ball_default_radius_mm
         Of ``[balls]``.
     declared_response : str, float or None

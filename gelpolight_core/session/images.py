@@ -1,4 +1,4 @@
-"""The images of a session's stages: which there are, and how they are read."""
+"""The images of a session's stages, and how they are read."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SUFFIXES = (".png", ".tif", ".tiff")
 
 
 class SessionImages:
-    """What sessions of open and of closed sensors have in common: their images and ball radii.
+    """Common part of the sessions of open and of closed sensors: images and ball radii.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ def read_raw_image(path: Path) -> tuple[NDArray[Any], bool]:
     Returns
     -------
     (rows, columns, 3) uint8 or uint16, bool
-        RGB, and whether the file held a single grey channel, which is then repeated.
+        RGB, and whether the file contains a single grey channel, which is then repeated.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a session lacks for the calibration of an open sensor, in one message."""
+"""The missing parts of a session for the calibration of an open sensor, in one message."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class Rest:
         yield
         press_view = self.window.page("measure").press_view
         for _ in range(LONGEST_STEPS):
-            press_view.hold()
+            press_view.freeze()
             yield
             if press_view.work.image is not None:
                 break

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from app.calibrate.detection import Detection, judged, or_refusal
 from app.calibrate.light_checks import enlarged, marked, refuse_grey
-from app.calibrate.marks import working_rim
+from app.calibrate.marks import working_circle
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
@@ -28,7 +28,7 @@ def detect_background(
     whiteboard : (rows, columns, 3), optional
         Image of the whiteboard stage; a press differs from it. Without it, contact is not checked.
     """
-    rim = Overlay(lines=() if table is None else (working_rim(table),))
+    circle = Overlay(lines=() if table is None else (working_circle(table),))
 
     def detect() -> Detection:
         refuse_grey(rgb)
@@ -41,9 +41,9 @@ def detect_background(
                 "captured."
             )
         marks = Overlay(
-            lines=rim.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
+            lines=circle.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
         )
         result = judged(marks, found.quality.figures, good)
         return result if compared else replace(result, warns=True)
 
-    return or_refusal(detect, marks=rim)
+    return or_refusal(detect, marks=circle)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.calibrate.detection import Detection, as_image, judged, or_refusal
-from app.calibrate.marks import ball_contour, ball_handle, working_rim
+from app.calibrate.marks import ball_contour, ball_handle, working_circle
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from gelpolight_core.errors import InputError
@@ -85,7 +85,7 @@ def detect_ball(
     done = tuple(Marker(u, v, "dot", "info") for u, v in _pixels(earlier_mm, table))
     there = () if next_mm is None else _pixels([next_mm], table)
     wanted = tuple(Marker(u, v, "ring", "expected", text=tr("next press")) for u, v in there)
-    rim = working_rim(table)
+    circle = working_circle(table)
 
     def detect() -> Detection:
         _refuse_size(rgb, setting.image_size)
@@ -102,22 +102,22 @@ def detect_ball(
         marks = Overlay(
             markers=done,
             circles=() if handle is None else (handle,),
-            lines=(rim, *ball_contour(press, table)),
+            lines=(circle, *ball_contour(press, table)),
         )
         good = tr("Ball found: contact radius {c:.2f} mm, depth {d:.2f} mm.")
         text = good.format(c=press.contact_radius_mm, d=press.pose.depth_mm)
         return judged(marks, press.quality.figures, text, press)
 
-    return or_refusal(detect, marks=Overlay(markers=(*done, *wanted), lines=(rim,)))
+    return or_refusal(detect, marks=Overlay(markers=(*done, *wanted), lines=(circle,)))
 
 
 def next_press_mm(
     table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[tuple[float, float]]
 ) -> tuple[float, float] | None:
-    """Return the place (x, y) in the working area that is farthest from all earlier presses.
+    """Return the position (x, y) in the working area that is farthest from all earlier presses.
 
-    The first press is in the middle. Nowhere is it so near to the border that the contact of the
-    ball would be cut. None if the ball is too large for the field.
+    The first press is in the middle. It is always far enough from the border for the contact of the
+    ball. None if the ball is too large for the field.
     """
     pitch_mm = COARSER * table.grid.pitch_mm
     valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
@@ -138,7 +138,7 @@ def next_press_mm(
 def _pixels(
     points_mm: Sequence[tuple[float, float]], table: ResamplingTable
 ) -> list[tuple[float, float]]:
-    """Return where points of the top surface are seen; those that are not seen are left out."""
+    """Return the pixels of points of the top surface; invisible points are left out."""
     nodes = table.grid.to_index(np.array(points_mm, np.float64).reshape(-1, 2))
     return [(float(u), float(v)) for u, v in seen_at(table, nodes)]
 
@@ -157,7 +157,7 @@ def _refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
 def placed_ball(circle: PlacedCircle, setting: BallSetting) -> Detection:
     """Show a contact that was placed by hand."""
     mark = Circle(circle.u_px, circle.v_px, circle.radius_px, "good", handle="ball")
-    overlay = Overlay(circles=(mark,), lines=(working_rim(setting.table),))
+    overlay = Overlay(circles=(mark,), lines=(working_circle(setting.table),))
     return Detection(overlay, tr("The contact was placed by hand."), True)
 
 

@@ -1,4 +1,4 @@
-"""What the presses so far give, and what one more would bring."""
+"""The accuracy from the present presses, and the expected benefit of one more."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ SHOWN_PX = 640
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How good a calibration in place is, and whether to go on.
+    """Accuracy of an in-place calibration, and whether more presses help.
 
     Attributes
     ----------
     error_deg : float
         Mean error of the normals of presses that were left out.
     gain : float or None
-        Share by which one more press lowers the error; None with too few presses to progress.
+        Relative decrease of the error by one more press; None with too few presses.
     curve : tuple of (int, float)
-        Number of presses, and the typical error with so many, degrees.
+        Numbers of presses, and the typical errors with them, degrees.
     next_px : (u, v) or None
         Where the next press helps most; None if more presses do not help.
     """
@@ -63,7 +63,7 @@ class Progress:
 
 
 def progress_of(run: InPlaceRun) -> Progress:
-    """Return what a calibration in place says of its presses."""
+    """Return the progress of an in-place calibration."""
     result, gain = run.result, expected_gain(run.result)
     errors = [press.held_out.normal_deg for press in result.presses]
     settled = gain is not None and gain < SETTLED
@@ -76,7 +76,7 @@ def progress_of(run: InPlaceRun) -> Progress:
 
 
 def residual_panel(run: InPlaceRun) -> Panel:
-    """Return the presses on the background, coloured by how well the others explain them."""
+    """Return the presses on the background, coloured by their residuals."""
     grid, progress = run.result.model.grid, progress_of(run)
     background = run.result.model.background
     rgb = (255.0 * np.clip(background / max(float(background.max()), 1e-6), 0, 1)).astype(np.uint8)

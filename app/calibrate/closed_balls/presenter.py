@@ -1,4 +1,4 @@
-"""The step of the ball presses on a closed sensor, with what one more press would bring."""
+"""The step of the ball presses on a closed sensor, with the benefit of one more press."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class ClosedBallsStep(BallsStep):
 
     @property
     def progress(self) -> Progress | None:
-        """What the present presses give; None without an up-to-date calibration."""
+        """Accuracy from the present presses; None without an up-to-date calibration."""
         run = self._run()
         present = self.model.statuses[Stage.BALLS].state is not StageState.STALE
         return progress_of(run) if run is not None and present else None
@@ -100,7 +100,7 @@ class ClosedBallsStep(BallsStep):
         return is_done(state) and progress is not None and progress.settled
 
     def show_state(self, state: str, sentence: str) -> None:
-        """Show the state, and what one more press would bring."""
+        """Show the state, and the benefit of one more press."""
         progress = self.progress
         if progress is not None:
             figures = self.model.statuses[Stage.BALLS].quality.figures

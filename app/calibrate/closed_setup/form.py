@@ -144,7 +144,7 @@ def _is_of(preset: Preset, session: ClosedSession) -> bool:
 
 
 def _facts(preset: Preset) -> str:
-    """Return what a preset is for, as sentences."""
+    """Return the images that a preset is made for, as sentences."""
     text = tr("For images of {w} x {h} pixels").format(w=preset.image_px[0], h=preset.image_px[1])
     if any(preset.cropped):
         text += tr(", with {c:.0f} % of the camera image cut off on each side").format(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from app.calibrate.detection import Detection, judged, or_refusal, share
 from app.calibrate.light_checks import enlarged, marked, refuse_grey
-from app.calibrate.marks import working_rim
+from app.calibrate.marks import working_circle
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
 from gelpolight_core.errors import InputError
@@ -51,7 +51,7 @@ def detect_whiteboard(
     background : (rows, columns, 3), optional
         Image of the background stage, if captured; it shows whether the membrane is still mounted.
     """
-    rim = Overlay(lines=() if table is None else (working_rim(table),))
+    circle = Overlay(lines=() if table is None else (working_circle(table),))
 
     def detect() -> Detection:
         refuse_grey(rgb)
@@ -60,12 +60,12 @@ def detect_whiteboard(
             _refuse_membrane(small, shrunk(background), area)
         unlit = area & (small.min(axis=2) < LEAST_LIGHT)
         lit = area & ~unlit
-        inner = _without_rim(lit)
+        inner = _without_edge(lit)
         change = local_change(small, inner, SPECK_OF_WIDTH * small.shape[1])
         specks = inner & (change > CHANGE)
         full = saturated(rgb) > 0
         marks = Overlay(
-            lines=rim.lines,
+            lines=circle.lines,
             masks=marked(full, enlarged(specks, rgb)),
         )
         figures = (
@@ -83,11 +83,11 @@ def detect_whiteboard(
         )  # fmt: skip
         return judged(marks, figures, tr("The whiteboard is well lit."))
 
-    return or_refusal(detect, marks=rim)
+    return or_refusal(detect, marks=circle)
 
 
-def _without_rim(lit: Mask2) -> Mask2:
-    """Return the lit area without the mixed pixels at the rim of the board; specks stay in it."""
+def _without_edge(lit: Mask2) -> Mask2:
+    """Return the lit area without the mixed pixels at the edge of the board; specks stay in it."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
     whole = cv2.morphologyEx(lit.astype(np.uint8), cv2.MORPH_CLOSE, disc)
     return np.asarray(cv2.erode(whole, disc, borderType=cv2.BORDER_REPLICATE)) > 0

@@ -55,7 +55,7 @@ class LivePanel(QWidget):
         self._start = self._state = before
         self._before: dict[str, Effect] = {}
         self._worker: NewestWins[tuple[CurveEdit, str], tuple[Effect, Effect]] = NewestWins(
-            lambda question: self._both(effect, *question), name="lut-effect"
+            lambda request: self._both(effect, *request), name="lut-effect"
         )
         self._timer = QTimer(self, interval=POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -89,7 +89,7 @@ class LivePanel(QWidget):
         self._residual.setVisible(on)
 
     def show_state(self, edit: CurveEdit) -> None:
-        """Request the effect of a state; an older request without an answer is dropped."""
+        """Request the effect of a state; an older request without a result is dropped."""
         self._state = edit
         self._ask()
 
@@ -165,21 +165,21 @@ class LivePanel(QWidget):
             return
         if not self._words.text():
             self._words.setText(tr("Reconstructing the press."))
-        self._worker.ask((self._state, name))
+        self._worker.submit((self._state, name))
         self._timer.start()
 
     def _poll(self) -> None:
-        answered = self._worker.take()
-        if answered is None:
+        finished = self._worker.take()
+        if finished is None:
             return
         if self._worker.idle:
             self._timer.stop()
-        if isinstance(answered.error, InputError):
-            self._words.setText(str(answered.error))
-        elif answered.error is not None:
-            raise answered.error
-        elif answered.answer is not None and answered.question[1] == self.press.currentData():
-            self._show(*answered.answer)
+        if isinstance(finished.error, InputError):
+            self._words.setText(str(finished.error))
+        elif finished.error is not None:
+            raise finished.error
+        elif finished.result is not None and finished.request[1] == self.press.currentData():
+            self._show(*finished.result)
 
     def _show(self, before: Effect, after: Effect) -> None:
         self._lines["ball"].setData(after.position_mm, after.sphere_mm, connect="finite")

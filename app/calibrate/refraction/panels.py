@@ -1,4 +1,4 @@
-"""A press near the rim, before and after the correction of lens, tilt and refraction."""
+"""A press near the boundary, before and after the correction of lens, tilt and refraction."""
 
 from __future__ import annotations
 

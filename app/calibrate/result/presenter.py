@@ -47,7 +47,7 @@ class ResultStep(StepPresenter):
         return is_done(state) and bool(self.model.saved)
 
     def is_settled(self, state: str) -> bool:
-        """Return whether the calibration is saved: who saves it has read the figures."""
+        """Return whether the calibration is saved: the user has then read the figures."""
         return self.is_finished(state)
 
     def refresh(self) -> None:

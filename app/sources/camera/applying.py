@@ -113,14 +113,14 @@ def locked(controls: Iterable[Setting]) -> dict[str, float]:
     """Return the present settings, with all automatic settings switched to fixed values."""
     values = {}
     for control in controls:
-        held = CONTROLS[control.key].held
-        values[control.key] = control.value if held is None else held
+        locked_value = CONTROLS[control.key].locked_value
+        values[control.key] = control.value if locked_value is None else locked_value
     return values
 
 
 def is_locked(controls: Iterable[Setting]) -> bool:
     """Return whether the camera reports no automatic setting."""
-    return not any(CONTROLS[c.key].held is not None and c.value for c in controls)
+    return not any(CONTROLS[c.key].locked_value is not None and c.value for c in controls)
 
 
 def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> QualityTable:
@@ -134,7 +134,7 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
         Settings of the camera as read back.
     """
     there = {control.key: control for control in controls}
-    free = [c for c in there.values() if CONTROLS[c.key].held is not None and c.value]
+    free = [c for c in there.values() if CONTROLS[c.key].locked_value is not None and c.value]
     figures = [
         Figure(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
     ]
@@ -151,7 +151,7 @@ def _lock_advice() -> str:
 
 
 def _figure(applied: Applied) -> Figure:
-    serious = applied.key in MAIN or CONTROLS[applied.key].held is not None
+    serious = applied.key in MAIN or CONTROLS[applied.key].locked_value is not None
     value = float("nan") if applied.read is None else applied.read
     verdict, advice = Verdict.PASS, ""
     if not applied.holds:

@@ -34,7 +34,7 @@ SLOW_REOPEN_S = 2.0
 """Shorter than the silence after which a stream counts its source as lost."""
 CHECK_S = 5.0
 CLOSE_S = 0.5
-"""A camera that is still opening is left to its thread; stopping a stream may take only a second.
+"""A camera that is still opening is closed by its thread; stopping a stream can take a second.
 """
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 5.0
 UNSETTLED_FRAMES = 5

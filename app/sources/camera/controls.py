@@ -22,7 +22,7 @@ class ControlKind:
         Key of the switch for the automatic mode; empty if there is none.
     switch : bool
         Whether it is a switch, on (1) or off (0).
-    held : float or None
+    locked_value : float or None
         Value when locked; None: its present value.
     """
 
@@ -30,21 +30,23 @@ class ControlKind:
     unit: str = ""
     automatic: str = ""
     switch: bool = False
-    held: float | None = None
+    locked_value: float | None = None
 
 
 # Switches come before the settings that they unlock; settings are applied in this order.
 CONTROLS: Mapping[str, ControlKind] = {
-    "exposure_auto": ControlKind(lambda: tr("Automatic exposure"), switch=True, held=0.0),
+    "exposure_auto": ControlKind(lambda: tr("Automatic exposure"), switch=True, locked_value=0.0),
     "exposure_ms": ControlKind(lambda: tr("Exposure"), "ms", "exposure_auto"),
-    "white_balance_auto": ControlKind(lambda: tr("Automatic white balance"), switch=True, held=0.0),
+    "white_balance_auto": ControlKind(
+        lambda: tr("Automatic white balance"), switch=True, locked_value=0.0
+    ),
     "white_balance_k": ControlKind(lambda: tr("White balance"), "K", "white_balance_auto"),
-    "gain_auto": ControlKind(lambda: tr("Automatic gain"), switch=True, held=0.0),
+    "gain_auto": ControlKind(lambda: tr("Automatic gain"), switch=True, locked_value=0.0),
     "gain": ControlKind(lambda: tr("Gain"), "", "gain_auto"),
-    "focus_auto": ControlKind(lambda: tr("Automatic focus"), switch=True, held=0.0),
+    "focus_auto": ControlKind(lambda: tr("Automatic focus"), switch=True, locked_value=0.0),
     "focus": ControlKind(lambda: tr("Focus"), "", "focus_auto"),
     "rate_follows_exposure": ControlKind(
-        lambda: tr("Exposure may lower the frame rate"), switch=True, held=0.0
+        lambda: tr("Exposure may lower the frame rate"), switch=True, locked_value=0.0
     ),
     "power_line_hz": ControlKind(lambda: tr("Mains frequency"), "Hz"),
     "gamma": ControlKind(lambda: tr("Gamma")),

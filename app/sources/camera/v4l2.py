@@ -202,21 +202,21 @@ class V4l2:
         if query is None:
             return None
         try:
-            held = ControlValue(query.id, 0)
-            self._ask(VIDIOC_G_CTRL, held)
+            reading = ControlValue(query.id, 0)
+            self._ask(VIDIOC_G_CTRL, reading)
         except OSError:
             return None  # listed but not readable: some cameras do that
         kind, scale = CONTROLS[key], _KNOWN[key].scale
         writable = not query.flags & (READ_ONLY | GRABBED | INACTIVE)
-        low, high, step, value = 0.0, 1.0, 1.0, float(held.value != 0)
+        low, high, step, value = 0.0, 1.0, 1.0, float(reading.value != 0)
         if key == "exposure_auto":
-            value = float(held.value != EXPOSURE_MANUAL)
+            value = float(reading.value != EXPOSURE_MANUAL)
         elif key == "power_line_hz":
             high, step = 60.0, 10.0
-            value = MAINS_HZ.get(held.value, 0.0)
+            value = MAINS_HZ.get(reading.value, 0.0)
         elif not kind.switch:
             low, high = query.minimum * scale, query.maximum * scale
-            step, value = max(query.step, 1) * scale, held.value * scale
+            step, value = max(query.step, 1) * scale, reading.value * scale
         rounded = (round(x, 6) for x in (low, high, step, value))
         return Setting(key, kind.label(), kind.unit, *rounded, writable)
 

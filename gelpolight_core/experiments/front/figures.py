@@ -25,7 +25,7 @@ LOOKS = {
     "polynomial": ("#e69f00", "D"),
     "network": ("#8a3ffc", "v"),
 }
-"""Colour and marker; a method with wrong eigenvalues has that of its method, hollow."""
+"""Colour and marker. A method with wrong eigenvalues has the hollow marker of its method."""
 LEAST_ERROR = 1e-3
 
 

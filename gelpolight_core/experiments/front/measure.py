@@ -1,9 +1,8 @@
 """Error against run time of each method.
 
 Errors are differences from the true depth, which no method
-uses. Every press is timed, and all methods take turns on
-it, so that a slow spell of the machine meets all alike. A method that fails or refuses is a gap
-with its reason.
+uses. Every press is timed with all methods in turn, so that a slow phase of the machine affects
+all. A method that fails or refuses is a gap with its reason.
 """
 
 from __future__ import annotations
@@ -29,9 +28,10 @@ from gelpolight_core.translation import tr
 Progress = Callable[[str, float], None]
 REPEATS = 2
 BUDGET_S = 2.0
-"""A method that has run so long at one size is not repeated; each press is timed at least once."""
+"""A method that has run for this time at one size is not repeated. Each press is timed at least
+once."""
 MOST_WIDTH = {"precision": 640, "rival_wrong": 1280}
-"""Widest images of families that teach nothing more by larger ones."""
+"""Largest image width of families for which larger images give no new information."""
 TOUCHED_MM = 0.02
 WORTH = 0.01
 
@@ -43,7 +43,7 @@ class Point:
     Attributes
     ----------
     sensor, method, label, family : str
-        What was measured.
+        The method and sensor.
     width : int
         Of the image, in pixels.
     megapixels : float
@@ -60,7 +60,7 @@ class Point:
     presses : int
         How many there were.
     gap : str
-        Why there is nothing; empty where there is something.
+        The reason of a gap; empty if there is none.
     """
 
     sensor: str
@@ -157,7 +157,7 @@ def _time(run: _Run, press: Press) -> None:
 
 
 def _score(run: _Run, press: Press, grid: MembraneGrid, radius_mm: float) -> None:
-    """Score a method on a press; what it refuses makes it a gap."""
+    """Score a method on a press; a refusal makes a gap."""
     if run.solve is None:
         return
     try:
@@ -191,7 +191,7 @@ def normal_error_deg(
     truth : TrueDepth
         What was pressed; only nodes deeper than `TOUCHED_MM` count.
     radius_mm : float
-        Only nodes within it count.
+        Only nodes within this radius count.
     """
     pitch = float(truth.x_mm[1] - truth.x_mm[0])
     down, across = (np.asarray(g) for g in np.gradient(truth.depth_mm, pitch))
@@ -242,15 +242,15 @@ def _point(run: _Run, scene: Scene) -> Point:
 
 
 def measured(point: Point) -> tuple[float, float]:
-    """Return time (ms) and depth error (um) of a point that is no gap."""
+    """Return time (ms) and depth error (um) of a point that is not a gap."""
     assert point.median_ms is not None and point.rms_um is not None
     return point.median_ms, point.rms_um
 
 
 def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the points of one sensor and size that nothing beats in both time and depth error.
+    """Return the points of one sensor and size that no other exceeds in both time and depth error.
 
-    The fastest comes first. A slower point has to be better by `WORTH`: smaller differences are
+    The fastest comes first. A slower point must be better by `WORTH`: smaller differences are
     noise.
     """
     known = sorted(
@@ -275,9 +275,9 @@ def fronts(points: Sequence[Point]) -> tuple[Point, ...]:
 
 
 def observed_order(points: Sequence[Point]) -> Order | None:
-    """Return how the depth error of one method on one sensor falls with the pitch.
+    """Return the order of the depth error of one method on one sensor with the pitch.
 
-    None where it has fewer than three sizes.
+    None with fewer than three sizes.
     """
     known = [p for p in points if p.rms_um is not None]
     return fit_order([p.pitch_mm for p in known], [p.rms_um or 0.0 for p in known])
@@ -286,18 +286,18 @@ def observed_order(points: Sequence[Point]) -> Order | None:
 def recommended(
     points: Sequence[Point], *, rate_hz: float | None = None, rms_um: float | None = None
 ) -> Point | None:
-    """Return the method to choose; None where none is fast and accurate enough.
+    """Return the recommended method; None if none is fast and accurate enough.
 
-    With an error that is wanted it is the fastest, without one the most accurate.
+    With a required error it is the fastest, without one the most accurate.
 
     Parameters
     ----------
     points : sequence of Point
         Of one sensor and size.
     rate_hz : float, optional
-        Frames a second that are wanted; the 95th percentile of the time has to keep it.
+        Required frames per second; the 95th percentile of the time must meet it.
     rms_um : float, optional
-        Largest depth error that is wanted.
+        Largest accepted depth error.
     """
     known = [p for p in points if p.p95_ms is not None and p.rms_um is not None]
     if rate_hz is not None:

@@ -1,4 +1,4 @@
-"""Methods from image to depth, to be compared: each with a name and a family."""
+"""Methods from image to depth for the comparison, each with a name and a family."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class Method:
     name, label : str
         For files, and for people.
     family : str
-        What it belongs to: ``paper``, ``effort``, ``precision``, ``rival`` or ``rival_wrong``.
+        Its family: ``paper``, ``effort``, ``precision``, ``rival`` or ``rival_wrong``.
     make : callable
-        Makes it ready for a scene: returns a function from frame to depth and its slopes.
+        Prepares it for a scene: returns a function from frame to depth and its slopes.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Method:
 
 
 class Rivals:
-    """The methods that learn from balls, each trained once for a sensor.
+    """The methods that learn from ball presses, each trained once per sensor.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Rivals:
         self._trained: dict[tuple[str, str], Predict] = {}
 
     def predict(self, kind: str, scene: Scene) -> Predict:
-        """Return what a rival has learned from the balls of a scene's sensor."""
+        """Return the trained function of a rival for the sensor of a scene."""
         if scene.samples is None:
             raise InputError(
                 tr("There are no ball presses to learn from"),
@@ -82,7 +82,7 @@ class Rivals:
         return self._trained[key]
 
     def _learn(self, kind: str, samples: BallSamples, kept: Path | None) -> Predict:
-        """Train, or read what an earlier run has trained."""
+        """Train, or read the result of an earlier run."""
         if kind == "table":
             return fit_table(samples)
         if kind == "polynomial":

@@ -20,7 +20,7 @@ LOOK_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The machine, and what else ran on it.
+    """The machine, and other programs that ran on it.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class Machine:
         For a quiet machine.
     others_percent : float or None
         Processor time of all other programs while this one measured, in percent of one processor;
-        None where the system does not say.
+        None if the system does not report it.
     busiest : tuple of str
-        The other programs that were busiest when the waiting ended, with their percent.
+        The busiest other programs at the end of the waiting time, in percent.
     """
 
     processors: int
@@ -92,7 +92,7 @@ class Watch:
         self._start = time.monotonic(), _busy_s(), sum(os.times()[:4])
 
     def result(self) -> Machine:
-        """Return what was seen since the waiting ended."""
+        """Return the load since the end of the waiting time."""
         then, busy, own = self._start
         now = _busy_s()
         others = None

@@ -112,9 +112,9 @@ def write_work_precision(
     folder : Path
         Where the files are written.
     rules : sequence of RuleFigure, optional
-        What is left out, and what that saves.
+        Rules that skip work, and the time they save.
     machine : Machine, optional
-        On which it was measured, and what else ran.
+        The machine, and the other programs that ran.
 
     Raises
     ------

@@ -44,21 +44,21 @@ SHALLOW_MM = 0.03
 MOST_FRAMES = 4
 """Presses for the rules: each is solved a dozen times."""
 PREPARING = 0.4
-"""Share of a sensor's work that the calibration and the rendering are, for the progress."""
+"""Share of calibration and rendering in the work for a sensor, for the progress."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a sensor's images come from.
+    """Source of a sensor's images.
 
     Attributes
     ----------
     name : str
         Of the sensor.
     folder : Path
-        Its session; a virtual sensor's is simulated there, if it is not there yet.
+        Its session. That of a virtual sensor is simulated if it does not exist yet.
     kept : Path
-        Folder for its calibrations and larger images; what an earlier run has left is used.
+        Folder for its calibrations and larger images; results of an earlier run are used again.
     design : SensorDesign or None
         Of a virtual sensor.
     """
@@ -113,7 +113,7 @@ def measure_sensor(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> tuple[Point, ...]:
-    """Calibrate a sensor once, and measure every method at every size its images allow.
+    """Calibrate a sensor once, and measure every method at every possible image size.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def measure_sensor(
 
 
 def prepared(source: Source, seed: int, progress: Progress) -> tuple[Session, Scene]:
-    """Return a sensor's session and calibration; what an earlier run has left is used.
+    """Return a sensor's session and calibration; results of an earlier run are used again.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def prepared(source: Source, seed: int, progress: Progress) -> tuple[Session, Sc
 def measure_leaving_out(
     source: Source, *, seed: int = 0, repeats: int = REPEATS, progress: Progress | None = None
 ) -> tuple[RuleFigure, ...]:
-    """Measure what each rule that leaves out work saves and changes, at the session's size.
+    """Measure the saved time and the change of depth of each rule, at the session's size.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def render_larger(source: Source, scale: int, seed: int) -> Path:
 
 
 def _scale(width: int, scene: Scene, source: Source) -> float | None:
-    """Return a size over the session's; None where its images do not allow it."""
+    """Return a size over that of the session; None if its images do not allow it."""
     own = scene.full.camera.width
     if own % width == 0:
         return width / own

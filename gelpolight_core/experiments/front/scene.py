@@ -1,9 +1,9 @@
 """A calibrated sensor at any image size, with its presses.
 
 A sensor is calibrated once, at the size of its session's images. Smaller images are averages over
-pixels, with the calibration of that smaller camera: what changes from size to size is then the
-pixel, not the calibration. Images that are larger than the session's are rendered, which only a
-virtual sensor can.
+pixels, with the calibration of that smaller camera. Only the pixel size changes from size to size,
+not the calibration. Images that are larger than the session's are rendered, which only a virtual
+sensor can.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ class Scene:
     paper, full : Calibration
         By the paper's model, and refined.
     samples : BallSamples or None
-        What rivals learn from; None where only a calibration is known.
+        Training data of the rivals; None if only a calibration is known.
     kept : Path or None
-        Folder for what was trained.
+        Folder for trained rivals.
     """
 
     sensor: str
@@ -105,7 +105,7 @@ class Press:
 
 
 def calibrated_scene(session: Session, kept: Path, progress: Progress) -> Scene:
-    """Calibrate a session, or read what an earlier run has kept.
+    """Calibrate a session, or read the result of an earlier run.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def calibrated_scene(session: Session, kept: Path, progress: Progress) -> Scene:
 
 
 def session_presses(session: Session, names: Sequence[str] = ()) -> list[Press]:
-    """Read the presses with a flat top as the camera's own numbers where they are linear.
+    """Read the presses with a flat top, as camera values if these are linear.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _scaled(calibration: Calibration, scale: float, background: Map) -> Calibrat
     clean = np.maximum(unmix(light, calibration.crosstalk), 0.0).astype(np.float32)
     full = calibration.full
     if full is not None:
-        # Eq. 9 makes the factors of the background: what the pixels change there, they change here.
+        # The factors follow from the background (Eq. 9), so the new pixels change them, too.
         before = _on_grid(full.background, old, table.grid)
         share = np.divide(clean, before, out=np.ones_like(clean), where=before > 1e-3)
         factors = np.where(factors > 0.0, factors * share, 0.0).astype(np.float32)
@@ -240,9 +240,9 @@ def _scaled_camera(camera: Camera, scale: float, width: int, height: int) -> Cam
 
 
 def _on_grid(values: Map, old: MembraneGrid, new: MembraneGrid) -> Map:
-    """Return a map (rows, columns, 3) on another grid, averaged where that is coarser.
+    """Return a map (rows, columns, 3) on another grid, averaged if that is coarser.
 
-    0 is unknown; an average is of known values only, so that nothing fades towards the edge.
+    0 means unknown. Only known values are averaged, so that values do not decrease near the edge.
     """
     width = max(1, round(new.pitch_mm / old.pitch_mm))
     known = (values > 0.0).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Error against run time of one calibration, on presses whose truth is known."""
+"""Error against run time of one calibration, on presses with a known truth."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RENDERING = 0.4
 
 
 def usual_methods() -> tuple[Method, ...]:
-    """Return the methods of `USUAL`: those that one calibration suffices for."""
+    """Return the methods of `USUAL`, for which one calibration is sufficient."""
     return tuple(method for method in methods() if method.name in USUAL)
 
 
@@ -42,7 +42,7 @@ def measure_calibration(
     Parameters
     ----------
     calibration : Calibration
-        Of the sensor that the session is of.
+        Calibration of the session's sensor.
     folder : Path
         With ``presses/truth.csv`` and ``truth/*.npz``; cylinders and cuboids count.
     chosen : sequence of Method

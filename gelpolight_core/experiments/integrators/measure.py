@@ -31,19 +31,19 @@ SIDES = (40, 60, 120, 240, 480)
 MOST_SIDE = 240
 """Largest grid of the integrators that take seconds there."""
 ROUNDING_UM = 3e-5
-"""Below it single precision rounds: such errors do not decide an order."""
+"""Smaller errors are rounding errors of single precision and are not used for an order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Integrator:
-    """A way from slopes to depth.
+    """A method from slopes to depth.
 
     Attributes
     ----------
     name, label : str
         For files and people.
     make : callable
-        Makes it ready for a grid of one size: returns a function from surface to depth.
+        Prepares it for a grid of one size: returns a function from surface to depth.
     slow : bool
         Whether large grids take seconds.
     """
@@ -114,7 +114,7 @@ def measure_integrators(
     side : int, optional
         The same, on all surfaces.
     repeats : int, optional
-        Timed runs; one for those that take long.
+        Timed runs; one for slow integrators.
     progress : callable, optional
         Called with the present task and the share done.
     """
@@ -131,7 +131,7 @@ def measure_integrators(
 
 
 def integrator_order(points: Sequence[IntegratorPoint], name: str) -> Order | None:
-    """Return the order of an integrator on the smooth bump, above what rounding decides."""
+    """Return the order of an integrator on the smooth bump, without rounding errors."""
     mine = [p for p in points if p.name == name and p.scene == "bump" and p.mean_um > ROUNDING_UM]
     return fit_order([1.0 / p.side for p in mine], [p.mean_um for p in mine])
 

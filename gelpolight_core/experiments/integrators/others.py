@@ -24,7 +24,7 @@ def cosine_transform(slope_x: Array, slope_y: Array, pitch_mm: float) -> Array:
 
 
 def shifted_cosine_transform(slope_x: Array, slope_y: Array, pitch_mm: float) -> Array:
-    """Do the same with the faults that open tactile libraries share.
+    """Do the same with the faults that are common in open tactile libraries.
 
     Wave k is divided by the eigenvalue of wave k + 1, and differences over two nodes are not
     halved: depths are too low or too high, depending on the width of the contact.
@@ -85,7 +85,7 @@ def sparse_quadratic(
 
 
 def _sides(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Return what is before and after each edge along an axis."""
+    """Return the nodes before and after each edge along an axis."""
     all_, first, last = slice(None), slice(None, -1), slice(1, None)
     return ((all_, first), (all_, last)) if axis == 1 else ((first, all_), (last, all_))
 

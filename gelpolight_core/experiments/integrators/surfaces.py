@@ -27,7 +27,7 @@ class Surface:
     depth_mm, slope_x, slope_y : (side, side)
         Exact.
     weight : (side, side)
-        1, or 0 where no slope is known; slopes are 0 there.
+        1, or 0 where the slope is unknown; slopes are 0 there.
     hold : (side, side)
         1, or 0 next to a border that the surface crosses.
     pitch_mm : float
@@ -95,13 +95,13 @@ def _free_form(x: Array, y: Array) -> tuple[Array, Array, Array]:
 
 
 def _wedge(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Return a ramp with three upright sides, whose walls no slope shows."""
+    """Return a ramp with three vertical sides, which no slope shows."""
     on = (np.abs(y) < 2.0) & (np.abs(x) < 3.0)
     return np.where(on, 0.4 * (x + 3.0), 0.0), np.where(on, 0.4, 0.0), np.zeros_like(x)
 
 
 def _dome(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Return a hemisphere, whose vertical edge no image shows."""
+    """Return a hemisphere. No image shows its vertical edge."""
     square = x**2 + y**2
     on = square < 2.9**2
     z = np.sqrt(np.maximum(9.0 - square, 1e-3))
@@ -109,7 +109,7 @@ def _dome(x: Array, y: Array) -> tuple[Array, Array, Array]:
 
 
 def _half_wall(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Return two levels: joined by a ramp along one part, by an upright wall along the other."""
+    """Return two levels: joined by a ramp along one part, by a vertical wall along the other."""
     high = x > 0.0
     rise = np.clip((y + 3.0) / 3.0, 0.0, 1.0)
     ramp = high & (y > -3.0) & (y < 0.0)
@@ -127,5 +127,3 @@ SURFACES: dict[str, tuple[str, Callable[[Array, Array], tuple[Array, Array, Arra
     "dome": (tr("hemisphere"), _dome),
     "half_wall": (tr("two levels, a ramp and a vertical wall"), _half_wall),
 }
-STEEP = ("wedge", "dome", "half_wall")
-"""Surfaces with walls that no slope shows."""

@@ -1,8 +1,8 @@
 """The common method: one table from colour to slope, n = F(I) (the paper's Eq. 2).
 
-Light is assumed parallel and uniform, so that a colour means the same slope everywhere. The
-colour is the relative change I / I0 - 1. Colours that no ball has shown take the slope of the
-nearest one that a ball has shown.
+Light is assumed parallel and uniform, so that a colour gives the same slope everywhere. The colour
+is the relative change I / I0 - 1. Colours that no ball has shown get the slope of the nearest
+colour of a ball.
 """
 
 from __future__ import annotations
@@ -49,5 +49,5 @@ def fit_table(samples: BallSamples) -> Predict:
 
 
 def _bins(change: Map, low: Map, step: Map) -> NDArray[np.int32]:
-    # Clipped before the cast: a wall may change by more than whole numbers hold.
+    # Clipped before the cast: a wall can change by more than the range of integers.
     return np.asarray(np.clip((change - low) / step, 0, BINS - 1), np.int32)

@@ -1,7 +1,7 @@
 """A small neural network from colour and position to slope, as the open tactile libraries train.
 
 Three hidden layers of 128, 32 and 32 rectified units, trained on the angles of the slopes with
-Adam (Kingma and Ba 2015). Plain NumPy: no library of networks is needed for 6,000 numbers.
+Adam (Kingma and Ba 2015). Plain NumPy: 6,000 parameters need no neural network library.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STEPS, BATCH = 6000, 512
 RATE, DECAYS, TINY = 1e-2, (0.9, 0.999), 1e-8
 MOST_ANGLE = 1.4
 BLOCK = 1 << 13
-"""Pixels that are computed together: their values stay in the cache."""
+"""Pixels that are computed together, so that their values stay in the cache."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Network:
     layers : list of (weights, bias)
         In their order.
     middle, spread : (5,) float32
-        Of the inputs: colour changes, then position in mm.
+        Scales of the inputs: colour changes, then position in mm.
     """
 
     layers: Layers
@@ -43,7 +43,7 @@ class Network:
     spread: Map
 
     def __call__(self, change: Map, position_mm: Map) -> Map:
-        """Return the slopes (N, 2) of relative changes (N, 3) at places (N, 2)."""
+        """Return the slopes (N, 2) of relative changes (N, 3) at positions (N, 2)."""
         slopes = np.empty((len(change), 2), np.float32)
         for begin in range(0, len(change), BLOCK):
             part = slice(begin, begin + BLOCK)
@@ -95,7 +95,7 @@ def _trained(inputs: Map, angles: Map, seed: int, steps: int) -> Layers:
     rng = np.random.default_rng(seed)
     sizes = (inputs.shape[1], *UNITS, angles.shape[1])
     layers: Layers = [
-        # He et al. 2015: keeps the variance from layer to layer.
+        # He et al. 2015: keeps the variance constant from layer to layer.
         (
             (rng.standard_normal((a, b)) * np.sqrt(2.0 / a)).astype(np.float32),
             np.zeros(b, np.float32),

@@ -12,18 +12,17 @@ from gelpolight_core.experiments.rivals.samples import BallSamples, Map, Predict
 Array = NDArray[np.float64]
 DEGREE = 3
 PENALTIES = tuple(10.0**power for power in range(-8, 0))
-"""Tried for the ridge, relative to the mean square of a term."""
+"""Tested ridge penalties, relative to the mean square of a term."""
 BLOCK = 1 << 13
 """Pixels that are computed together: their terms stay in the cache."""
 CLIP = 3.0
-"""Inputs farther out, in standard deviations of the samples, count as this: a polynomial does not
-extrapolate."""
+"""Inputs are clipped at this number of standard deviations: a polynomial does not extrapolate."""
 
 
 def fit_polynomial(samples: BallSamples) -> Predict:
     """Fit slopes to powers of colour ratio and position.
 
-    The penalty is the one that predicts each ball best from the others.
+    The penalty is the one with the smallest error on balls that were left out.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 Predict = Callable[[Map, Map], Map]
-"""From relative changes (N, 3) and places in mm (N, 2) to slopes (N, 2)."""
+"""From relative changes (N, 3) and positions in mm (N, 2) to slopes (N, 2)."""
 
 FLAT_PIXELS = 4000
 AWAY_MM = 4.0
@@ -68,7 +68,7 @@ def relative_change(light: Map, background: Map) -> Map:
 
 
 def ball_samples(results: StageResults) -> BallSamples:
-    """Return the pixels of all ball presses of a calibration, in contact and well beside it.
+    """Return the pixels of all ball presses of a calibration, inside and far outside the contact.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def ball_samples(results: StageResults) -> BallSamples:
 
 
 def require_pixels(samples: BallSamples) -> None:
-    """Refuse samples that nothing can be learned from.
+    """Refuse samples that are not sufficient for training.
 
     Raises
     ------

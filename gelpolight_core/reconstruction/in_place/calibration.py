@@ -28,14 +28,14 @@ UNKNOWN = ("optics", "refraction", "temperature")
 
 @dataclass(frozen=True, slots=True)
 class ClosedSensor:
-    """What is stated of a closed sensor."""
+    """The stated data of a closed sensor."""
 
     serial: str
 
 
 @dataclass(frozen=True)
 class InPlaceCalibration:
-    """All that is known of a closed sensor.
+    """All known data of a closed sensor.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ def in_place_arrays(c: InPlaceCalibration) -> dict[str, NDArray[Any]]:
 
 
 def in_place_entry(c: InPlaceCalibration) -> dict[str, Any]:
-    """Return what of a closed sensor's calibration goes into the manifest."""
+    """Return the manifest entries of a closed sensor's calibration."""
     model = c.in_place
     return {
         "sensor": {"serial": c.sensor.serial},
@@ -160,7 +160,7 @@ def read_in_place(
     quality: Mapping[str, QualityTable],
     provenance: Provenance,
 ) -> InPlaceCalibration:
-    """Return the closed sensor's calibration of a file, all its values checked.
+    """Return the closed sensor's calibration of a file, with all values checked.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""How the colour of the membrane has changed since nothing touched it.
+"""Change of the membrane's colour relative to the untouched membrane.
 
-Both images are smoothed over 2 nodes first: the texture of a gel moves with it and would be read
-as slope (1.3 degrees on a GelSight Mini).
+Both images are smoothed over 2 nodes first: the texture of a gel moves with it and would look like
+slope (1.3 degrees on a GelSight Mini).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 
 SMOOTHING_NODES = 2.0
 OFFSET = 0.02
-"""Added to the background that a change is divided by, so that dark places do not shout."""
+"""Added to the background in the divisor, so that noise of dark areas is not amplified."""
 LARGEST_CHANGE = 4.0
 GAIN_STEP = 5
 
@@ -57,8 +57,8 @@ class ColourChange:
     Attributes
     ----------
     change : (rows, columns, 3) float32
-        Smoothed image less smoothed background, over the background.
-    trusted : (rows, columns) bool
+        Smoothed image minus smoothed background, divided by the background.
+    usable : (rows, columns) bool
         Known, not saturated and no marker.
     saturated : (rows, columns) bool
         A channel is at its upper end.
@@ -67,7 +67,7 @@ class ColourChange:
     """
 
     change: Map
-    trusted: Mask
+    usable: Mask
     saturated: Mask
     gain: NDArray[np.float64]
 
@@ -90,27 +90,27 @@ def colour_change(image: Map, base: Reference, *, follow_gain: bool = False) -> 
     base : Reference
         The untouched membrane.
     follow_gain : bool, optional
-        Whether a common change of each channel's brightness is divided out, as where the camera's
-        exposure wanders.
+        Whether a common change of each channel's brightness is corrected, for example when the
+        exposure changes.
     """
     # Channel by channel: a reduction over an axis of three is ten times slower.
     red, green, blue = (image[..., k] for k in range(3))
     finite: Mask = np.asarray(np.isfinite(red + green + blue))
     saturated = np.asarray(np.maximum(np.maximum(red, green), blue) >= SATURATED)
-    trusted = finite & base.known & ~saturated
+    usable = finite & base.known & ~saturated
     if base.markers:
-        trusted &= ~base.markers.covered(np.where(finite[..., None], image, base.background))
-    smooth = _smooth(image, trusted)
-    # Both from the same nodes: gaps move the place that an average stands for.
-    same = np.array_equal(trusted, base.plain)
-    there = base.smooth if same else _smooth(base.background, trusted)
+        usable &= ~base.markers.covered(np.where(finite[..., None], image, base.background))
+    smooth = _smooth(image, usable)
+    # Both from the same nodes: gaps shift the position of an average.
+    same = np.array_equal(usable, base.plain)
+    there = base.smooth if same else _smooth(base.background, usable)
     gain = np.ones(3)
     if follow_gain:
         gain = np.asarray(common_gain(smooth, base), np.float64)
         smooth = np.asarray(smooth / gain.astype(np.float32), np.float32)
     change = (smooth - there) / (there + np.float32(OFFSET))
     np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE, out=change)
-    return ColourChange(change, trusted, saturated, gain)
+    return ColourChange(change, usable, saturated, gain)
 
 
 def common_gain(smooth: Map, base: Reference) -> NDArray[np.float64]:
@@ -128,12 +128,12 @@ def common_gain(smooth: Map, base: Reference) -> NDArray[np.float64]:
     )
 
 
-def _smooth(rgb: Map, trusted: Mask) -> Map:
+def _smooth(rgb: Map, usable: Mask) -> Map:
     """Smooth an image, with the reliable nodes only."""
-    if trusted.all():
+    if usable.all():
         return np.asarray(cv2.GaussianBlur(rgb, (0, 0), SMOOTHING_NODES), np.float32)
-    share = cv2.GaussianBlur(trusted.astype(np.float32), (0, 0), SMOOTHING_NODES)
-    kept = np.where(trusted[..., None], rgb, np.float32(0.0))
+    share = cv2.GaussianBlur(usable.astype(np.float32), (0, 0), SMOOTHING_NODES)
+    kept = np.where(usable[..., None], rgb, np.float32(0.0))
     total = cv2.GaussianBlur(kept, (0, 0), SMOOTHING_NODES)
     whole = total / np.maximum(share, 1e-3)[..., None]
     return np.asarray(whole, np.float32)

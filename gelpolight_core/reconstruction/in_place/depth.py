@@ -26,7 +26,7 @@ STEEP_SHARE, REACH_MM = 0.25, 2.0
 """A contact crosses the border within this reach of walls, which have this share of the steepest
 slope. Small errors of the slopes over all of the field leave depth at the border, too."""
 LEAST_DEPTH_NODES = 0.5
-"""A map that is nowhere deeper is left alone."""
+"""A map that is nowhere deeper is not changed."""
 TOLERANCE, ROUGH_TOLERANCE = 1e-3, 1e-2
 
 
@@ -38,10 +38,10 @@ def depth_of(
     weight: Map,
     workers: RowWorkers | None = None,
 ) -> tuple[Map, bool]:
-    """Integrate slopes, the border free where a contact crosses it.
+    """Integrate slopes with a border that is free where a contact crosses it.
 
-    A coarse solution that is hardly held anywhere shows where the border is pressed. A second one
-    that is free there is the start of the fine solution, which has the details left to find.
+    A coarse solution with a nearly free border shows where the border is pressed. A second coarse
+    solution, free only there, is the start of the fine solution, which adds the details.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def depth_of(
             slope_x, slope_y, weight, pitch_mm=pitch_mm, tolerance=TOLERANCE, workers=workers
         )
         return whole.depth_mm, False
-    # A coarse node's spring stands for those of its share of the fine border.
+    # The weight of a coarse node represents that of its part of the fine border.
     coarse = integrate_weighted(
         small_x, small_y, small_weight, pitch_mm=pitch, hold=firm, tolerance=TOLERANCE
     ).depth_mm
@@ -129,8 +129,8 @@ def _firm(rough_mm: Map, near: NDArray[np.bool_], least_mm: float) -> Map | None
 def surface_slopes(depth_mm: Map, pitch_mm: float) -> tuple[Map, Map]:
     """Return the slopes (rows, columns) of a depth map along x and y.
 
-    They are those of a surface, unlike the slopes that each node's colour gives: what is
-    contradictory in these, 0.4 to 1.5 degrees on real sensors, the integration has removed.
+    They are those of a surface, unlike the slopes from the colours of single nodes. The integration
+    has removed the inconsistent part of those slopes, 0.4 to 1.5 degrees on real sensors.
     """
     slope_y, slope_x = np.gradient(depth_mm, np.float32(pitch_mm))
     return np.asarray(slope_x, np.float32), np.asarray(slope_y, np.float32)

@@ -1,8 +1,8 @@
-"""Where the pixels of a closed sensor lie on its membrane.
+"""Positions of the pixels of a closed sensor on its membrane.
 
-Nothing is known of lens and layers: a place is the pixel's distance from the image's centre times
-the scale, x right, y down. Large images are averaged over blocks of pixels, because the texture of
-a gel limits the resolution before the camera does.
+Lens and layers are unknown. A position is the distance of the pixel from the image centre times the
+scale, x right, y down. Large images are averaged over blocks of pixels, because the texture of the
+gel limits the resolution more than the camera.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from gelpolight_core.reflectance.contour import Circle
 
 Map = NDArray[np.float32]
 WORKING_SIDE = 320
-"""Nodes along the longer side of the grid, about."""
+"""Approximate number of nodes along the longer side of the grid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class WorkingGrid:
         return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.float32)
 
     def to_pixels(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Return the camera pixels (N, 2) at places (N, 2) on the membrane."""
+        """Return the camera pixels (N, 2) at positions (N, 2) on the membrane."""
         middle = 0.5 * (np.array([self.image.width, self.image.height]) - 1.0)
         return np.asarray(points_mm / self.mm_per_px + middle, np.float64)
 
@@ -94,7 +94,7 @@ class WorkingGrid:
         return Circle(x, y, circle.radius / self.factor)
 
     def table(self) -> ResamplingTable:
-        """Return the camera pixel of each node; rays are taken as vertical."""
+        """Return the camera pixel of each node; rays are assumed to be vertical."""
         grid = MembraneGrid(self.x_mm, self.y_mm, self.pitch_mm)
         columns, rows = (
             np.asarray(mm / self.mm_per_px + 0.5 * (n - 1), np.float32)

@@ -29,15 +29,15 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 COLOUR_CELLS = 32
-"""Cells along each channel of the record of colours that the balls have shown."""
+"""Cells along each channel of the table of colours that the balls have shown."""
 COLOUR_RANGE = (-1.0, 3.0)
 BEYOND_SLOPE = 1.1
-"""Slopes beyond the steepest that the balls have shown, times this, are extrapolated."""
+"""Slopes above the steepest slope of the balls times this factor are extrapolated."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorCurve:
-    """How far slopes and depths of presses that were left out are off.
+    """Errors of slopes and depths of presses that were left out.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class ErrorCurve:
 
 @dataclass(frozen=True)
 class InPlaceModel:
-    """A closed sensor's membrane: its background, and slope by change of colour and place.
+    """The membrane of a closed sensor: background, and slope from change of colour and position.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class InPlaceModel:
     errors : ErrorCurve
         Of presses that were left out.
     follow_gain : bool
-        Whether each frame's common brightness is divided out.
+        Whether a common change of brightness is corrected in each frame.
     scale_sd : float
         Relative standard deviation of `grid.mm_per_px`.
     """
@@ -96,7 +96,7 @@ class InPlaceModel:
         return reference(self.background)
 
     def change(self, rgb: Map) -> ColourChange:
-        """Return the change of colour that a camera image (height, width, 3) shows."""
+        """Return the change of colour in a camera image (height, width, 3)."""
         return colour_change(self.grid.reduce(rgb), self.reference, follow_gain=self.follow_gain)
 
     def slopes(self, change: Map, workers: RowWorkers | None = None) -> tuple[Map, Map]:
@@ -161,7 +161,7 @@ def colour_cells(change: Map) -> NDArray[np.int32]:
 @numba.njit(nogil=True, cache=True)
 def _cell(value, low, scale, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     position = (value - low) * scale
-    if not position > np.float32(0.0):  # also what is no number
+    if not position > np.float32(0.0):  # also values that are not numbers
         return 0
     return min(int(min(position, np.float32(last))), last)
 

@@ -23,17 +23,17 @@ Map = NDArray[np.float32]
 
 EXTRAPOLATED_WEIGHT = 0.3
 DIFFERENT = 0.12
-"""Median change of colour from which an image is not of this sensor's membrane."""
+"""Median change of colour above which an image does not show this sensor's membrane."""
 EXAMPLES = 6
 THINNED = 4
 NOISE_REACH = 8.0
-"""Nodes over which the noise's size is averaged: so few examples scatter."""
+"""Nodes over which the size of the noise is averaged, because there are few examples."""
 STEPS = (tr("change of colour"), tr("slopes"), tr("integration"))
 
 
 @dataclass(frozen=True, slots=True)
 class InPlaceDepth:
-    """What a closed sensor's image shows.
+    """Result from an image of a closed sensor.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class InPlaceDepth:
     slope_sd, depth_sd_mm : (rows, columns) float32 or None
         From the image's noise.
     slope_model_sd, depth_model_sd_mm : (rows, columns) float32 or None
-        By presses that were left out.
+        From the errors of presses that were left out.
     noise_mm : (examples, rows / 4, columns / 4) float32 or None
-        Errors of the depth that the image's noise could as well have made.
+        Examples of depth errors that the image's noise can cause.
     """
 
     depth_mm: Map
@@ -116,7 +116,7 @@ class InPlaceSolver:
             slope_x, slope_y = model.slopes(seen.change, self._threads)
             beyond = model.extrapolated(seen.change, slope_x, slope_y)
             weight = np.where(beyond, np.float32(EXTRAPOLATED_WEIGHT), np.float32(1.0))
-            weight[~seen.trusted] = 0.0
+            weight[~seen.usable] = 0.0
             reason.append(why)
         with record.done(STEPS[2], 3 * slope_x.nbytes) as reason:
             depth, crossed = depth_of(
@@ -130,7 +130,7 @@ class InPlaceSolver:
         flags = np.zeros(slope_x.shape, np.uint8)
         flags[beyond] |= np.uint8(Flag.EXTRAPOLATED.value)
         flags[seen.saturated] |= np.uint8(Flag.SATURATED.value)
-        flags[~seen.trusted & ~seen.saturated] |= np.uint8(Flag.INVALID.value)
+        flags[~seen.usable & ~seen.saturated] |= np.uint8(Flag.INVALID.value)
         notes = [free_boundary_note()] if crossed else []
         notes += [self._difference_note(seen.change)]
         if not with_normals:

@@ -1,4 +1,4 @@
-"""The polynomial from change of colour and place to slope: its terms, and the pass over a frame.
+"""The polynomial from change of colour and position to slope: its terms, and its evaluation.
 
 A term is a product of powers of the three channels' changes (degree 1 to 3) times a product of
 powers of x and y (degree 0 to 3). There is no term without colour: no change means no slope.
@@ -65,12 +65,12 @@ def _powers(values: Map, most: int) -> list[Map]:
 
 
 def penalty(*, position_growth: float, colour_growth: float) -> Array:
-    """Return how much the ridge costs each term (`TERMS`,), 1 for the simplest.
+    """Return the ridge penalty of each term (`TERMS`,), 1 for the simplest.
 
     Parameters
     ----------
     position_growth, colour_growth : float
-        By how much it grows with each degree in place, and in colour beyond the first.
+        Factor per degree in position, and per degree in colour above the first.
     """
     colour = np.array([sum(p) for p in COLOUR_TERMS], float)
     position = np.array([i + j for i, j in POSITION_TERMS], float)

@@ -1,13 +1,14 @@
-"""Integration that preserves steps: at each node the smoother of its two sides decides.
+"""Integration that preserves steps: each node follows the smoother of its two sides.
 
 Bilateral normal integration (Cao, Santo, Shi, Okura, Matsushita, ECCV 2022), for parallel
-projection. Each node states its slope to both of its neighbours along an axis; a logistic weight
-moves towards the side that the depth follows better, so that a wall, which no slope shows, breaks
-the chain at one edge and bends nothing beside it. Weights and depth are found in turn.
+projection. Each node gives its slope to both neighbours along an axis. A logistic weight prefers
+the side that agrees better with the depth. A wall, which no slope shows, therefore separates the
+surface at one edge and does not deform the surface beside it. Weights and depth are computed
+alternately.
 
-Two things differ from the paper. It weighs depth differences; here their residuals are weighed, so
-that a smooth flank keeps both of its sides. And residuals count by what is usual in the image, so
-that walls are found at any pitch and noise alone breaks nothing.
+Two things differ from the paper. The paper weights by depth differences; here the residuals are
+used, so that a smooth flank keeps both of its sides. Residuals are relative to typical residuals of
+the image, so that walls are found at any pitch, and noise alone separates nothing.
 """
 
 from __future__ import annotations
@@ -20,15 +21,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 STEEPNESS = 2.0
-"""Of the logistic weight: the paper's k, for residuals in units of an unremarkable one."""
+"""Steepness of the logistic weight: the paper's k, for residuals in units of a typical one."""
 UNUSUAL, FLOOR = 3.0, 0.1
-"""A residual is unremarkable up to this many medians, and up to this many pitches."""
+"""A residual is typical up to this multiple of the median, and of the pitch."""
 MOST_ROUNDS = 150
 SETTLED = 1e-5
 """Relative change of the energy below which the rounds end."""
 INNER_ROUNDS, INNER_TOLERANCE = 40, 1e-3
 LEAST_WEIGHT = 1e-6
-"""Of an edge, so that every part hangs together."""
+"""Least weight of an edge, so that all parts remain connected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class BilateralIntegration:
     depth_mm : (rows, columns) float64
         The median over the valid nodes next to the border is 0; not a number where not valid.
     rounds : int
-        Of weights and depth in turn.
+        Rounds of weights and depth.
     converged : bool
         Whether the energy converged.
     """
@@ -71,7 +72,7 @@ def integrate_bilateral(
     valid : (rows, columns) bool, optional
         Nodes with a slope; by default all that are finite.
     steepness : float, optional
-        How sharply one side is preferred; 0: never, which is plain least squares.
+        How strongly one side is preferred; 0: not at all, which is plain least squares.
 
     Raises
     ------
@@ -124,7 +125,7 @@ class _Sides:
         self._linked = known[first] & known[last]
 
     def edges(self, depth: Array | None, steepness: float) -> tuple[int, Array, Array]:
-        """Return axis, weight of each edge, and weight times the difference that is wanted."""
+        """Return axis, weight of each edge, and weight times the required difference."""
         first, last = _before(self._axis), _after(self._axis)
         ahead = np.full(self._slope.shape, 0.5) if depth is None else self._ahead(depth, steepness)
         near = np.where(self._linked, (ahead * self._trust)[first], 0.0)
@@ -139,7 +140,7 @@ class _Sides:
         return float(np.sum(self._trust * (ahead * after**2 + (1.0 - ahead) * before**2)))
 
     def _ahead(self, depth: Array, steepness: float) -> Array:
-        """Return the share of the weight of each node for the edge after it."""
+        """Return the share of each node's weight for the edge after it."""
         before, after = self._residuals(depth)
         preferred = steepness * self._trust * (before**2 - after**2) / self._typical(before, after)
         share = 1.0 / (1.0 + np.exp(-np.clip(preferred, -60.0, 60.0)))
@@ -147,13 +148,13 @@ class _Sides:
         return np.where(lonely_before, 1.0, np.where(lonely_after, 0.0, share))
 
     def _typical(self, before: Array, after: Array) -> float:
-        """Return the square of a residual that is still unremarkable."""
+        """Return the square of the largest typical residual."""
         linked = np.abs(after[_before(self._axis)][self._linked])
         usual = float(np.median(linked)) if linked.size else 0.0
         return max(UNUSUAL * usual, FLOOR) ** 2
 
     def _residuals(self, depth: Array) -> tuple[Array, Array]:
-        """Return by how much the edge before, and the one after, misses each node's slope."""
+        """Return the residuals of the edge before and the edge after each node."""
         first, last = _before(self._axis), _after(self._axis)
         difference = depth[last] - depth[first]
         before, after = np.zeros(depth.shape), np.zeros(depth.shape)
@@ -200,7 +201,7 @@ def _solved(edges: list[tuple[int, Array, Array]], start: Array) -> Array:
     depth, left = start.copy(), wanted - outflow(start)
     better = guess(left)
     direction, size = better.copy(), float(np.sum(left * better))
-    # Relative to the whole right-hand side: a start that is nearly right is left as it is.
+    # Relative to the whole right-hand side, so that a nearly correct start is not changed.
     enough = INNER_TOLERANCE**2 * float(np.sum(wanted * guess(wanted)))
     for _ in range(INNER_ROUNDS):
         if size <= enough:
@@ -224,7 +225,7 @@ def _after(axis: int) -> tuple[slice, slice]:
 
 
 def _ring(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the outermost nodes of the grid, or of what is valid where that is smaller."""
+    """Return the outermost nodes of the grid, or of its valid part if that is smaller."""
     rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
     ring = np.zeros(known.shape, bool)
     ring[[rows[0], rows[-1]], :] = True

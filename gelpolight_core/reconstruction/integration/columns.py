@@ -1,8 +1,8 @@
 """The part of the Poisson solver without a transform: tridiagonal equations along columns.
 
-A sine transform along the rows leaves, for every wave, one tridiagonal system down the columns. It
-is solved directly, many waves at a time, with one pass down and one up: a sixth of the work of
-transforms along the columns, and any number of rows costs alike.
+After a sine transform along the rows, each wave has one tridiagonal system along the columns. It is
+solved directly, many waves at a time, with one pass down and one up. This takes a sixth of the work
+of transforms along the columns, for any number of rows.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 BLOCK = 64
-# In decay lengths: what is left, exp(-2 * 12) and exp(-2 * 20), is below the rounding.
+# In decay lengths: the rest, exp(-2 * 12) and exp(-2 * 20), is below the rounding.
 _SETTLED = {np.dtype(np.float32): 12.0, np.dtype(np.float64): 20.0}
 
 _whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
@@ -44,9 +44,9 @@ def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) ->
 def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Solve ``-x[i-1] + (2 + wave) x[i] - x[i+1] = scale * field[i]`` in place, block by block.
 
-    Half a pixel outside the first and the last row x is 0: there the middle term is 3 + wave. Of
-    the elimination the distance of its factor from 1 is kept, which loses no digits for long
-    waves; sums run in double precision, whatever the field's is.
+    Half a pixel outside the first and the last row, x is 0: there the middle term is 3 + wave. The
+    elimination stores the difference of its factor from 1, which is accurate for long waves. Sums
+    are in double precision for any type of the field.
     """
     rows, columns = field.shape
     kept = np.empty((rows, BLOCK), np.float64)

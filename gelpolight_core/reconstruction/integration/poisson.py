@@ -1,16 +1,16 @@
-"""From slopes to depth: the Poisson equation on the grid, solved without iterating.
+"""From slopes to depth: direct solution of the Poisson equation on the grid.
 
 The unknowns are the depths at the pixel centres, and the depth is 0 on a border that lies half a
-pixel outside the outermost pixel centres: the outline of the grid's pixels. That is what the
-DST-II stands for; a DST-I would want depth 0 at pixel centres, so that either the outermost pixels
-are lost or a ring of slopes has to be made up.
+pixel outside the outermost pixel centres: the outline of the grid's pixels. This corresponds to the
+DST-II. A DST-I requires depth 0 at pixel centres, so that either the outermost pixels are lost or
+slopes of an additional ring must be invented.
 
 The right-hand side is built from *edge integrals*, the integral of the slope from one pixel centre
-to the next, which is what the difference of two depths is equal to. The matrix is therefore the
-plain five-point one for every stencil, and the order of the answer is that of the integral.
+to the next, which is equal to the difference of two depths. The matrix is therefore the plain
+five-point one for every stencil, and the order of the result is that of the integral.
 
-A sine transform along the rows parts the waves, and for each of them the tridiagonal system down
-the columns is solved directly: exact as a transform along both axes, and less work.
+A sine transform along the rows separates the waves. For each wave, the tridiagonal system along the
+columns is solved directly. This is as exact as a transform along both axes, and less work.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ FloatArray = NDArray[np.floating[Any]]
 Stencil = Literal[4, 2, 1]
 
 SLOPE_LIMIT = 10.0
-"""Steepest slope taken at face value, 84 degrees: from above, a steeper wall is seen over less
-than a tenth of its height and cannot be told from a fault of the image."""
+"""Largest slope that is used, 84 degrees. From above, a steeper wall is visible over less than a
+tenth of its height and cannot be distinguished from a fault of the image."""
 
 _TAPS = 5
 _TRANSFORM = 2
@@ -49,7 +49,7 @@ class Integration:
     sanitised_count : int
         Number of slope values (two per pixel) that were not finite and were set to 0.
     clipped_count : int
-        How many slope values were beyond the limit and brought back to it.
+        Number of slope values that were clipped to the limit.
     """
 
     depth_mm: FloatArray
@@ -66,7 +66,7 @@ class EdgeWeights:
     start_x, start_y : (padded columns,), (padded rows,) int
         First of the nodes.
     weight_x, weight_y : (padded columns, 5), (padded rows, 5)
-        What their slopes along x and y count.
+        Weights of their slopes along x and y.
     top, left : int
         Lines and columns of padding before the grid.
     """
@@ -87,12 +87,11 @@ class PoissonSolver:
     with depth 0 on the border). Edge integrals: ``h (-p[j-1] + 13 p[j] + 13 p[j+1] - p[j+2]) / 24``
     for stencil 4, one-sided integrals of the same order next to the border.
 
-    A length that the transform does not like (a prime factor above 5) is padded on both sides
-    with flat membrane, which moves the border outwards by the padding: nothing changes for a
-    contact that stays inside the grid. A grid of one row or one column is integrated along the
-    other axis.
+    A length with a prime factor above 5, for which the transform is slow, is padded on both sides
+    with flat membrane. This moves the border outwards by the padding and has no effect on a contact
+    inside the grid. A grid of one row or one column is integrated along the other axis.
 
-    An object may be used from several threads at once: it holds no working memory.
+    An object can be used by several threads at once: it has no working memory.
 
     Parameters
     ----------
@@ -113,7 +112,7 @@ class PoissonSolver:
     Raises
     ------
     ValueError
-        Where an argument is out of its range.
+        If an argument is out of range.
 
     Examples
     --------
@@ -162,13 +161,13 @@ class PoissonSolver:
         Parameters
         ----------
         slope_x, slope_y : (rows, columns)
-            d(depth)/dx along a row and d(depth)/dy down a column, mm per mm. Not changed; not
-            copied either where they are C-contiguous and of the solver's dtype.
+            d(depth)/dx along a row and d(depth)/dy along a column, mm per mm. They are not changed,
+            and not copied if they are C-contiguous and of the solver's dtype.
 
         Raises
         ------
         ValueError
-            Where a shape is not the solver's.
+            If a shape is not that of the solver.
         """
         for slope in (slope_x, slope_y):
             if np.shape(slope) != self.shape:
@@ -200,7 +199,7 @@ class PoissonSolver:
         Parameters
         ----------
         divergence : (padded rows, padded columns)
-            Made with `edges`; written over.
+            Made with `edges`; overwritten.
         """
         field, (rows, columns) = divergence, self.shape
         if 1 in self._axes:
@@ -243,7 +242,7 @@ def integrate_slopes(
     Raises
     ------
     ValueError
-        Where the slopes are not two maps of one shape, or an argument is out of its range.
+        If the slopes are not two maps of one shape, or an argument is out of range.
     """
     if np.ndim(slope_x) != 2:
         raise ValueError(f"slopes of shape {np.shape(slope_x)}, expected (rows, columns)")
@@ -285,7 +284,7 @@ def _waves(length: int) -> NDArray[np.float64]:
     """Eigenvalues of ``-d[j-1] + 2 d[j] - d[j+1]`` for the DST-II, whose index runs from 1 to N.
 
     The eigenvectors are sin(pi k (j + 1/2) / N): odd about half a pixel outside the border. In
-    double precision, whatever the transform's is: they reach 1e-8 beside 4.
+    double precision for any transform: they range from 1e-8 to 4.
     """
     k = np.arange(1, length + 1)
     return 4.0 * np.sin(np.pi * k / (2 * length)) ** 2

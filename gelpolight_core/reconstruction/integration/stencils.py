@@ -12,7 +12,7 @@ _part = njit(cache=True, nogil=True, fastmath=_flags, forceinline=True)
 
 @_part
 def _sound(source, limit):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return whether all slopes of a line are finite and none is too steep."""
+    """Return whether all slopes of a line are finite and within the limit."""
     sound = source.dtype.type(0)
     one, none = source.dtype.type(1), source.dtype.type(0)
     for column in range(source.shape[0]):
@@ -106,7 +106,7 @@ def divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
             loaded = begin
         while loaded < min(begin + 5, rows):
             bad, clipped = _clean(slope_y[loaded], ring[loaded % 5], limit)
-            # What is read by two threads is counted by one.
+            # Lines that two threads read are counted by one.
             if first <= loaded + top < last:
                 faults[loaded + top, 0] += bad
                 faults[loaded + top, 1] += clipped

@@ -24,8 +24,7 @@ Map = NDArray[np.float32]
 TOLERANCE = 3e-4
 MAX_ROUNDS = 60
 SHARED_NODES, SHARED_SUMS = 60_000, 200_000
-"""Transforms, and the passes between them, of a smaller grid are done before a second thread has
-woken."""
+"""For smaller grids, one thread finishes transforms and passes before a second thread starts."""
 
 _flags = {"nsz", "arcp", "contract", "reassoc"}
 _whole = numba.njit(nogil=True, fastmath=_flags, cache=True)
@@ -78,11 +77,10 @@ def integrate_weighted(
     start_mm : (rows, columns), optional
         A first guess.
     hold : (rows, columns), optional
-        Weight of depth 0 just outside the border, 0..1; by default 1 everywhere. Where a
-        contact crosses the border it is small, and what is around leads the depth.
+        Weight of depth 0 just outside the border, 0..1; by default 1 everywhere. Where a contact
+        crosses the border it is small, and the depth follows from the surroundings.
     tolerance : float, optional
-        Of what is left, relative to the depth itself, in the root of the mean squared weighted
-        slope.
+        Of the residual relative to the depth, as root mean square weighted slope.
     workers : RowWorkers, optional
         Threads; by default one.
     """
@@ -205,7 +203,7 @@ def _least(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 def _integral(a, b, before, after, weight_before, weight_after):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the mean slope of an edge from four nodes: its own two, and the next on each side.
 
-    One without any weight is left out.
+    Nodes without weight are left out.
     """
     first = _1 if weight_before > _0 else _0
     second = _1 if weight_after > _0 else _0
@@ -258,7 +256,7 @@ def _flow(first, last, slope_x, slope_y, weight, pitch, out):  # type: ignore[no
 
 @_whole
 def _apply(first, last, depth, weight, firm, out, sums):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Write the weighted differences' outflow of a depth map, and each row's product with it."""
+    """Write the divergence of the weighted differences of a depth map, and each row's product."""
     rows, columns = depth.shape
     edge = np.empty(columns, np.float32)
     for i in range(first, last):

@@ -43,7 +43,7 @@ class PaperDepth(NamedTuple):
     Attributes
     ----------
     depth_mm : (rows, columns) float32
-        Where each ray meets the undeformed surface.
+        Intersection of each ray with the undeformed surface.
     normals : (rows, columns, 3) float32 or None
         Unit normals, z < 0; None where they were not requested.
     flags : (rows, columns) uint8
@@ -82,12 +82,12 @@ class PaperSolver:
 
     @cached_property
     def boundary_nodes(self) -> NearBoundary:
-        """Where it shows that a contact crosses the boundary of the field."""
+        """Nodes at which a contact across the boundary of the field is visible."""
         return nodes_near_boundary(self.calibration)
 
     @cached_property
     def ray_spread_per_mm(self) -> float:
-        """How fast the rays run apart on the way down to the membrane, as a share per mm."""
+        """Relative divergence of the rays per mm of depth."""
         table = self.calibration.table
         rows, columns = table.grid.shape
         here = np.s_[rows // 4 : 3 * rows // 4, columns // 4 : 3 * columns // 4]
@@ -145,7 +145,7 @@ class PaperSolver:
 
 
 def shading_maps(calibration: Calibration) -> ShadingMaps:
-    """Gather a calibration's maps as the fused pass wants them."""
+    """Return the maps of a calibration in the form for the fused pass."""
     table = calibration.table
     strength = calibration.radiance * calibration.factors
     known = usable(table.valid, calibration.radiance, calibration.factors)

@@ -1,8 +1,7 @@
 """Normals of the membrane from one image: the paper's model (Eq. 10), in one fused pass.
 
 Resampling, division by light and factor, the reflectance table and the 3x3 solve are done block by
-block of nodes, so that each byte of the image is read once. Lights are frozen at the flat
-membrane.
+block of nodes, so that each byte of the image is read once. Lights are those of the flat membrane.
 """
 
 from __future__ import annotations
@@ -32,14 +31,14 @@ Gain = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ShadingMaps:
-    """What the pass needs of a calibration, as float32 arrays.
+    """Data of a calibration for the pass, as float32 arrays.
 
     Attributes
     ----------
     u_px, v_px : (rows, columns)
         Raw pixel of each node; negative where it is not seen.
     gain : (rows, columns, 3)
-        1 / (rho |L|); 0 where the node is of no use.
+        1 / (rho |L|); 0 where the node is not usable.
     lookup : (3, size)
         R sampled evenly (Eq. 7).
     lookup_scale : (3,)
@@ -86,9 +85,9 @@ class SlopeField:
 
 
 class SlopeSolver:
-    """Solves Eq. (10) for images of one sensor; what does not change is prepared once.
+    """Solves Eq. (10) for images of one sensor; constant data are prepared once.
 
-    It may be called from several threads, which then wait for each other.
+    Several threads can call it; they then wait for each other.
 
     Parameters
     ----------
@@ -139,7 +138,7 @@ class SlopeSolver:
         slopes: bool = False,
         gain: Gain | None = None,
     ) -> tuple[Map, SlopeField]:
-        """Return what `solver` makes the depth of, and the slopes where they are wanted.
+        """Return the divergence of the slopes for `solver`, and the slopes if requested.
 
         One pass, which is quicker than :meth:`solve` and :meth:`PoissonSolver.integrate`.
 
@@ -150,7 +149,7 @@ class SlopeSolver:
         solver : PoissonSolver
             Of the same grid, in single precision.
         slopes : bool, optional
-            Whether they are wanted beside the flags; the length's error is not made.
+            Whether the slopes are returned, too; the error of the length is not computed.
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
@@ -179,7 +178,7 @@ class SlopeSolver:
     def _of_image(
         self, raw: NDArray[Any], gain: Gain | None
     ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Return an image and the sensor as the kernels want them."""
+        """Return an image and the sensor in the form for the kernels."""
         height, width = raw.shape[:2]
         # numba would compile the kernel a second time for a read-only array.
         raw = np.require(raw, requirements=["C", "W"])
@@ -228,9 +227,9 @@ def solve_slopes(raw: NDArray[Any], maps: ShadingMaps, *, workers: int = 1) -> S
 
 
 def _blocks(maps: ShadingMaps) -> tuple[Map, NDArray[np.bool_]]:
-    """Return pixels and gains, block by block, and which blocks have any node of use.
+    """Return pixels and gains, block by block, and which blocks have usable nodes.
 
-    Nodes of no use have gain 0.
+    Unusable nodes have gain 0.
     """
     rows, columns = maps.u_px.shape
     count = -(-columns // BLOCK)

@@ -9,32 +9,32 @@ USED = Known("A-1", (1280, 960))
 
 
 def test_without_a_calibration_the_advice_is_to_choose_one() -> None:
-    assert measuring_advice(LiveState(), held=False, refused="").act == "sensors"
-    demo = measuring_advice(LiveState(kind="virtual", serial="V"), held=False, refused="")
+    assert measuring_advice(LiveState(), frozen=False, refused="").act == "sensors"
+    demo = measuring_advice(LiveState(kind="virtual", serial="V"), frozen=False, refused="")
     assert demo.act == "calibrate"
 
 
 def test_images_of_another_sensor_or_size_are_refused_with_both_values() -> None:
     other = LiveState(kind="recording", serial="B-2", size=(1280, 960), used=USED)
-    found = measuring_advice(other, held=False, refused="")
+    found = measuring_advice(other, frozen=False, refused="")
     assert not found.usable
     assert "A-1" in found.text
     assert "B-2" in found.text
     small = LiveState(kind="camera", size=(640, 480), used=USED)
-    assert "640x480" in measuring_advice(small, held=False, refused="").text
+    assert "640x480" in measuring_advice(small, frozen=False, refused="").text
 
 
 def test_a_press_is_requested_and_a_frozen_one_needs_no_advice() -> None:
     ready = LiveState(kind="camera", size=(1280, 960), used=USED)
-    assert "Press" in measuring_advice(ready, held=False, refused="").text
-    assert measuring_advice(ready, held=True, refused="").text == ""
-    noted = measuring_advice(ready, held=True, refused="", notes=("it is dim.", "it is cut off"))
+    assert "Press" in measuring_advice(ready, frozen=False, refused="").text
+    assert measuring_advice(ready, frozen=True, refused="").text == ""
+    noted = measuring_advice(ready, frozen=True, refused="", notes=("it is dim.", "it is cut off"))
     assert (noted.text, noted.role) == ("It is dim. It is cut off.", "warn")
-    refused = measuring_advice(ready, held=True, refused="it is grey")
+    refused = measuring_advice(ready, frozen=True, refused="it is grey")
     assert (refused.text, refused.act) == ("it is grey", "live")
 
 
 def test_a_calibration_being_read_is_not_reported_missing() -> None:
-    for held in (False, True):
-        found = measuring_advice(LiveState(reading=True), held=held, refused="")
+    for frozen in (False, True):
+        found = measuring_advice(LiveState(reading=True), frozen=frozen, refused="")
         assert "calibration" in found.text and not found.act

@@ -287,7 +287,7 @@ def test_a_steady_press_is_frozen_and_detected_automatically(
         context.source.choose(info)
     _measured(page, qtbot)
     press_view = page.press_view
-    assert press_view.hold_action.isChecked()
+    assert press_view.freeze_action.isChecked()
     assert press_view.work.tool.name == "cylinder"
     held = press_view.work.result.measurement.as_json()
 
@@ -297,7 +297,7 @@ def test_a_steady_press_is_frozen_and_detected_automatically(
     _measured(page, qtbot)
     assert press_view.work.result.measurement.as_json() == held
 
-    press_view.hold_action.trigger()
+    press_view.freeze_action.trigger()
     assert press_view.work.image is None
     assert not press_view.panel.keep.isEnabled()
 
@@ -341,12 +341,12 @@ def test_a_recording_can_be_measured_frame_by_frame(
     page.open_path(path)
     press_view = page.press_view
     qtbot.waitUntil(lambda: press_view.replay.isVisible(), timeout=PATIENCE_MS)
-    qtbot.waitUntil(lambda: press_view.hold_action.isEnabled(), timeout=PATIENCE_MS)
-    press_view.hold()
+    qtbot.waitUntil(lambda: press_view.freeze_action.isEnabled(), timeout=PATIENCE_MS)
+    press_view.freeze()
     assert press_view.work.image is not None
     press_view.replay.findChild(QAction, "replay.on").trigger()
     assert press_view.work.image is None
-    qtbot.waitUntil(lambda: press_view.hold_action.isEnabled(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: press_view.freeze_action.isEnabled(), timeout=PATIENCE_MS)
 
 
 def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(

@@ -12,10 +12,10 @@ import cv2
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.measure.measuring import Answer, MeasuredImage, Measuring, Question
+from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.sheet import Sheet
 from app.measure.work import Work
-from app.services.newest_wins import Answered, NewestWins
+from app.services.newest_wins import Finished, NewestWins
 from app.sources.source import Frame
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -35,14 +35,14 @@ def test_a_removed_image_is_released_and_the_next_one_is_measured(
     work = Work()
     work.use(Reconstructor(small_calibration))
     work.take(image)
-    qtbot.waitUntil(lambda: work.answer is not None, timeout=PATIENCE_MS)
-    assert work.answer is not None
-    linear = weakref.ref(work.answer.linear)
+    qtbot.waitUntil(lambda: work.image_results is not None, timeout=PATIENCE_MS)
+    assert work.image_results is not None
+    linear = weakref.ref(work.image_results.linear)
     work.take(None)
     assert not work.busy
     qtbot.waitUntil(lambda: linear() is None)
     work.take(image)
-    qtbot.waitUntil(lambda: work.answer is not None and not work.busy, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: work.image_results is not None and not work.busy, timeout=PATIENCE_MS)
     work.close()
 
 
@@ -76,17 +76,17 @@ def test_results_of_an_earlier_calibration_are_not_shown(
     begun, arrived = threading.Event(), list[str]()
 
     class Slow(Measuring):
-        def __call__(self, question: Question | None) -> Answer | None:
-            if question is not None:
+        def __call__(self, request: MeasureRequest | None) -> ImageResults | None:
+            if request is not None:
                 begun.set()
-                assert go[question.calibration.sensor.serial].wait(60.0)
-            return super().__call__(question)
+                assert go[request.calibration.sensor.serial].wait(60.0)
+            return super().__call__(request)
 
     class Watched(NewestWins[Any, Any]):
-        def take(self) -> Answered[Any, Any] | None:
+        def take(self) -> Finished[Any, Any] | None:
             found = super().take()
             if found is not None:
-                arrived.append(found.question.calibration.sensor.serial)
+                arrived.append(found.request.calibration.sensor.serial)
             return found
 
     monkeypatch.setattr("app.measure.work.Measuring", Slow)
@@ -114,7 +114,7 @@ def test_a_frame_of_another_sensor_is_refused_though_its_size_fits(
     measuring, model = Measuring(), small_calibration.model
     for serial in ("", small_calibration.sensor.serial):
         image = MeasuredImage("press", frame=frame, serial=serial)
-        assert measuring(Question(small_calibration, model, image, Sheet())) is not None
+        assert measuring(MeasureRequest(small_calibration, model, image, Sheet())) is not None
     image = MeasuredImage("press", frame=frame, serial="B-2")
     with pytest.raises(InputError, match="sensor B-2"):
-        measuring(Question(small_calibration, model, image, Sheet()))
+        measuring(MeasureRequest(small_calibration, model, image, Sheet()))

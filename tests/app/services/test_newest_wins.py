@@ -1,4 +1,4 @@
-"""Only the newest question is answered; no older answer follows."""
+"""Only the newest request is processed; no older result follows."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ import weakref
 from app.services.newest_wins import NewestWins
 
 
-def answer_of(worker: NewestWins, timeout_s: float = 5.0):  # type: ignore[no-untyped-def]
-    """Return the next answer."""
+def finished_of(worker: NewestWins, timeout_s: float = 5.0):  # type: ignore[no-untyped-def]
+    """Return the next result."""
     end = time.monotonic() + timeout_s
     while time.monotonic() < end:
-        answered = worker.take()
-        if answered is not None:
-            return answered
+        finished = worker.take()
+        if finished is not None:
+            return finished
         time.sleep(0.005)
-    raise AssertionError("no answer came")
+    raise AssertionError("no result came")
 
 
-def test_a_newer_question_replaces_a_waiting_one() -> None:
+def test_a_newer_request_replaces_a_waiting_one() -> None:
     gate, began, asked = threading.Event(), threading.Event(), []
 
-    def slow(question: int) -> int:
-        asked.append(question)
+    def slow(request: int) -> int:
+        asked.append(request)
         began.set()
         assert gate.wait(5.0)
-        return 10 * question
+        return 10 * request
 
     worker = NewestWins(slow, name="test-newest")
-    worker.ask(1)
+    worker.submit(1)
     assert began.wait(5.0)
-    for question in range(2, 20):
-        worker.ask(question)
+    for request in range(2, 20):
+        worker.submit(request)
     gate.set()
-    while answer_of(worker).question != 19:
+    while finished_of(worker).request != 19:
         pass
     assert asked == [1, 19]
     assert worker.idle
@@ -43,30 +43,30 @@ def test_a_newer_question_replaces_a_waiting_one() -> None:
 
 
 def test_an_error_is_passed_on_and_the_thread_continues() -> None:
-    def fails(question: int) -> float:
-        return 1.0 / question
+    def fails(request: int) -> float:
+        return 1.0 / request
 
     worker = NewestWins(fails, name="test-errors")
-    worker.ask(0)
-    assert isinstance(answer_of(worker).error, ZeroDivisionError)
-    worker.ask(2)
-    assert answer_of(worker).answer == 0.5
+    worker.submit(0)
+    assert isinstance(finished_of(worker).error, ZeroDivisionError)
+    worker.submit(2)
+    assert finished_of(worker).result == 0.5
     assert worker.stop()
 
 
 def test_a_stopped_worker_leaves_no_thread() -> None:
-    worker = NewestWins(lambda question: question, name="test-stops")
+    worker = NewestWins(lambda request: request, name="test-stops")
     assert worker.stop()
     assert "test-stops" not in {thread.name for thread in threading.enumerate()}
 
 
-def test_an_answer_is_not_kept_after_it_was_read() -> None:
+def test_a_result_is_not_kept_after_it_was_read() -> None:
     class Heavy:
         pass
 
     worker = NewestWins(lambda _question: Heavy(), name="test-kept")
-    worker.ask(0)
-    kept = weakref.ref(answer_of(worker).answer)
+    worker.submit(0)
+    kept = weakref.ref(finished_of(worker).result)
     end = time.monotonic() + 5.0
     while kept() is not None and time.monotonic() < end:
         time.sleep(0.005)

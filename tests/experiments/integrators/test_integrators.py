@@ -18,9 +18,12 @@ from gelpolight_core.experiments.integrators.others import (
     shifted_cosine_transform,
     sparse_quadratic,
 )
-from gelpolight_core.experiments.integrators.surfaces import STEEP, SURFACES, surface
+from gelpolight_core.experiments.integrators.surfaces import SURFACES, surface
 from gelpolight_core.experiments.orders import fit_order
 from gelpolight_core.reconstruction.integration.bilateral import integrate_bilateral
+
+STEEP = ("wedge", "dome", "half_wall")
+"""Surfaces with walls that no slope shows."""
 
 
 @cache
