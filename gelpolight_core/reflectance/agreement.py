@@ -78,8 +78,9 @@ class PressAgreement:
         limit = ODD_WARN_PERCENT / 100.0
         if self.usual_odd_share > limit:
             return tr(
-                "no press looks like a ball under these lights: check the LEDs, the exposure and"
-                " the ball radii, and repeat mirror, whiteboard and background"
+                "no press follows a single reflectance curve. On a very glossy membrane this is"
+                " normal if the figures of the joint refinement pass; otherwise check the LEDs, the"
+                " exposure and the ball radii, and repeat mirror, whiteboard and background"
             )
         if self.odd_share > limit:
             return tr(

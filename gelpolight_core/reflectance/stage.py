@@ -189,7 +189,11 @@ def _judge(
                 "%",
                 warn=8.0,
                 fail=25.0,
-                advice=tr("Check ball radii and LED positions, then repeat the worst presses"),
+                advice=tr(
+                    "On a very glossy membrane this is normal if the figures of the joint"
+                    " refinement pass; otherwise check ball radii and LED positions, then repeat"
+                    " the worst presses"
+                ),
             ),
             judge(
                 "outlier_percent",
