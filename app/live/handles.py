@@ -29,11 +29,6 @@ class Handle:
     v: float
     radius_px: float = 0.0
 
-    @property
-    def grip_position(self) -> tuple[float, float]:
-        """The resize point of a circle: its rightmost point."""
-        return self.u + self.radius_px, self.v
-
 
 def handles_of(overlay: Overlay) -> tuple[Handle, ...]:
     """Return all handles, in the order of the keyboard."""
@@ -50,7 +45,7 @@ def find_grip(
     for handle in handles:
         near.append((math.hypot(handle.u - u, handle.v - v), handle, Grip.CENTRE))
         if handle.radius_px > 0.0:
-            # The whole rim resizes, so that nobody has to aim at the small square.
+            # The whole circle resizes, so that nobody has to aim at the small square.
             off = abs(math.hypot(handle.u - u, handle.v - v) - handle.radius_px)
             near.append((off, handle, Grip.RADIUS))
     near = [item for item in near if item[0] <= reach_px]

@@ -86,9 +86,9 @@ def kinds() -> tuple[Kind, ...]:
             tr("Circle"),
             "C",
             (
-                tr("Click a point on the rim"),
-                tr("Click a second point on the rim"),
-                tr("Click a third point on the rim"),
+                tr("Click a point on the edge"),
+                tr("Click a second point on the edge"),
+                tr("Click a third point on the edge"),
             ),
         ),
         Kind(

@@ -30,8 +30,8 @@ class RefractionStep(StepPresenter):
             tr("Refraction"),
             (Stage.BALLS,),
             tr(
-                "Compare a press near the rim before and after the correction. The ellipse of the "
-                "contact must have become a circle."
+                "Compare a press near the edge of the field before and after the correction. The "
+                "ellipse of the contact must have become a circle."
             ),
             "ball",
         )
