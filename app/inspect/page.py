@@ -17,6 +17,7 @@ from app.inspect.actions import FileActions
 from app.inspect.modes import ModeChoice
 from app.inspect.processing_panel import ProcessedLine
 from app.inspect.record_control import RecordControl
+from app.inspect.second_dock import SecondDock
 from app.inspect.stream import DepthStream
 from app.inspect.views import Views
 from app.live.advice import advise
@@ -70,9 +71,10 @@ class InspectPage(QWidget):
         self._pixel_map: PixelMap | None = None
         self._shown: Shown | None = None
         self._recorded = ""
+        self.second = SecondDock(self.views, self, context=context)
         self._lay_out()
         self._connect()
-        self.views.restore()
+        self.second.restore()
 
     def _lay_out(self) -> None:
         foot = QWidget()
@@ -144,6 +146,7 @@ class InspectPage(QWidget):
         self._texts = QTimer(self)
         self._texts.setInterval(TEXT_MS)
         self._texts.timeout.connect(self._show_texts)
+        self._texts.timeout.connect(self.second.show_texts)
 
     # Called by the main window
 
@@ -151,6 +154,7 @@ class InspectPage(QWidget):
         """Show the source through the calibration in use."""
         self._want()
         self.depth.enter()
+        self.second.enter()
         self._texts.start()
         self.setFocus()
 
@@ -159,6 +163,7 @@ class InspectPage(QWidget):
         self._texts.stop()
         self.recorder.stop()
         self.live.enter(False)
+        self.second.leave()
         self.views.keep()
 
     def may_close(self) -> bool:
@@ -168,6 +173,7 @@ class InspectPage(QWidget):
         self.views.keep()
         self.jobs.close()
         self.modes.close()
+        self.second.finish()
         self.depth.finish()
         self.views.finish()
         return True
@@ -183,6 +189,10 @@ class InspectPage(QWidget):
     def show_stream(self) -> None:
         """Show what is sent to other programs."""
         self.stream.show_dialog()
+
+    def show_second_sensor(self) -> None:
+        """Show a second sensor beside the first one."""
+        self.second.open()
 
     def begin_demo(self) -> None:
         """Use the virtual sensor."""

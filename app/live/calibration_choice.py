@@ -30,11 +30,17 @@ WARM_FROM = 0.2
 
 
 class CalibrationBox(ComboBox):
-    """The calibrations of the library. Selecting one puts it into use."""
+    """The calibrations of the library. Selecting one puts it into use.
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    Parameters
+    ----------
+    page : str, optional
+        First part of the object name.
+    """
+
+    def __init__(self, parent: QWidget | None = None, *, page: str = "inspect") -> None:
         super().__init__(parent)
-        named(self, "inspect.calibration", tr("Calibration in use"))
+        named(self, f"{page}.calibration", tr("Calibration in use"))
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(WIDTH_CHARACTERS)
 

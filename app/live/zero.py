@@ -27,7 +27,8 @@ from gelpolight_core.reconstruction.background_shift import (
 from gelpolight_core.translation import tr
 
 FRAMES = 8
-SUFFIX = "-zero"
+SUFFIX, SECOND_SUFFIX = "-zero", "-zero-2"
+"""Ends of the names of calibrations set to zero: each sensor that is open has a file of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +61,15 @@ class ZeroControl(QObject):
         Runs the computation.
     context : AppContext
         Holds the library and the messages.
+    suffix : str, optional
+        End of the name of the calibration set to zero.
     """
 
-    def __init__(self, live: LiveSession, jobs: Jobs, *, context: AppContext) -> None:
+    def __init__(
+        self, live: LiveSession, jobs: Jobs, *, context: AppContext, suffix: str = SUFFIX
+    ) -> None:
         super().__init__(live)
+        self._suffix = suffix
         self._live, self._jobs, self._context = live, jobs, context
 
     def set_zero(self) -> None:
@@ -76,12 +82,12 @@ class ZeroControl(QObject):
 
     def _on_captured(self, frames: list[NDArray[Any]]) -> None:
         workspace = self._context.workspace
-        used = workspace.in_use
+        used, suffix = workspace.in_use, self._suffix
         if used is not None:
             self._jobs.submit(
                 Job(
                     tr("Setting zero"),
-                    lambda _progress: zero_calibration(workspace, used, frames),
+                    lambda _progress: zero_calibration(workspace, used, frames, suffix=suffix),
                     self._on_zeroed,
                     self._on_failed,
                 )
@@ -114,7 +120,9 @@ class ZeroControl(QObject):
         self._context.requests.calibrations_changed.emit()
 
 
-def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[Any]]) -> Zeroed:
+def zero_calibration(
+    workspace: Workspace, used: Path, frames: Sequence[NDArray[Any]], *, suffix: str = SUFFIX
+) -> Zeroed:
     """Write the calibration in use with the present background, and put it into use.
 
     The new file is next to the original, which is not changed. Zeroing again replaces the new file.
@@ -127,6 +135,8 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
         The calibration in use, which may itself be one set to zero.
     frames : sequence of (height, width, 3)
         Images of the untouched sensor.
+    suffix : str, optional
+        End of the name of the new file.
 
     Raises
     ------
@@ -138,7 +148,7 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
     before = background_shift(frames[0], calibration)
     made = datetime.now(UTC).isoformat(timespec="seconds")
     changed = zeroed(calibration, frames, operator=user_name(), made=made)
-    path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")
+    path = origin.with_name(f"{origin.stem}{suffix}{ENDING}")
     write_calibration(changed, path)
     workspace.use(path)
     return Zeroed(path, origin, before)
@@ -146,8 +156,8 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
 
 def original_of(used: Path) -> Path:
     """Return the original of a calibration set to zero. Any other is its own original."""
-    if used.stem.endswith(SUFFIX):
-        origin = used.with_name(f"{used.stem.removesuffix(SUFFIX)}{ENDING}")
-        if origin.is_file():
+    for suffix in (SUFFIX, SECOND_SUFFIX):
+        origin = used.with_name(f"{used.stem.removesuffix(suffix)}{ENDING}")
+        if used.stem.endswith(suffix) and origin.is_file():
             return origin
     return used

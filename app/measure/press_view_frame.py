@@ -66,8 +66,7 @@ class PressViewFrame(QMainWindow):
         self.setWindowFlags(Qt.WindowType.Widget)
         self.context = context
         self.work = Work(self)
-        self.box = CalibrationBox()
-        self.box.setObjectName("measure.calibration")
+        self.box = CalibrationBox(page="measure")
         self.live = LiveSession(context=context, name="measure live", parent=self)
         self.depth = LiveDepth(self.live, jobs, self.box, context=context)
         idle = tr("Place a tool, or detect the object. Press Space to return to the camera.")

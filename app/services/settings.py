@@ -178,14 +178,38 @@ class Settings:
     @property
     def source(self) -> tuple[str, Path | None]:
         """Kind and file of the source that was selected last. An empty kind: none."""
-        file = self._text("source/file")
-        return self._text("source/kind"), Path(file) if file else None
+        return self._source("source")
 
     @source.setter
     def source(self, chosen: tuple[str, Path | None]) -> None:
+        self._keep_source("source", chosen)
+
+    @property
+    def second_source(self) -> tuple[str, Path | None]:
+        """The same for the second sensor of Inspect."""
+        return self._source("second_sensor")
+
+    @second_source.setter
+    def second_source(self, chosen: tuple[str, Path | None]) -> None:
+        self._keep_source("second_sensor", chosen)
+
+    @property
+    def second_sensor(self) -> bool:
+        """Whether Inspect shows a second sensor."""
+        return self._text("second_sensor/open") == "yes"
+
+    @second_sensor.setter
+    def second_sensor(self, on: bool) -> None:
+        self._store.setValue("second_sensor/open", "yes" if on else "no")
+
+    def _source(self, group: str) -> tuple[str, Path | None]:
+        file = self._text(f"{group}/file")
+        return self._text(f"{group}/kind"), Path(file) if file else None
+
+    def _keep_source(self, group: str, chosen: tuple[str, Path | None]) -> None:
         kind, file = chosen
-        self._store.setValue("source/kind", kind)
-        self._store.setValue("source/file", "" if file is None else str(file))
+        self._store.setValue(f"{group}/kind", kind)
+        self._store.setValue(f"{group}/file", "" if file is None else str(file))
 
     @property
     def limits(self) -> Limits:

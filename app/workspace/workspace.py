@@ -3,6 +3,7 @@
 ::
 
     workspace.json                       the calibration in use
+    second-sensor.json                   the one of the second sensor of Inspect
     sensors/SERIAL/NAME.gplcal           calibrations, with NAME.validation.json next to them
     sensors/SERIAL/sessions/NAME/        session folders
     sensors/SERIAL/recordings/TIME.gplrec
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from gelpolight_core.sensor_calibration import Calibration
 
 ENDING = ".gplcal"
-STATE = "workspace.json"
+STATE, SECOND_STATE = "workspace.json", "second-sensor.json"
 NAME_BYTES = 160
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{n}{k}" for n in ("COM", "LPT") for k in range(10))}
 
@@ -51,10 +52,12 @@ class Workspace:
     ----------
     folder : Path
         It need not exist. It is created when the first file is added.
+    state : str, optional
+        Name of the file that keeps the calibration in use.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, *, state: str = STATE) -> None:
+        self.folder, self._state = folder, state
         self._records: Records | None = None
 
     @property
@@ -214,7 +217,7 @@ class Workspace:
     def in_use(self) -> Path | None:
         """The calibration in use. None if none was selected or it no longer exists."""
         try:
-            stored = parse_json(read_file(self.folder / STATE))["in_use"]
+            stored = parse_json(read_file(self.folder / self._state))["in_use"]
             path = self.folder / stored
             inside = ".." not in path.parts and path.is_relative_to(self.sensors_folder)
             return path if inside and path.is_file() else None
@@ -234,7 +237,7 @@ class Workspace:
             self._refuse_outside(path)
         text = json.dumps({"in_use": path and path.relative_to(self.folder).as_posix()}) + "\n"
         make_folder(self.folder)
-        write_bytes(self.folder / STATE, text.encode())
+        write_bytes(self.folder / self._state, text.encode())
 
     def import_calibration(self, source: Path) -> Path:
         """Copy a calibration file into the folder of its sensor, completely or not at all.
