@@ -3,7 +3,7 @@
 A path tracer of the simulation's own; it shares no code with the reconstruction. Paths run between
 parts of the surface, directly or by the lower face of the layers, with the LEDs' light and its cast
 shadows at each point (:mod:`gelpolight_core.simulation.paths`). Indirect light is smooth, so it is
-computed at nodes: 0.8 mm apart where nothing is pressed, 0.2 mm near an object, 0.1 mm where the
+computed at nodes: 0.8 mm apart where nothing is pressed, 0.2 mm near an object, 0.05 mm where the
 membrane bends strongly. The random numbers of a node depend on its position only, so a rendering is
 repeatable, and the error of the untouched membrane is the same in the background.
 
@@ -33,16 +33,16 @@ from gelpolight_core.simulation.surface import PressedSurface
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FINEST_MM = 0.1
-_STEPS = (8, 2, 1)
+FINEST_MM = 0.05
+_STEPS = (16, 4, 1)
 """Distances between nodes, in finest ones: coarse to fine."""
-_PATHS = (1024, 512, 256)
+_PATHS = (1024, 512, 128)
 """Paths for a node of each distance."""
 _NEAR_MM = 1.0
 _PRESSED_MM = 0.005
 """Nodes are closer within `_NEAR_MM` of membrane that is deeper than this."""
 _BENT = 0.25
-"""Change of the slope over 0.4 mm above which the closest nodes are used."""
+"""Change of the slope over 0.2 mm above which the closest nodes are used."""
 _NODES_AT_ONCE = 64  # takes a few hundredths of a second
 
 FLAT = PressedSurface(np.zeros((2, 2)), np.zeros((2, 2), dtype=np.bool_), 0.0, 0.0, 1.0)
