@@ -30,8 +30,10 @@ _CERTAIN = 3
 _R1, _R2, _R3 = 0.8191725133961645, 0.6710436067037893, 0.5497004779019703
 
 _SHIFT_12, _SHIFT_25, _SHIFT_27 = np.uint64(12), np.uint64(25), np.uint64(27)
-_SHIFT_11, _SHIFT_31 = np.uint64(11), np.uint64(31)
-_FACTOR, _MIX = np.uint64(2685821657736338717), np.uint64(0x9E3779B97F4A7C15)
+_SHIFT_11, _SHIFT_30, _SHIFT_31 = np.uint64(11), np.uint64(30), np.uint64(31)
+_FACTOR, _GOLDEN = np.uint64(2685821657736338717), np.uint64(0x9E3779B97F4A7C15)
+_MIX_1, _MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+_MOST_PATHS = 1 << 20
 _UNIT = 1.0 / (1 << 53)
 
 
@@ -48,12 +50,11 @@ def _random(state: Any) -> float:  # pragma: no cover - compiled
 
 @compiled
 def _start_random(state: Any, number: int) -> None:  # pragma: no cover - compiled
-    """Start the sequence of a number; neighbouring numbers give unrelated sequences."""
-    x = (np.uint64(number) + np.uint64(1)) * _MIX
-    x = (x ^ (x >> _SHIFT_31)) * _FACTOR
-    state[0] = x ^ (x >> _SHIFT_27)
-    for _ in range(4):
-        _random(state)
+    """Start the sequence of a number; neighbouring numbers give unrelated ones (splitmix64)."""
+    x = (np.uint64(number) + np.uint64(1)) * _GOLDEN
+    x = (x ^ (x >> _SHIFT_30)) * _MIX_1
+    x = (x ^ (x >> _SHIFT_27)) * _MIX_2
+    state[0] = x ^ (x >> _SHIFT_31)
 
 
 @compiled
@@ -380,7 +381,7 @@ def gather(
     value = np.zeros(out.shape[1])
     for number in range(nodes.shape[0]):
         x, y, sx, sy = nodes[number, 0], nodes[number, 1], nodes[number, 2], nodes[number, 3]
-        _start_random(state, numbers[number])
+        _start_random(state, numbers[number] * _MOST_PATHS)
         d = sample(surface[0], (x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
         length = math.sqrt(1.0 + sx * sx + sy * sy)
         start = (
@@ -389,6 +390,8 @@ def gather(
         r1, r2, r3 = _random(state), _random(state), _random(state)
         value[:] = 0.0
         for path in range(samples):
+            # A path does not depend on the length of the paths before it.
+            _start_random(state, numbers[number] * _MOST_PATHS + path + 1)
             spread = (
                 (r1 + path * _R1) % 1.0,
                 (r2 + path * _R2) % 1.0,

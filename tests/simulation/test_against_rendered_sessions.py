@@ -20,6 +20,7 @@ from gelpolight_core.design.parts import (
     PhotometryDesign,
 )
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.simulation import interreflection
 from gelpolight_core.simulation.rays import sensor_axes
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import (
@@ -31,7 +32,7 @@ from gelpolight_core.simulation.virtual_sensor import (
 )
 
 
-def design_of(folder: Path) -> SensorDesign:
+def design_of(folder: Path, *, bounces: int = 0) -> SensorDesign:
     """Build the design that a rendered session's truth describes."""
     truth = json.loads((folder / "truth.json").read_text())
     normal = np.array(truth["top_plane"]["normal_camera"])
@@ -84,6 +85,7 @@ def design_of(folder: Path) -> SensorDesign:
             },
             variation=0.0,
             speck_count=0,
+            bounces=bounces,
         ),
         photometry=PhotometryDesign(
             crosstalk=tuple(tuple(row) for row in truth["crosstalk_camera_from_led"])
@@ -147,6 +149,38 @@ def test_press_on_a_plain_sensor_matches_the_path_tracer(
     assert np.abs(error.mean(axis=0)).max() < 0.2 / 255.0
     assert np.sqrt((error**2).mean()) < 1.5 / 255.0
     assert np.sqrt((error**2).mean()) < 0.1 * np.sqrt(((rendered - bare)[touched] ** 2).mean())
+
+
+@pytest.mark.parametrize("press_name", ["cylinder_s5_d150", "cuboid_s5_d125"])
+def test_interreflection_matches_the_path_tracer(
+    shared_data: Path, monkeypatch: pytest.MonkeyPatch, press_name: str
+) -> None:
+    monkeypatch.setattr(interreflection, "_PATHS", (64, 64, 16))
+    folder = shared_data / "sensor-B"
+    sensor = VirtualSensor(design_of(folder, bounces=4).scaled(0.25))
+    plain = VirtualSensor(design_of(folder).scaled(0.25))
+    state = PressedMembrane(surface_of(folder / "truth" / f"{press_name}.npz"))
+
+    def rendered(path: str) -> np.ndarray:
+        return image_of(folder / path).reshape(240, 4, 320, 4, 3).mean(axis=(1, 3))
+
+    whiteboard = rendered("whiteboard/whiteboard.png")
+    simulated = sensor.brightness(Whiteboard())
+    clear = whiteboard > 0.2
+    exposure = np.median(whiteboard[clear] / simulated[clear])
+    bare = exposure * sensor.brightness(BareMembrane())
+    background = rendered("background/background.png")
+    # The rendered membrane has a pattern, which is known only where the press has not moved it.
+    pattern = np.where(background > 0.08, background / np.maximum(bare, 0.02), np.nan)
+    pattern = np.nanmedian(pattern, axis=2, keepdims=True)
+    direct = exposure * plain.brightness(state) * sensor.exposure / plain.exposure
+    indirect = exposure * sensor.brightness(state) - direct
+    missing = rendered(f"presses/{press_name}.png") / pattern - direct
+    near = (indirect > 0.01) & np.isfinite(missing)
+    assert near.sum() > 3_000
+    # Regression of what direct light leaves on what interreflection adds.
+    slope = (missing * indirect)[near].sum() / (indirect[near] ** 2).sum()
+    assert slope == pytest.approx(1.0, abs=0.08)
 
 
 @pytest.mark.parametrize("name", ["sensor-A", "sensor-B"])
