@@ -119,7 +119,7 @@ def test_whiteboard_matches_the_path_tracer_but_for_one_exposure(
     simulated = VirtualSensor(design_of(folder)).brightness(Whiteboard())
     clear = (rendered > 0.1) & (simulated > 0.05)
     ratio = rendered[clear] / simulated[clear]
-    # At 0.1 one 8-bit step is 2 %; B has interreflection, which is not simulated.
+    # At 0.1 one 8-bit step is 2 %; B has interreflection, which is not simulated here.
     assert np.percentile(np.abs(ratio / np.median(ratio) - 1.0), 98) < spread
     channels = [
         np.median(rendered[..., k][clear[..., k]] / simulated[..., k][clear[..., k]])
@@ -155,10 +155,11 @@ def test_press_on_a_plain_sensor_matches_the_path_tracer(
 def test_interreflection_matches_the_path_tracer(
     shared_data: Path, monkeypatch: pytest.MonkeyPatch, press_name: str
 ) -> None:
-    monkeypatch.setattr(interreflection, "_PATHS", (64, 64, 16))
+    monkeypatch.setattr(interreflection, "_PATHS", (128, 64, 16))
     folder = shared_data / "sensor-B"
-    sensor = VirtualSensor(design_of(folder, bounces=4).scaled(0.25))
-    plain = VirtualSensor(design_of(folder).scaled(0.25))
+    sensor, plain = (
+        VirtualSensor(design_of(folder, bounces=number).scaled(0.25)) for number in (12, 0)
+    )
     state = PressedMembrane(surface_of(folder / "truth" / f"{press_name}.npz"))
 
     def rendered(path: str) -> np.ndarray:
@@ -166,21 +167,22 @@ def test_interreflection_matches_the_path_tracer(
 
     whiteboard = rendered("whiteboard/whiteboard.png")
     simulated = sensor.brightness(Whiteboard())
-    clear = whiteboard > 0.2
+    clear = (whiteboard > 0.2) & (simulated > 0.05)
     exposure = np.median(whiteboard[clear] / simulated[clear])
     bare = exposure * sensor.brightness(BareMembrane())
     background = rendered("background/background.png")
     # The rendered membrane has a pattern, which is known only where the press has not moved it.
-    pattern = np.where(background > 0.08, background / np.maximum(bare, 0.02), np.nan)
-    pattern = np.nanmedian(pattern, axis=2, keepdims=True)
-    direct = exposure * plain.brightness(state) * sensor.exposure / plain.exposure
-    indirect = exposure * sensor.brightness(state) - direct
-    missing = rendered(f"presses/{press_name}.png") / pattern - direct
-    near = (indirect > 0.01) & np.isfinite(missing)
+    lit = bare.sum(axis=2, keepdims=True) > 0.3
+    pattern = np.where(lit, background.sum(axis=2, keepdims=True), 1.0)
+    pattern /= np.where(lit, bare.sum(axis=2, keepdims=True), 1.0)
+    pattern *= exposure
+    direct = pattern * plain.brightness(state) * sensor.exposure / plain.exposure
+    indirect = pattern * sensor.brightness(state) - direct
+    missing = rendered(f"presses/{press_name}.png") - direct
+    near = (indirect > 0.01) & lit
     assert near.sum() > 3_000
-    # Regression of what direct light leaves on what interreflection adds.
-    slope = (missing * indirect)[near].sum() / (indirect[near] ** 2).sum()
-    assert slope == pytest.approx(1.0, abs=0.08)
+    # What direct light leaves is what interreflection adds. Few paths and large pixels: 8 %.
+    assert missing[near].sum() == pytest.approx(indirect[near].sum(), rel=0.08)
 
 
 @pytest.mark.parametrize("name", ["sensor-A", "sensor-B"])
