@@ -31,7 +31,6 @@ from gelpolight_core.simulation.shading import Material
 from gelpolight_core.simulation.surface import PressedSurface
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 FINEST_MM = 0.05
 _STEPS = (16, 4, 1)
@@ -43,7 +42,7 @@ _PRESSED_MM = 0.005
 """Nodes are closer within `_NEAR_MM` of membrane that is deeper than this."""
 _BENT = 0.25
 """Change of the slope over 0.2 mm above which the closest nodes are used."""
-_NODES_AT_ONCE = 64  # takes a few hundredths of a second
+_NODES_AT_ONCE = 16  # takes a few hundredths of a second
 
 FLAT = PressedSurface(np.zeros((2, 2)), np.zeros((2, 2), dtype=np.bool_), 0.0, 0.0, 1.0)
 

@@ -12,9 +12,10 @@ from gelpolight_core.design.parts import CameraDesign, LayerDesign, MembraneDesi
 from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.simulation import interreflection
 from gelpolight_core.simulation.interreflection import FLAT, indirect_light
-from gelpolight_core.simulation.lamps import PointLamp, lamp_table
+from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.membrane import even_factor
-from gelpolight_core.simulation.paths import membrane_hit, scattered
+from gelpolight_core.simulation.paths import membrane_hit
+from gelpolight_core.simulation.scattering import scattered
 from gelpolight_core.simulation.shading import Material, metallic_lobe, metallic_rise
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.truth import truth_table
@@ -109,10 +110,9 @@ def test_each_further_reflection_adds_its_term_of_the_series() -> None:
 
 
 def flat_light(index: float, bounces: int = 4) -> np.ndarray:
-    sensor = VirtualSensor(design_of(bounces, index=index))
-    design = sensor.design
-    light = indirect_light(design, sensor._table, FLAT, even_factor(design.membrane), Material(0.8))
-    return light.maps
+    design = design_of(bounces, index=index)
+    lamps, factors = lamp_table(lamps_of(design)), even_factor(design.membrane)
+    return indirect_light(design, lamps, FLAT, factors, Material(0.8)).maps
 
 
 @pytest.mark.usefixtures("fewer_paths")
@@ -156,6 +156,24 @@ def test_without_reflections_nothing_is_added() -> None:
         assert extra.max() > 0.0
     assert "interreflection" not in truth_table(plain, ())["transport"]
     assert "at most 2 reflections" in truth_table(more, ())["transport"]
+
+
+class Stopped(Exception):
+    """The exception that the test uses to stop the work."""
+
+
+@pytest.mark.usefixtures("fewer_paths")
+def test_tracing_paths_is_stopped() -> None:
+    design = design_of(2)
+    lamps, factors = lamp_table(lamps_of(design)), even_factor(design.membrane)
+    checks = iter(range(3))
+
+    def interrupt() -> None:
+        if next(checks, None) is None:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        indirect_light(design, lamps, FLAT, factors, Material(0.8), interrupt=interrupt)
 
 
 def wall(height_mm: float) -> PressedSurface:
