@@ -176,6 +176,8 @@ class MembraneDesign:
         Number of dark and bright specks.
     decay_length_mm : float
         Decay length of the pressed membrane outside the contact (lambda of the elastic foundation).
+    bounces : int
+        Largest number of reflections between parts of the membrane; 0 for direct light only.
     """
 
     working_diameter_mm: float = _within(26.0, 0.5, 500.0)
@@ -187,6 +189,7 @@ class MembraneDesign:
     variation_scale_mm: float = _within(3.0, 0.1, 100.0)
     speck_count: int = _within(30, 0, 10000)
     decay_length_mm: float = _within(0.7, 0.05, 20.0)
+    bounces: int = _within(0, 0, 64)
 
 
 @dataclass(frozen=True, slots=True)

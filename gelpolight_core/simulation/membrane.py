@@ -45,6 +45,18 @@ def reflectance_factor(
     return np.clip(factor, 0.05, None), float(cells[0]), FACTOR_PITCH_MM, rim
 
 
+def even_factor(membrane: MembraneDesign) -> tuple[Array, float, float, float]:
+    """Return a factor of 1 in the format of :func:`reflectance_factor`.
+
+    Parameters
+    ----------
+    membrane : MembraneDesign
+        With the diameter of the working circle.
+    """
+    rim = 0.5 * membrane.working_diameter_mm
+    return np.ones((2, 2)), -2.0 * rim, 4.0 * rim, rim
+
+
 def _smooth(size: int, scale_mm: float, rng: np.random.Generator) -> Array:
     """Return a random field of unit variance that varies over `scale_mm`."""
     # Drawn on a lattice much finer than the variation, then interpolated linearly.

@@ -140,12 +140,12 @@ def steepest_horizon(
             steepest = max(steepest, slope)
             along += _SHADOW_STEP
         else:
-            along += _tile_exit(x, y, direction, i, j)
+            along += tile_exit(x, y, direction, i, j)
     return steepest
 
 
 @compiled
-def _tile_exit(
+def tile_exit(
     x: float, y: float, direction: Any, i: int, j: int
 ) -> float:  # pragma: no cover - compiled
     """Return the distance along `direction` to leave tile (i, j)."""

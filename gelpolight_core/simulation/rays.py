@@ -158,7 +158,28 @@ def project_through_layers(camera: CameraDesign, layers: LayerDesign, points_mm:
     (..., 2)
         Pixels.
     """
-    points = np.asarray(points_mm, dtype=np.float64)
+    lateral = _lateral_to(layers, np.asarray(points_mm, dtype=np.float64))
+    along = np.sqrt(1.0 - (lateral * lateral).sum(axis=-1, keepdims=True))
+    direction = np.concatenate([lateral, along], axis=-1)
+    return project_to_pixels(camera, np.asarray(direction @ sensor_axes(layers)))
+
+
+def slopes_to(layers: LayerDesign, points_mm: Array) -> Array:
+    """Return (..., 2) lateral shifts per mm of the camera's rays to points in the elastomer.
+
+    Parameters
+    ----------
+    layers : LayerDesign
+        The stack.
+    points_mm : (..., 3)
+        Sensor frame; z <= 0.
+    """
+    inner = _lateral_to(layers, points_mm) / layers.elastomer_refractive_index
+    return np.asarray(inner / np.sqrt(1.0 - (inner * inner).sum(axis=-1, keepdims=True)))
+
+
+def _lateral_to(layers: LayerDesign, points: Array) -> Array:
+    """Return (..., 2): in air, the lateral part of the unit directions of the rays to points."""
     radius = np.hypot(points[..., 0], points[..., 1])
     low, high = np.zeros_like(radius), np.full_like(radius, 1.0 - 1e-12)
     for _ in range(60):
@@ -166,12 +187,7 @@ def project_through_layers(camera: CameraDesign, layers: LayerDesign, points_mm:
         beyond = radius_through_layers(layers, middle, height_mm=-points[..., 2]) > radius
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     sine = 0.5 * (low + high)
-    away = np.maximum(radius, 1e-300)
-    direction = np.stack(
-        [points[..., 0] / away * sine, points[..., 1] / away * sine, np.sqrt(1.0 - sine * sine)],
-        axis=-1,
-    )
-    return project_to_pixels(camera, np.asarray(direction @ sensor_axes(layers)))
+    return np.asarray(points[..., :2] * (sine / np.maximum(radius, 1e-300))[..., None])
 
 
 def transmission(sine_in_air: Array, first_index: float, second_index: float) -> Array:

@@ -13,6 +13,7 @@ from scipy.ndimage import maximum_filter, uniform_filter
 
 from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.simulation.compiled import Interrupt, compiled, never
+from gelpolight_core.simulation.indirect_light import NO_LIGHT, IndirectLight
 from gelpolight_core.simulation.occlusion import lamp_share, sample, visible_depth
 from gelpolight_core.simulation.rays import RayTable
 from gelpolight_core.simulation.surface import PressedSurface
@@ -78,6 +79,12 @@ def metallic_lobe(
 
 
 @compiled
+def metallic_rise(v_h: float) -> float:  # pragma: no cover - compiled
+    """Return the metal's reflectance relative to normal incidence."""
+    return 1.0 + (1.0 / 0.91 - 1.0) * (1.0 - v_h) ** 5
+
+
+@compiled
 def point_brightness(
     point: Any, normal: Any, to_camera: Any, lamp: Any, material: Any
 ) -> float:  # pragma: no cover - compiled
@@ -107,8 +114,7 @@ def point_brightness(
         h = math.sqrt(hx * hx + hy * hy + hz * hz)
         v_h = (to_camera[0] * hx + to_camera[1] * hy + to_camera[2] * hz) / h
         n_h = (normal[0] * hx + normal[1] * hy + normal[2] * hz) / h
-        rise = (1.0 - v_h) ** 5
-        metal = material[1] * (1.0 + (1.0 / 0.91 - 1.0) * rise)
+        metal = material[1] * metallic_rise(v_h)
         thrown += metal * metallic_lobe(n_l, n_v, n_h, v_h, material[2])
     return float(strength * n_l * thrown)
 
@@ -152,11 +158,12 @@ def _blend(table: Any, row: float, column: float) -> float:  # pragma: no cover 
 @compiled
 def _pressed(
     out: Any, chosen: Any, rays: Any, surface: Any, grid: Any, factor: Any, lamps: Any,
-    material: Any, samples: int,
+    material: Any, indirect: Any, samples: int,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
     depth, slope_x, slope_y, tile_max, tile_min = surface
     x0, y0, pitch, deepest = grid
     factors, factor_x0, factor_pitch, rim = factor
+    gathered, gathered_first, gathered_pitch = indirect
     share = 1.0 / (samples * samples)
     value = np.zeros(lamps.shape[0])
     for number in range(chosen.shape[0]):
@@ -186,6 +193,10 @@ def _pressed(
                 if bright > 0.0:
                     bright *= lamp_share(depth, tile_max, grid, (px, py, d), lamps[k])
                 value[k] += share * rho * bright
+            for k in range(gathered.shape[0]):
+                value[k] += share * rho * sample(
+                    gathered[k], (px - gathered_first) / gathered_pitch,
+                    (py - gathered_first) / gathered_pitch)  # fmt: skip
         through = rays[4][i, j]
         for k in range(lamps.shape[0]):
             out[i, j, k] = value[k] * through
@@ -198,6 +209,7 @@ def shade_pressed(
     factors: tuple[Array, float, float, float],
     lamps: Array,
     material: Material,
+    indirect: IndirectLight = NO_LIGHT,
     *,
     samples: int = 3,
     interrupt: Interrupt = never,
@@ -218,6 +230,8 @@ def shade_pressed(
         Lamp table.
     material : Material
         Material of the membrane.
+    indirect : IndirectLight, optional
+        Light from other parts of the membrane.
     samples : int, optional
         Rays per pixel and side at edges; 1 is fastest.
     interrupt : callable, optional
@@ -239,6 +253,7 @@ def shade_pressed(
         factors,
         lamps,
         material.values,
+        indirect.values,
     )
     peak = float(out.max(initial=0.0))
     for some in _portions(chosen + corner, interrupt):

@@ -83,8 +83,17 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
             "decay_length_mm": membrane.decay_length_mm,
         },
         "photometry": _photometry_table(sensor, stages),
-        "transport": "direct light of the LEDs with cast shadows only",
+        "transport": _transport(membrane.bounces),
     }
+
+
+def _transport(bounces: int) -> str:
+    if bounces == 0:
+        return "direct light of the LEDs with cast shadows only"
+    return (
+        "direct light of the LEDs with cast shadows, and interreflection with at most "
+        f"{bounces} reflections between parts of the membrane, directly or by the lower face"
+    )
 
 
 def _photometry_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:

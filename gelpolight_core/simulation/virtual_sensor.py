@@ -13,8 +13,10 @@ from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.boards import BoardPose, board_image, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
+from gelpolight_core.simulation.indirect_light import IndirectLight
+from gelpolight_core.simulation.interreflection import FLAT, indirect_light
 from gelpolight_core.simulation.lamps import Lamp, PointLamp, lamp_table, lamps_of
-from gelpolight_core.simulation.membrane import reflectance_factor
+from gelpolight_core.simulation.membrane import even_factor, reflectance_factor
 from gelpolight_core.simulation.occlusion import sample_all
 from gelpolight_core.simulation.rays import (
     camera_points,
@@ -51,6 +53,9 @@ class Mirror:
 @dataclass(frozen=True, slots=True)
 class Whiteboard:
     """The diffuse standard pressed onto the bare elastomer.
+
+    It is flat, so it lights itself only by the lower face of the layers, and only if the design has
+    interreflection.
 
     Attributes
     ----------
@@ -119,10 +124,19 @@ class VirtualSensor:
             design.membrane, np.random.default_rng([seed, zlib.crc32(b"membrane")])
         )
         interrupt()
+        self._board = Material(design.photometry.whiteboard_reflectance)
+        self._board_light = indirect_light(
+            design,
+            self._table,
+            FLAT,
+            even_factor(design.membrane),
+            self._board,
+            interrupt=interrupt,
+        )
         self.exposure = self._exposure()
         interrupt()
         self._cover = self._rim_cover()
-        self._membrane = self._flat(self.material) * self._factor_seen()[..., None]
+        self._membrane = self._flat_membrane(self._membrane_light(FLAT, interrupt))
 
     def brightness(self, state: State, *, samples: int = 3, interrupt: Interrupt = never) -> Array:
         """Return the exact image (rows, columns, 3), linear, before noise and saturation.
@@ -144,16 +158,19 @@ class VirtualSensor:
         if isinstance(state, Mirror):
             light = self._mirror() * photometry.mirror_peak
         elif isinstance(state, Whiteboard):
-            light = self._flat(Material(photometry.whiteboard_reflectance))
+            light = self._flat(self._board, self._board_light)
             light *= self.exposure * state.exposure
             if state.led is not None:
                 light[..., np.arange(light.shape[2]) != state.led] = 0.0
         else:
             light = self._membrane.copy()
             if isinstance(state, PressedMembrane):
+                indirect = self._membrane_light(state.surface, interrupt)
+                if self.design.membrane.bounces > 0:
+                    light = self._flat_membrane(indirect)
                 shade_pressed(
                     light, self.rays, state.surface, self.factors, self._table, self.material,
-                    samples=samples, interrupt=interrupt,
+                    indirect, samples=samples, interrupt=interrupt,
                 )  # fmt: skip
             interrupt()
             light *= self.exposure
@@ -195,9 +212,18 @@ class VirtualSensor:
             self.design.layers, working_diameter_mm=self.design.membrane.working_diameter_mm
         )
 
-    def _flat(self, material: Material) -> Array:
+    def _membrane_light(self, surface: PressedSurface, interrupt: Interrupt) -> IndirectLight:
+        return indirect_light(
+            self.design, self._table, surface, self.factors, self.material, interrupt=interrupt
+        )
+
+    def _flat_membrane(self, indirect: IndirectLight) -> Array:
+        return self._flat(self.material, indirect) * self._factor_seen()[..., None]
+
+    def _flat(self, material: Material, indirect: IndirectLight) -> Array:
         """Brightness of the flat top surface at each pixel, before exposure."""
         light = flat_brightness(self.rays, self._table, material)
+        indirect.add_flat(light, self.rays)
         light *= (self.rays.transmission * self._cover)[..., None]
         return np.nan_to_num(light)
 
@@ -220,7 +246,8 @@ class VirtualSensor:
         photometry = self.design.photometry
         rim = 0.5 * self.design.membrane.working_diameter_mm
         rays = self.rays
-        light = flat_brightness(rays, self._table, Material(photometry.whiteboard_reflectance))
+        light = flat_brightness(rays, self._table, self._board)
+        self._board_light.add_flat(light, rays)
         light *= rays.transmission[..., None]
         inside = np.hypot(rays.x_mm, rays.y_mm) <= rim
         seen = mixed(light[inside], photometry.crosstalk)

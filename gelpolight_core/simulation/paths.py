@@ -1,0 +1,279 @@
+"""Random light paths between parts of the membrane.
+
+A path starts at a point of the surface and runs against the light. A ray that leaves the surface
+towards the camera is reflected by the lower face of the layers. Each point that a path meets adds
+the light of the LEDs there, with cast shadows.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from gelpolight_core.simulation.compiled import compiled
+from gelpolight_core.simulation.occlusion import lamp_share, sample, tile_exit
+from gelpolight_core.simulation.scattering import random_number, scattered, start_random
+from gelpolight_core.simulation.shading import point_brightness
+from gelpolight_core.simulation.surface import TILE
+
+_STEP = 0.7
+"""Step of the march along a ray in cells: below one, so that no ridge is skipped."""
+_START = 0.5
+"""Length in cells of the first part of a ray, in which a surface does not meet itself."""
+_HALVINGS = 14
+_CERTAIN = 3
+"""After this number of reflections, a path ends at random."""
+
+# Steps of an evenly spread sequence in three dimensions (Roberts' R3).
+_R1, _R2, _R3 = 0.8191725133961645, 0.6710436067037893, 0.5497004779019703
+
+_MOST_PATHS = 1 << 20
+
+
+@compiled
+def membrane_hit(
+    depth: Any, tile_max: Any, grid: Any, point: Any, direction: Any, begin: float
+) -> Any:  # pragma: no cover - compiled
+    """Return (found, x_mm, y_mm, depth_mm): where a ray in the elastomer meets the membrane.
+
+    Parameters
+    ----------
+    depth, tile_max
+        Maps of the :class:`PressedSurface`; outside them the membrane is flat.
+    grid : (x0_mm, y0_mm, pitch_mm, deepest_mm)
+        Position of the depth map.
+    point : (x_mm, y_mm, depth_mm)
+        Start.
+    direction : (3,)
+        Unit vector in the sensor frame; z points away from the camera.
+    begin : float
+        Length in mm of the first part of the ray that meets nothing.
+    """
+    x0, y0, pitch, deepest = grid
+    sideways = max(math.hypot(direction[0], direction[1]), 1e-9)
+    move = (direction[0] / sideways, direction[1] / sideways)
+    rise = -direction[2] / sideways * pitch
+    cell = ((point[0] - x0) / pitch, (point[1] - y0) / pitch)
+    along = begin * sideways / pitch
+    if rise < 0.0:
+        # Nothing is deeper than the deepest point.
+        along = max(along, (deepest - point[2]) / rise)
+    rows, columns = tile_max.shape
+    before = along
+    first = True
+    while True:
+        d = point[2] + rise * along
+        if rise >= 0.0 and d > deepest:
+            return False, 0.0, 0.0, 0.0
+        x, y = cell[0] + move[0] * along, cell[1] + move[1] * along
+        j, i = math.floor(x / TILE), math.floor(y / TILE)
+        if not (0 <= i < rows and 0 <= j < columns):
+            if rise < 0.0 and d <= 0.0:
+                break
+            enter = _entrance(x, y, move, columns * TILE, rows * TILE)
+            flat = -point[2] / rise if rise < 0.0 else 1e300
+            if flat <= along + enter:
+                at = _position(grid, cell, move, max(flat, along))
+                return True, at[0], at[1], 0.0
+            if enter >= 1e299:
+                return False, 0.0, 0.0, 0.0
+            before, first = along, False
+            along += enter
+            continue
+        leave = tile_exit(x, y, move, i, j)
+        if min(d, d + rise * leave) > tile_max[i, j]:
+            before, first = along, False
+            along += leave
+            continue
+        if d <= sample(depth, x, y):
+            break
+        before, first = along, False
+        along += min(_STEP, leave) if leave > 1e-3 else leave + 1e-3
+    if first:
+        # Within a cell of the start: a fold of the surface.
+        before = along
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (before + along)
+        x, y = cell[0] + move[0] * middle, cell[1] + move[1] * middle
+        if point[2] + rise * middle <= sample(depth, x, y):
+            along = middle
+        else:
+            before = middle
+    at = _position(grid, cell, move, along)
+    return True, at[0], at[1], max(0.0, point[2] + rise * along)
+
+
+@compiled
+def _position(grid: Any, cell: Any, move: Any, along: float) -> Any:  # pragma: no cover - compiled
+    return grid[0] + grid[2] * (cell[0] + move[0] * along), grid[1] + grid[2] * (
+        cell[1] + move[1] * along
+    )
+
+
+@compiled
+def _entrance(
+    x: float, y: float, move: Any, columns: int, rows: int
+) -> float:  # pragma: no cover - compiled
+    """Return the distance in cells after which a ray from outside a grid enters it."""
+    near, far = 0.0, 1e300
+    for start, step, size in ((x, move[0], columns), (y, move[1], rows)):
+        if abs(step) < 1e-12:
+            if not 0.0 <= start < size:
+                return 1e300
+        else:
+            one, two = -start / step, (size - start) / step
+            near, far = max(near, min(one, two)), min(far, max(one, two))
+    if near >= far:
+        return 1e300
+    return near + 1e-6
+
+
+@compiled
+def _face(invariant: float, first: float, second: float) -> float:  # pragma: no cover - compiled
+    """Return the unpolarised Fresnel reflectance of a face; 1 beyond total reflection."""
+    if invariant >= second or invariant >= first:
+        return 1.0
+    cos_1 = math.sqrt(1.0 - (invariant / first) ** 2)
+    cos_2 = math.sqrt(1.0 - (invariant / second) ** 2)
+    across = (first * cos_1 - second * cos_2) / (first * cos_1 + second * cos_2)
+    along = (first * cos_2 - second * cos_1) / (first * cos_2 + second * cos_1)
+    return 0.5 * (across * across + along * along)
+
+
+@compiled
+def _returned(
+    point: Any, direction: Any, layers: Any, choice: float
+) -> Any:  # pragma: no cover - compiled
+    """Return (x_mm, y_mm, share): where a ray comes back to the elastomer's lower face.
+
+    The face itself reflects a little if there is a window; most light comes from the window's other
+    face.
+    """
+    thickness, elastomer, window_mm, window = layers
+    sideways = math.hypot(direction[0], direction[1])
+    reach = (thickness - point[2]) / -direction[2]
+    x, y = point[0] + reach * direction[0], point[1] + reach * direction[1]
+    invariant = elastomer * sideways
+    if window_mm <= 0.0:
+        return x, y, _face(invariant, elastomer, 1.0)
+    upper = _face(invariant, elastomer, window)
+    if choice < upper:
+        return x, y, 1.0
+    sine = invariant / window
+    further = 2.0 * window_mm / math.sqrt(1.0 - sine * sine) / window * elastomer
+    share = _face(invariant, window, 1.0) * (1.0 - upper)
+    return x + further * direction[0], y + further * direction[1], share
+
+
+@compiled
+def _next_point(
+    surface: Any, grid: Any, layers: Any, point: Any, direction: Any, choice: float
+) -> Any:  # pragma: no cover - compiled
+    """Return (found, x_mm, y_mm, depth_mm, z of the direction, share) where a ray ends."""
+    begin = _START * grid[2]
+    found, x, y, d = membrane_hit(surface[0], surface[3], grid, point, direction, begin)
+    if found or direction[2] > -1e-9:
+        return found, x, y, d, direction[2], 1.0
+    x, y, share = _returned(point, direction, layers, choice)
+    if share <= 0.0:
+        return False, x, y, 0.0, direction[2], 0.0
+    back = (direction[0], direction[1], -direction[2])
+    found, x, y, d = membrane_hit(surface[0], surface[3], grid, (x, y, layers[0]), back, 0.0)
+    return found, x, y, d, back[2], share
+
+
+@compiled
+def _normal(surface: Any, grid: Any, x: float, y: float) -> Any:  # pragma: no cover - compiled
+    at = ((x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
+    gx, gy = sample(surface[1], at[0], at[1]), sample(surface[2], at[0], at[1])
+    length = math.sqrt(1.0 + gx * gx + gy * gy)
+    return -gx / length, -gy / length, -1.0 / length
+
+
+@compiled
+def _add_path(
+    value: Any, start: Any, scene: Any, bounces: int, numbers: Any, state: Any
+) -> None:  # pragma: no cover - compiled
+    """Add the light of one path to `value` (lamps,)."""
+    surface, grid, factor, lamps, material, layers = scene
+    factors, factor_x0, factor_pitch, rim = factor
+    point, normal, view = start
+    weight = 1.0
+    for bounce in range(bounces):
+        if bounce > 0:
+            numbers = (random_number(state), random_number(state), random_number(state))
+        lx, ly, lz, share = scattered(normal, view, material, numbers[0], numbers[1], numbers[2])
+        weight *= share
+        if weight <= 0.0:
+            return
+        found, x, y, d, lz, share = _next_point(
+            surface, grid, layers, point, (lx, ly, lz), random_number(state)
+        )
+        if not found or x * x + y * y > rim * rim:
+            return
+        point, normal, view = (x, y, d), _normal(surface, grid, x, y), (-lx, -ly, -lz)
+        if normal[0] * view[0] + normal[1] * view[1] + normal[2] * view[2] <= 0.0:
+            return
+        weight *= share * sample(
+            factors, (x - factor_x0) / factor_pitch, (y - factor_x0) / factor_pitch
+        )
+        for k in range(lamps.shape[0]):
+            bright = point_brightness(point, normal, view, lamps[k], material)
+            if bright > 0.0:
+                value[k] += (
+                    weight * bright * lamp_share(surface[0], surface[3], grid, point, lamps[k])
+                )
+        if bounce + 1 >= _CERTAIN:
+            going_on = min(0.95, weight)
+            if random_number(state) >= going_on:
+                return
+            weight /= going_on
+
+
+@compiled
+def gather(
+    out: Any, nodes: Any, numbers: Any, scene: Any, bounces: int, samples: int
+) -> None:  # pragma: no cover - compiled
+    """Write the light (nodes, lamps) that nodes receive from other parts of the surface.
+
+    Parameters
+    ----------
+    out : (nodes, lamps)
+        Brightness towards the camera at a reflectance factor of 1.
+    nodes : (nodes, 4)
+        x_mm, y_mm and the slopes of the camera's ray.
+    numbers : (nodes,)
+        Number of each node's random sequence.
+    scene : (surface, grid, factor, lamps, material, layers)
+        As for the pixels; layers: elastomer's thickness and index, window's thickness and index.
+    bounces : int
+        Largest number of reflections before a node.
+    samples : int
+        Paths for a node.
+    """
+    surface, grid = scene[0], scene[1]
+    state = np.zeros(1, np.uint64)
+    value = np.zeros(out.shape[1])
+    for number in range(nodes.shape[0]):
+        x, y, sx, sy = nodes[number, 0], nodes[number, 1], nodes[number, 2], nodes[number, 3]
+        start_random(state, numbers[number] * _MOST_PATHS)
+        d = sample(surface[0], (x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
+        length = math.sqrt(1.0 + sx * sx + sy * sy)
+        start = (
+            (x, y, d), _normal(surface, grid, x, y), (-sx / length, -sy / length, -1.0 / length)
+        )  # fmt: skip
+        r1, r2, r3 = random_number(state), random_number(state), random_number(state)
+        value[:] = 0.0
+        for path in range(samples):
+            # A path does not depend on the length of the paths before it.
+            start_random(state, numbers[number] * _MOST_PATHS + path + 1)
+            spread = (
+                (r1 + path * _R1) % 1.0,
+                (r2 + path * _R2) % 1.0,
+                (r3 + path * _R3) % 1.0,
+            )
+            _add_path(value, start, scene, bounces, spread, state)
+        for k in range(out.shape[1]):
+            out[number, k] = value[k] / samples

@@ -1,0 +1,260 @@
+"""Light between parts of the simulated membrane compared with closed formulas."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gelpolight_core.design.parts import CameraDesign, LayerDesign, MembraneDesign
+from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.simulation import interreflection
+from gelpolight_core.simulation.interreflection import FLAT, indirect_light
+from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
+from gelpolight_core.simulation.membrane import even_factor
+from gelpolight_core.simulation.paths import membrane_hit
+from gelpolight_core.simulation.scattering import scattered
+from gelpolight_core.simulation.shading import Material, metallic_lobe, metallic_rise
+from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.truth import truth_table
+from gelpolight_core.simulation.virtual_sensor import (
+    BareMembrane,
+    PressedMembrane,
+    VirtualSensor,
+    Whiteboard,
+)
+
+HALF_ANGLE_DEG, RADIUS_MM = 72.0, 1.5
+OPENING_MM = RADIUS_MM * math.sin(math.radians(HALF_ANGLE_DEG))
+
+
+@pytest.fixture(autouse=True)
+def few_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes of a quarter of the density and fewer paths: the tests' limits allow for the noise."""
+    monkeypatch.setattr(interreflection, "FINEST_MM", 0.2)
+    monkeypatch.setattr(interreflection, "_STEPS", (4, 1, 1))
+    monkeypatch.setattr(interreflection, "_PATHS", (256, 256, 256))
+
+
+@pytest.fixture
+def fewer_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As few paths as possible, where only their presence matters."""
+    monkeypatch.setattr(interreflection, "_PATHS", (8, 8, 8))
+
+
+def design_of(bounces: int, *, index: float = 1.41, rim_mm: float = 13.0) -> SensorDesign:
+    """Return a sensor with a diffuse membrane and a camera of 80 x 60 pixels."""
+    return SensorDesign(
+        camera=CameraDesign(shot_variance=0.0, read_sd=0.0, blur_sigma_px=0.0),
+        layers=LayerDesign(window_thickness_mm=0.0, elastomer_refractive_index=index),
+        membrane=MembraneDesign(
+            working_diameter_mm=2.0 * rim_mm,
+            specular_weight=0.0,
+            variation=0.0,
+            speck_count=0,
+            bounces=bounces,
+        ),
+    ).scaled(1.0 / 16.0)
+
+
+def spherical_dent() -> PressedSurface:
+    """Return a part of a sphere, concave towards the camera; its rim is the deepest place."""
+    pitch = 0.02
+    x = pitch * np.arange(-100, 101)
+    inside = RADIUS_MM**2 - x[None] ** 2 - x[:, None] ** 2
+    depth = RADIUS_MM - np.sqrt(np.maximum(inside, (RADIUS_MM * 0.2) ** 2))
+    return PressedSurface(depth, depth < 0.0, float(x[0]), float(x[0]), pitch)
+
+
+def in_the_dent(reflectance: float, bounces: int) -> np.ndarray:
+    """Return the indirect light in the dent; the lamp on the sphere lights it evenly with 1."""
+    design = design_of(bounces, index=1.0, rim_mm=OPENING_MM)
+    # Both cosines are half the distance over the radius, so that 1/r^2 cancels.
+    lamp = PointLamp(0.0, 0.0, 2.0 * RADIUS_MM, power=4.0 * RADIUS_MM**2, diameter_mm=0.0)
+    light = indirect_light(
+        design,
+        lamp_table((lamp,)),
+        spherical_dent(),
+        even_factor(design.membrane),
+        Material(reflectance),
+    )
+    cells = light.first_mm + light.pitch_mm * np.arange(light.maps.shape[1])
+    return light.maps[0][np.hypot(cells[None], cells[:, None]) < OPENING_MM - 0.2]
+
+
+@pytest.mark.parametrize("reflectance", [0.5, 0.95])
+def test_a_spherical_dent_is_brighter_by_the_sum_of_the_geometric_series(
+    reflectance: float,
+) -> None:
+    # From any point of a sphere, a part of it has its share of the area as form factor.
+    share = 0.5 * (1.0 - math.cos(math.radians(HALF_ANGLE_DEG)))
+    expected = reflectance / (1.0 - reflectance * share) - reflectance
+    found = in_the_dent(reflectance, bounces=30)
+    # One node of 256 paths has noise of 6 %, and there are 121.
+    assert found.mean() == pytest.approx(expected, rel=0.015)
+    # Even all over the dent.
+    assert found.std() < 0.08 * expected
+
+
+def test_each_further_reflection_adds_its_term_of_the_series() -> None:
+    share = 0.5 * (1.0 - math.cos(math.radians(HALF_ANGLE_DEG)))
+    sums = np.array([in_the_dent(0.8, bounces).mean() for bounces in (1, 2, 3, 4)])
+    terms = np.diff(sums, prepend=0.0)
+    expected = 0.8 * (0.8 * share) ** np.arange(1, 5)
+    assert terms[:3] == pytest.approx(expected[:3], rel=0.03)
+    # Fewer paths are that long.
+    assert terms[3] == pytest.approx(expected[3], rel=0.2)
+    assert (np.diff(terms) < 0.0).all() and (terms > 0.0).all()
+
+
+def flat_light(index: float, bounces: int = 4) -> np.ndarray:
+    design = design_of(bounces, index=index)
+    lamps, factors = lamp_table(lamps_of(design)), even_factor(design.membrane)
+    return indirect_light(design, lamps, FLAT, factors, Material(0.8)).maps
+
+
+@pytest.mark.usefixtures("fewer_paths")
+def test_a_flat_membrane_lights_itself_only_by_the_lower_face() -> None:
+    assert (flat_light(1.0) == 0.0).all()
+    assert flat_light(1.41).max() > 0.0
+
+
+def test_the_lower_face_returns_the_sum_over_mirror_images() -> None:
+    """Once from the membrane by the lower face: an integral over the mirrored membrane."""
+    design = design_of(1)
+    lamp = PointLamp(3.0, 0.0, 9.0, diameter_mm=0.0)
+    table, factors = lamp_table((lamp,)), even_factor(design.membrane)
+    light = indirect_light(design, table, FLAT, factors, Material(0.8))
+    step = 0.05
+    x = step * (np.arange(-260, 260) + 0.5)
+    x, y = np.meshgrid(x, x)
+    lit = 9.0**2 / ((x - 3.0) ** 2 + y**2 + 81.0) ** 2
+    lit[np.hypot(x, y) > 13.0] = 0.0
+    n, away = 1.41, 2.0 * design.layers.elastomer_thickness_mm
+    for at_mm in ((0.0, 0.0), (-4.0, 2.4), (9.6, -4.8)):
+        r2 = (x - at_mm[0]) ** 2 + (y - at_mm[1]) ** 2 + away**2
+        cosine = away / np.sqrt(r2)
+        cos_air = np.sqrt(np.maximum(1.0 - n * n * (1.0 - cosine**2), 0.0))
+        s = ((n * cosine - cos_air) / (n * cosine + cos_air)) ** 2
+        p = ((n * cos_air - cosine) / (n * cos_air + cosine)) ** 2
+        received = (0.8 * lit * 0.5 * (s + p) * cosine**2 / (math.pi * r2)).sum() * step**2
+        i, j = (round((v - light.first_mm) / light.pitch_mm) for v in (at_mm[1], at_mm[0]))
+        assert light.maps[0, i, j] == pytest.approx(0.8 * received, rel=0.05)
+
+
+@pytest.mark.usefixtures("fewer_paths")
+def test_without_reflections_nothing_is_added() -> None:
+    plain, more = VirtualSensor(design_of(0)), VirtualSensor(design_of(2))
+    for state in (Whiteboard(), BareMembrane(), PressedMembrane(wall(1.0))):
+        light = plain.brightness(state)
+        assert np.array_equal(VirtualSensor(design_of(0)).brightness(state), light)
+        # Relative to direct light: the exposure differs, as the board lights itself, too.
+        extra = more.brightness(state) / more.exposure - light / plain.exposure
+        assert extra.min() > -1e-15
+        assert extra.max() > 0.0
+    assert "interreflection" not in truth_table(plain, ())["transport"]
+    assert "at most 2 reflections" in truth_table(more, ())["transport"]
+
+
+class Stopped(Exception):
+    """The exception that the test uses to stop the work."""
+
+
+@pytest.mark.usefixtures("fewer_paths")
+def test_tracing_paths_is_stopped() -> None:
+    design = design_of(2)
+    lamps, factors = lamp_table(lamps_of(design)), even_factor(design.membrane)
+    checks = iter(range(3))
+
+    def interrupt() -> None:
+        if next(checks, None) is None:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        indirect_light(design, lamps, FLAT, factors, Material(0.8), interrupt=interrupt)
+
+
+def wall(height_mm: float) -> PressedSurface:
+    """Return a steep ridge around x = 0, along y."""
+    x = 0.05 * np.arange(-100, 101)
+    depth = height_mm * np.clip((1.0 - np.abs(x)) / 0.3, 0.0, 1.0) * np.ones((161, 1))
+    return PressedSurface(depth, depth > 0.0, float(x[0]), -4.0, 0.05)
+
+
+def test_a_wall_lights_the_membrane_on_its_lit_side_and_a_higher_one_more() -> None:
+    design = design_of(2, index=1.0)
+    lamps, factors = lamp_table((PointLamp(8.0, 0.0, 6.0),)), even_factor(design.membrane)
+
+    def beside(height_mm: float, x_mm: float) -> float:
+        light = indirect_light(design, lamps, wall(height_mm), factors, Material(0.8))
+        cells = light.first_mm + light.pitch_mm * np.arange(light.maps.shape[1])
+        near = (np.abs(cells[None] - x_mm) < 0.3) & (np.abs(cells[:, None]) < 2.0)
+        return float(light.maps[0][near].mean())
+
+    low, high = beside(0.5, 1.6), beside(1.0, 1.6)
+    assert high > 1.3 * low > 0.0
+    assert high > 3.0 * beside(1.0, -1.6)
+
+
+@pytest.mark.usefixtures("fewer_paths")
+def test_a_rendering_with_interreflection_is_repeatable() -> None:
+    state = PressedMembrane(wall(1.0))
+    first, second = (VirtualSensor(design_of(3), 1).brightness(state) for _ in range(2))
+    assert np.array_equal(first, second)
+
+
+def test_a_ray_meets_the_wall_where_the_geometry_puts_it() -> None:
+    surface = wall(1.0)
+    parts = (surface.depth_mm, surface.tile_max, (surface.x0_mm, surface.y0_mm, 0.05, 1.0))
+    # From outside the depth map, up by 0.1 mm per mm, to the wall of depth (1 - x) / 0.3.
+    length = math.hypot(1.0, 0.1)
+    towards = (-1.0 / length, 0.0, -0.1 / length)
+    found, x, _, d = membrane_hit(*parts, (7.0, 0.0, 0.0), towards, 0.0)
+    assert found
+    assert x == pytest.approx((1.0 - 0.3 * 0.7) / (1.0 - 0.03), abs=1e-5)
+    assert d == pytest.approx(0.1 * (7.0 - x))
+    # Steeper, it passes over the ridge and leaves towards the camera.
+    assert not membrane_hit(*parts, (7.0, 0.0, 0.0), (-0.6, 0.0, -0.8), 0.0)[0]
+    # From below it meets the flat part outside the map.
+    found, x, _, d = membrane_hit(*parts, (7.0, 0.0, 3.0), (-0.6, 0.0, 0.8), 0.0)
+    assert found
+    assert (x, d) == pytest.approx((7.0 - 3.0 * 0.75, 0.0))
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 30.0, 65.0])
+def test_drawn_directions_scatter_as_much_as_the_integral_over_the_hemisphere(
+    tilt_deg: float,
+) -> None:
+    material = (0.36, 0.4, 0.35)
+    tilt = math.radians(tilt_deg)
+    normal, view = (0.0, 0.0, -1.0), (math.sin(tilt), 0.0, -math.cos(tilt))
+    numbers = np.random.default_rng(1).uniform(size=(40_000, 3))
+    drawn = [scattered(normal, view, material, *some) for some in numbers]
+    assert np.allclose([math.hypot(*some[:3]) for some in drawn[:100]], 1.0)
+    total = 0.0
+    angles, step = np.linspace(0.0, 2.0 * math.pi, 120, endpoint=False), 1.0 / 120
+    for cosine in np.arange(0.5 * step, 1.0, step):
+        side = math.sqrt(1.0 - cosine**2)
+        for angle in angles:
+            h = np.array([side * math.cos(angle), side * math.sin(angle), -cosine]) + view
+            h /= np.linalg.norm(h)
+            v_h = float(h @ view)
+            lobe = metallic_lobe(cosine, math.cos(tilt), -h[2], v_h, material[2])
+            thrown = material[0] + material[1] * metallic_rise(v_h) * lobe
+            total += thrown * cosine / math.pi * step * (2.0 * math.pi / 120)
+    assert np.mean([some[3] for some in drawn]) == pytest.approx(total, rel=0.01)
+
+
+def test_the_interreflecting_design_that_is_shipped_is_as_it_says() -> None:
+    folder = Path(__file__).parents[2] / "resources" / "designs"
+    design = read_design(folder / "interreflecting.toml")
+    signal = 200.0 / 255.0
+    noise = (design.camera.shot_variance * signal + design.camera.read_sd**2) ** 0.5
+    assert 20.0 * math.log10(signal / noise) == pytest.approx(35.0, abs=0.1)
+    for led in design.leds:
+        assert math.hypot(led.x_mm, led.y_mm) == pytest.approx(9.5, abs=0.1)
+        assert led.height_mm == pytest.approx(design.ring.nominal_height_mm, abs=0.1)
+    assert design.membrane.bounces == 14
+    assert read_design(folder / "hard.toml").membrane.bounces == 0
