@@ -38,12 +38,15 @@ class Capture:
         Message about the capture.
     note : str
         Short text below the name, such as ``3.00 mm``.
+    residual : float or None
+        How far it is from the result of its stage; None if it was not compared.
     """
 
     path: Path
     state: str
     sentence: str
     note: str = ""
+    residual: float | None = None
 
 
 class FilmStrip(QListWidget):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from PySide6.QtWidgets import QFileDialog, QWidget
 
@@ -26,9 +26,17 @@ from gelpolight_core.translation import tr
 # After an automatic capture the technician has this long to arrange the next view.
 PAUSE_S = 1.5
 
-Judgement = tuple[str, str, str]
-"""State of a capture, message about it, and a short text below its name."""
-WAITING: Judgement = ("waiting", "", "")
+
+class Judgement(NamedTuple):
+    """How a capture was judged; the attributes are those of :class:`Capture`."""
+
+    state: str
+    sentence: str
+    note: str = ""
+    residual: float | None = None
+
+
+WAITING = Judgement("waiting", "")
 
 
 class ImageStep(StepPresenter):
@@ -63,7 +71,12 @@ class ImageStep(StepPresenter):
         status = self.model.statuses[self.stage]
         if status.state in (StageState.STALE, StageState.WAITING, StageState.EMPTY):
             return WAITING
-        return status.state.value, status.sentence, ""
+        return Judgement(status.state.value, status.sentence)
+
+    @property
+    def residual_heading(self) -> str:
+        """What the residual of a capture is, with its unit; empty in steps without one."""
+        return ""
 
     @property
     def radius_mm(self) -> float | None:
@@ -113,6 +126,9 @@ class ImageStep(StepPresenter):
     def refresh(self) -> None:
         """Update to changed results and corrections, also after undo."""
         super().refresh()
+        self.panel.residuals.show_captures(
+            self.captures(), heading=self.residual_heading, shown=self.model.shown
+        )
         self._point_to_captures()
         self.arm()
 
@@ -240,6 +256,13 @@ class ImageStep(StepPresenter):
             self.panel.show_notice(text, "warn")
             return
         self.capture()
+
+    def repeat(self, name: str) -> None:
+        """Exclude a capture, and show the live image to capture it again."""
+        self.exclude(name, True)
+        self.live()
+        text = tr("{name} is excluded. Capture a new image in its place.")
+        self.panel.show_notice(text.format(name=name), "warn")
 
     def choose_files(self) -> None:
         """Let the user choose image files to import."""

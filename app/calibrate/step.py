@@ -206,6 +206,9 @@ class StepPresenter(QObject):
         if self.model.shown:
             self.live()
 
+    def repeat(self, name: str) -> None:
+        """Exclude a capture, and capture it again."""
+
     def choose_files(self) -> None:
         """Let the user choose image files to import."""
 

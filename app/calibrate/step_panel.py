@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.calibrate.assembly import AssemblyDrawing
+from app.calibrate.residual_table import ResidualTable
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.step_data import Step
 from app.widgets.label import PlainLabel
@@ -174,6 +175,8 @@ class StepPanel(QWidget):
         self._column.addLayout(row)
         self._column.addWidget(self.sentence)
         self._column.addWidget(self.quality)
+        self.residuals = ResidualTable()
+        self._column.addWidget(self.residuals)
 
     def _build_foot(self) -> QVBoxLayout:
         foot = QVBoxLayout()
@@ -212,6 +215,7 @@ class StepPanel(QWidget):
         if step is not self._step:
             # The message belongs to the previous step; remove it, even during a computation.
             self._show_figures(())
+            self.residuals.show_captures((), heading="", shown="")
         self._step = step
         self._show_finished(False)
         self.title.setText(step.title)

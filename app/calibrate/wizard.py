@@ -165,6 +165,8 @@ class Wizard(QMainWindow):
         panel.lay_wanted.connect(self._lay_on_bench)
         area.live_wanted.connect(lambda: self.open.live())
         area.strip.chosen.connect(self.show_capture)
+        panel.residuals.chosen.connect(self._show_from_table)
+        panel.residuals.repeat_wanted.connect(lambda name: self.open.repeat(name))
         area.strip.excluded.connect(lambda name, out: self.open.exclude(name, out))
         area.view.moved.connect(lambda *at: self.open.moved(*at))
         self.live.processed.connect(lambda item: self.open.detected(item))
@@ -326,7 +328,12 @@ class Wizard(QMainWindow):
         except InputError as error:
             self._refuse(str(error))
 
+    def _show_from_table(self, name: str) -> None:
+        self.area.strip.choose(name)
+        self.show_capture(name)
+
     def _on_shown(self) -> None:
+        self.panel.residuals.select(self.model.shown)
         self._live_key.setEnabled(bool(self.model.shown))
         self._follow_bench()
 

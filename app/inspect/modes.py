@@ -43,8 +43,9 @@ class ModeBox(ComboBox):
             tr("Accuracy and speed"),
             tr(
                 "Choose accuracy or speed. Each name is followed by the errors of height "
-                "and size,\nmeasured on a simulated sensor, and by the time of a frame on "
-                "this machine once it\nhas been used. A frozen image always has the full "
+                "and size,\nmeasured on a simulated sensor with a matt membrane, and by the "
+                "time of a frame on\nthis machine once it has been used. The error of your "
+                "own sensor is stated on the\npage Sensors. A frozen image always has the full "
                 "accuracy of its model."
             ),
         )

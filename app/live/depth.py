@@ -19,6 +19,7 @@ from app.sources.processor import Failure, Outcome
 from app.sources.source import SourceInfo
 from gelpolight_core.health.finding import Finding
 from gelpolight_core.health.watch import HealthWatch
+from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace_tally import TraceTally
 from gelpolight_core.translation import tr
@@ -184,8 +185,9 @@ class LiveDepth(QObject):
         if heightmap.trace is None:
             texts.append(heightmap.model)
         else:
-            steps = tr("{effort}, steps: {n}")
-            texts.append(steps.format(effort=heightmap.trace.effort, n=len(heightmap.trace.done)))
+            mode = Mode(heightmap.model, heightmap.trace.effort)
+            steps = tr("{mode}, steps: {n}")
+            texts.append(steps.format(mode=mode.label, n=len(heightmap.trace.done)))
         if heightmap.visible_depth_mm is not None:
             um = 1e3 * heightmap.visible_depth_mm
             texts.append(tr("visible depth {um:.0f} um").format(um=um))

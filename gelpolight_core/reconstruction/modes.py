@@ -62,9 +62,9 @@ CLOSED_MODES = (Mode(IN_PLACE, "best"),)
 
 FOUND: Mapping[Mode, FoundError] = MappingProxyType(
     {
-        Mode(FULL, "fast"): FoundError(0.70, 0.41),
-        Mode(FULL, "balanced"): FoundError(0.39, 0.22),
-        Mode(FULL, "best"): FoundError(0.38, 0.15),
+        Mode(FULL, "fast"): FoundError(0.21, 0.32),
+        Mode(FULL, "balanced"): FoundError(0.18, 0.16),
+        Mode(FULL, "best"): FoundError(0.20, 0.10),
         Mode(PAPER, "best"): FoundError(2.0, 2.6),
     }
 )

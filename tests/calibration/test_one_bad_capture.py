@@ -64,7 +64,7 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
         Stage.BALLS: lambda name: judge_ball(name, project),
     }
     for path in project.session.found(FOLDERS[stage]):
-        state, sentence, _note = judges[stage](path.name)
+        state, sentence, *_ = judges[stage](path.name)
         if path.name in reasons:
             assert state == "fail"
             assert reasons[path.name] in sentence

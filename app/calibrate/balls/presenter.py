@@ -86,6 +86,11 @@ class BallsStep(ImageStep):
         """Return how a press was judged."""
         return judge_ball(path.name, self.model.project)
 
+    @property
+    def residual_heading(self) -> str:
+        """The difference between the shading of a press and that of its ball."""
+        return tr("Shading error, %")
+
     # The radius
 
     @property
@@ -206,15 +211,16 @@ def judge_ball(name: str, project: CalibrationProject) -> Judgement:
     if ball is None:
         return WAITING
     if ball.fault is not None:
-        return "fail", sentence_of(ball.fault), tr("not used")
+        return Judgement("fail", sentence_of(ball.fault), tr("not used"))
     if ball.press is None:
         return WAITING
     text = _disagreement(ball.press, project)
     if text:
-        return "fail", text, tr("check it")
+        return Judgement("fail", text, tr("check it"), 100.0 * ball.press.shading_misfit)
     quality = ball.press.quality
     note = tr("⌀ {d:g} mm").format(d=2.0 * ball.press.pose.radius_mm)
-    return quality.verdict.value, ". ".join(quality.advice), note
+    advice = ". ".join(quality.advice)
+    return Judgement(quality.verdict.value, advice, note, 100.0 * ball.press.shading_misfit)
 
 
 def _disagreement(press: BallPress, project: CalibrationProject) -> str:

@@ -86,13 +86,19 @@ class ClosedBallsStep(BallsStep):
             return WAITING
         fault = run.result.refused.get(path.name)
         if fault is not None:
-            return "fail", sentence_of(fault), tr("not used")
+            return Judgement("fail", sentence_of(fault), tr("not used"))
         for press in run.result.presses:
             if press.name == path.name:
                 error = press.held_out.normal_deg
                 text = tr("Without this press, its normals are found with an error of {e:.1f} deg.")
-                return "pass", text.format(e=error), tr("{e:.1f} deg").format(e=error)
+                note = tr("{e:.1f} deg").format(e=error)
+                return Judgement("pass", text.format(e=error), note, error)
         return WAITING
+
+    @property
+    def residual_heading(self) -> str:
+        """The error of the normals of a press that the others predict."""
+        return tr("Normal error, deg")
 
     def is_finished(self, state: str) -> bool:
         """Return whether more presses do not help."""

@@ -84,6 +84,11 @@ class LensStep(ImageStep):
         """Return what was found in a view."""
         return judge_view(self.views().get(path.name))
 
+    @property
+    def residual_heading(self) -> str:
+        """The reprojection error of a view."""
+        return tr("Corner error, px")
+
     def _on_captured(self, stage: str, _name: str) -> None:
         if stage == Stage.LENS:
             self._find_boards()
@@ -109,8 +114,9 @@ def judge_view(view: LensView | None) -> Judgement:
     if view is None:
         return WAITING
     if not view.used:
-        return "fail", view.reason, tr("not used")
+        return Judgement("fail", view.reason, tr("not used"))
     if math.isnan(view.rms_px):
-        return "pass", tr("Board found."), tr("board found")
+        return Judgement("pass", tr("Board found."), tr("board found"))
     note = tr("{r:.2f} px").format(r=view.rms_px)
-    return "pass", tr("Corner error {r:.3f} px.").format(r=view.rms_px), note
+    sentence = tr("Corner error {r:.3f} px.").format(r=view.rms_px)
+    return Judgement("pass", sentence, note, view.rms_px)

@@ -55,5 +55,5 @@ def judge_top_view(name: str, project: CalibrationProject, status: StageStatus) 
     found = project.results.top_pose
     for view in () if found is None or not status.quality.figures else found.views:
         if view.name == name and not view.used:
-            return "fail", view.reason, tr("not used")
-    return status.state.value, status.sentence, ""
+            return Judgement("fail", view.reason, tr("not used"))
+    return Judgement(status.state.value, status.sentence)

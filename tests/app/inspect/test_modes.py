@@ -49,7 +49,7 @@ def test_every_mode_is_offered_with_its_measured_errors(
     choice.offer(full, full)
     texts = [choice.box.itemText(k) for k in range(choice.box.count())]
     assert len(texts) == len(MODES) == 4
-    assert "fast   0.70 / 0.41 %" in choice.box.currentText()
+    assert "fast   0.21 / 0.32 %" in choice.box.currentText()
     assert "2.0 / 2.6 %" in texts[-1]
     errors = [FOUND[mode] for mode in MODES[:3]]
     # More effort is more accurate in both together. The height errors of balanced and best differ
