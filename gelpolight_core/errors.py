@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from gelpolight_core.translation import pattern
+
 
 class InputError(Exception):
     """Input that the user can correct. It is shown as one sentence, never as a traceback.
@@ -31,10 +33,19 @@ class InputError(Exception):
         self.advice = advice
         super().__init__(found, where, advice)
 
+    @property
+    def text(self) -> str:
+        """Where, what and advice, as a text that can be translated later."""
+        where, found, advice = map(_printable, (self.where, self.found, self.advice))
+        return pattern("{where}: {found}. {advice}.", where=where, found=found, advice=advice)
+
     def __str__(self) -> str:
         """Return the message that the user reads: where, what, advice."""
-        message = f"{self.where}: {self.found}. {self.advice}."
-        if message.isprintable():
-            return message
-        # A file name from elsewhere may contain terminal control characters.
-        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in message)
+        return str(self.text)
+
+
+def _printable(text: str) -> str:
+    """Return a text without terminal control characters, which a file name may contain."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

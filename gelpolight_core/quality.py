@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, pattern, tr
 
 
 class Verdict(StrEnum):
@@ -56,7 +56,8 @@ class Figure:
     @property
     def text(self) -> str:
         """Label, value and unit."""
-        return f"{self.label}: {self.value:.3g} {self.unit}".rstrip()
+        form = "{label}: {value:.3g} {unit}" if self.unit else "{label}: {value:.3g}"
+        return pattern(form, label=self.label, value=self.value, unit=self.unit)
 
     @property
     def higher_is_better(self) -> bool:
@@ -176,5 +177,5 @@ def failure(quality: Mapping[str, QualityTable]) -> str:
     if not failed:
         return ""
     return tr("the calibration failed its quality check ({figures})").format(
-        figures=", ".join(failed)
+        figures=joined(", ", failed)
     )

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import gettext
 import os
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 LANGUAGES = {"en": "English", "de": "Deutsch"}
 CATALOGUES = Path(__file__).parent / "locale"
@@ -53,9 +55,52 @@ def current_language() -> str:
     return _language
 
 
+class Text(str):
+    """A text in the user's language that remembers where it comes from.
+
+    Files store its template and its values (:mod:`gelpolight_core.io.texts`), so that it can be
+    shown in another language later.
+
+    Attributes
+    ----------
+    template : str
+        The English text of the source, with its placeholders.
+    values : dict
+        What the placeholders stand for; empty until :meth:`format`.
+    """
+
+    template: str
+    values: dict[str, Any]
+
+    def __new__(cls, shown: str, template: str, values: dict[str, Any] | None = None) -> Text:
+        """Return a text that is shown as `shown`."""
+        text = super().__new__(cls, shown)
+        text.template, text.values = template, values or {}
+        return text
+
+    def format(self, *args: object, **values: Any) -> Text:
+        """Return the text with its placeholders filled; they have names."""
+        return Text(super().format(*args, **values), self.template, values)
+
+    def __reduce__(self) -> tuple[type[Text], tuple[str, str, dict[str, Any]]]:
+        """Return what a copy is made from."""
+        return Text, (str(self), self.template, self.values)
+
+
 def tr(text: str) -> str:
-    """Return `text` in the user's language; fill placeholders afterwards with ``str.format``."""
-    return translated(text)
+    """Return `text` in the user's language; fill placeholders afterwards with ``format``."""
+    return Text(translated(text), text)
+
+
+def pattern(template: str, **values: Any) -> str:
+    """Return texts put together by a template that needs no translation, such as ``{a}. {b}``."""
+    return Text(template, template).format(**values)
+
+
+def joined(separator: str, parts: Iterable[str]) -> str:
+    """Return texts with a separator between them."""
+    values = {f"part{n}": part for n, part in enumerate(parts)}
+    return pattern(separator.join(f"{{{name}}}" for name in values), **values)
 
 
 def marked(text: str) -> str:

@@ -26,12 +26,12 @@ from gelpolight_core.calibration.manifest import (
     FORMAT,
     HEAD_LIMIT,
     MANIFEST,
-    OPEN_VERSION,
     UNREADABLE,
     VERSION,
     damaged,
     declared_bytes,
     opened,
+    quality_rows,
     read_manifest,
     read_member,
     read_quality,
@@ -201,12 +201,12 @@ def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
     elastomer = provenance.pop(ELASTOMER)
     manifest = {
         "format": FORMAT,
-        "version": VERSION if isinstance(c, InPlaceCalibration) else OPEN_VERSION,
+        "version": VERSION,
         "identity": c.identity,
         "model": c.model,
         "units": {"length": "mm", "picture": "linear light 0..1", "camera": "px"},
         "grid": _grid_entry(c.table.grid),
-        "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
+        "quality": {stage: quality_rows(table) for stage, table in c.quality.items()},
         "provenance": provenance,
     }
     if elastomer:

@@ -18,14 +18,14 @@ from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import NEWEST, brief, open_file, parse_json, written_text
+from gelpolight_core.io.texts import restored, stored
 from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-calibration"
 # Version 1 has no membrane curves, standard deviations, manual edits or camera response.
-# Version 3 adds closed sensors; calibrations of open sensors are the same as in version 2.
-VERSION = 3
-OPEN_VERSION = 2
+# Version 3 adds closed sensors; version 4 stores texts with templates and values.
+VERSION = 4
 MANIFEST = "manifest.json"
 ELASTOMER = "elastomer"
 """Beside the provenance, because older programs refuse unknown keys there."""
@@ -192,13 +192,22 @@ def read_member(archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
     return data
 
 
+def quality_rows(table: QualityTable) -> list[dict[str, Any]]:
+    """Return a quality table as it is stored: with texts that can be translated later."""
+    return [
+        row | {key: stored(getattr(figure, key)) for key in _TEXTS}
+        for row, figure in zip(table.as_rows(), table.figures, strict=True)
+    ]
+
+
 def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
-    """Return a quality table from the rows of ``QualityTable.as_rows``."""
+    """Return a quality table from :func:`quality_rows`, or from plain rows of older files."""
     return QualityTable(tuple(_figure(row) for row in rows))
 
 
 def _figure(row: dict[str, Any]) -> Figure:
-    texts = {key: written_text(row[key]) for key in ("key", "label", "unit", "advice")}
+    texts = {key: written_text(row[key]) for key in ("key", "unit")}
+    texts |= {key: restored(row[key]) for key in _TEXTS}
     limits = {key: None if row[key] is None else _number(row[key]) for key in _LIMITS}
     return Figure(**{
         **row, **texts, **limits, "value": _number(row["value"]), "verdict": Verdict(row["verdict"])
@@ -206,6 +215,7 @@ def _figure(row: dict[str, Any]) -> Figure:
 
 
 _LIMITS = ("warn_limit", "fail_limit")
+_TEXTS = ("label", "advice")
 
 
 def _number(value: Any) -> float:

@@ -33,7 +33,7 @@ from gelpolight_core.session.file_hashes import refuse_copies
 from gelpolight_core.session.missing import refuse_missing_stages
 from gelpolight_core.session.session import Session
 from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import pattern, tr
 
 Progress = Callable[[str, float], None]
 STAGES = tuple(FOLDERS.values())
@@ -289,7 +289,7 @@ def judge_radii(joint: JointResult) -> tuple[Figure, ...]:
             "%",
             warn=RADIUS_WARN_PERCENT,
             fail=RADIUS_FAIL_PERCENT,
-            advice=f"{seen.format(p=off)}. {advice}",
+            advice=pattern("{seen}. {advice}", seen=seen.format(p=off), advice=advice),
         ),
     )
 

@@ -23,7 +23,7 @@ from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.response.stage import ResponseResult
 from gelpolight_core.sensor_calibration import FullModel
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, pattern, tr
 
 Map = NDArray[np.float32]
 T = TypeVar("T")
@@ -107,7 +107,12 @@ def require_balls(results: StageResults) -> None:
 def judge_balls(results: StageResults) -> QualityTable:
     """Judge the ball presses together: which captures were left out, and why."""
     refused = [
-        f"{ball.file}: {ball.fault.found}. {ball.fault.advice}"
+        pattern(
+            "{file}: {found}. {advice}",
+            file=ball.file,
+            found=ball.fault.found,
+            advice=ball.fault.advice,
+        )
         for ball in results.balls
         if ball.fault is not None
     ]
@@ -118,7 +123,7 @@ def judge_balls(results: StageResults) -> QualityTable:
                 tr("Captures left out"),
                 float(len(refused)),
                 warn=0.0,
-                advice=tr("Left out: {names}").format(names="; ".join(refused)),
+                advice=tr("Left out: {names}").format(names=joined("; ", refused)),
             ),
         )
     )

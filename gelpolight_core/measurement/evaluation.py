@@ -13,6 +13,7 @@ import numpy as np
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.truth import PressTruth
 from gelpolight_core.measurement.variances import variance_between, variance_within
+from gelpolight_core.translation import tr
 
 PAPER_PERCENT = {"planar": 5.0, "depth": 8.0}
 """Mean errors that the paper reports for random regions."""
@@ -174,6 +175,15 @@ class Evaluation:
     def failed(self) -> tuple[PressResult, ...]:
         """The presses that could not be measured."""
         return tuple(result for result in self.results if result.measurement is None)
+
+    @property
+    def failure(self) -> str:
+        """How many presses could not be measured; empty if all could."""
+        if not self.failed:
+            return ""
+        return tr("{failed} of {all} presses could not be measured").format(
+            failed=len(self.failed), all=len(self.results)
+        )
 
     def overall(self, direction: str) -> Statistic:
         """Return the statistic of all presses that count in one direction."""

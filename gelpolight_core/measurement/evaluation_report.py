@@ -152,9 +152,7 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     handles, labels = panels[0][0].get_legend_handles_labels()
     note = tr("bars: mean, whiskers: one standard deviation, dots: presses")
     if evaluation.failed:
-        note += "; " + tr("{failed} of {all} presses could not be measured").format(
-            failed=len(evaluation.failed), all=len(evaluation.results)
-        )
+        note += f"; {evaluation.failure}"
     figure.supxlabel(note, fontsize=9, color="0.35")
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
     return figure

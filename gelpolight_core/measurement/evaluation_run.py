@@ -92,7 +92,7 @@ def measure_press(
     try:
         outcome = measure(path, shape)
     except InputError as error:  # a failed press is a result of the evaluation and does not stop it
-        outcome = str(error)
+        outcome = error.text
     if ledger is not None and key is not None:
         ledger.keep(key, outcome)
     return outcome

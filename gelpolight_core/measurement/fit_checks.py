@@ -9,7 +9,7 @@ from gelpolight_core.measurement.fit import EdgePrior, FitResult, WindowData, fi
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.segmentation import PressedRegion
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, tr
 
 GOOD_RESIDUAL = 0.005
 """Residual, as a share of the height, up to which no other shape is tried."""
@@ -56,7 +56,7 @@ def describe_fit_problems(
         _odd_drape(fit),
         _cut_drape(window),
     ]
-    return "; ".join(reason for reason in reasons if reason)
+    return joined("; ", (reason for reason in reasons if reason))
 
 
 def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> str:

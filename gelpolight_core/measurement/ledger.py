@@ -18,6 +18,7 @@ import numpy as np
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.appending import append_durably
 from gelpolight_core.io.reading import parse_json, plain_text, read_file
+from gelpolight_core.io.texts import restored, stored
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.translation import tr
 
@@ -85,7 +86,7 @@ class Ledger:
         self._known[key] = outcome
         if self._path is None:
             return
-        plain = outcome if isinstance(outcome, str) else _as_json(outcome)
+        plain = stored(outcome) if isinstance(outcome, str) else _as_json(outcome)
         line = json.dumps({"key": key, "outcome": plain}, separators=(",", ":")) + "\n"
         append_durably(self._path, ("\n" + line if self._torn else line).encode())
         self._torn = False
@@ -95,11 +96,17 @@ class Ledger:
         try:
             content = parse_json(line)
             outcome = content["outcome"]
-            self._known[content["key"]] = (
-                plain_text(outcome) if isinstance(outcome, str) else _measurement(outcome)
-            )
+            fitted = isinstance(outcome, dict) and "shape" in outcome
+            self._known[content["key"]] = _measurement(outcome) if fitted else _failure(outcome)
         except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError):
             return
+
+
+def _failure(outcome: Any) -> str:
+    """Return the sentence why an image has no measurement."""
+    text = restored(outcome)
+    plain_text(str(text))
+    return text
 
 
 def _damaged(path: Path) -> InputError:
@@ -112,7 +119,10 @@ def _damaged(path: Path) -> InputError:
 
 def _as_json(measurement: Measurement) -> dict[str, Any]:
     """Return all fields; JSON writes numbers so that they are read back exactly."""
-    return {**asdict(measurement), "outline_mm": measurement.outline_mm.tolist()}
+    plain = asdict(measurement)
+    plain["outline_mm"] = measurement.outline_mm.tolist()
+    plain["reason"] = stored(measurement.reason)
+    return plain
 
 
 def _measurement(content: dict[str, Any]) -> Measurement:
@@ -121,6 +131,7 @@ def _measurement(content: dict[str, Any]) -> Measurement:
     }
     for part in SPREADS:
         values[part] = _spread(content[part])
+    values["reason"] = restored(content["reason"])
     values["outline_mm"] = np.array(content["outline_mm"], np.float64)
     return Measurement(**values)
 

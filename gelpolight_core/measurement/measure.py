@@ -34,7 +34,7 @@ from gelpolight_core.measurement.spread import (
     mode_sd,
     noise_of_fit,
 )
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -129,7 +129,7 @@ def measure_object(
     window, region, prior = found.window, found.region, found.edge
     fit = _fit(shape, window, region, prior)
     reasons = (describe_fit_problems(shape, fit, window, region, prior), no_anchor(flags, region))
-    reason = "; ".join(found for found in reasons if found)
+    reason = joined("; ", (found for found in reasons if found))
     face = _face(shape, fit, window)
     noise = (
         {}

@@ -9,7 +9,7 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tool import ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, tr
 
 Result = TypeVar("Result", Measurement, ToolResult)
 
@@ -36,7 +36,7 @@ def judged(result: Result, height_map: HeightMap) -> Result:
         Doubtful, with the reason, if the calibration's verdict is "fail", the image has a fault, or
         a shape with walls was measured with an in-place calibration; unchanged otherwise.
     """
-    faults = [height_map.calibration_fault]
+    faults: list[str] = [height_map.calibration_fault]
     if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
         faults.append(
             tr(
@@ -46,10 +46,9 @@ def judged(result: Result, height_map: HeightMap) -> Result:
         )
     if height_map.health is not None:
         faults += [finding.cause for finding in height_map.health.faults]
-    fault = "; ".join(text for text in faults if text)
-    if not fault:
+    if not any(faults):
         return result
-    reason = f"{fault}; {result.reason}" if result.reason else fault
+    reason = joined("; ", (text for text in (*faults, result.reason) if text))
     doubtful = replace(result, verdict="doubtful", reason=reason)
     if isinstance(doubtful, ToolResult) and doubtful.measurement is not None:
         doubtful = replace(doubtful, measurement=judged(doubtful.measurement, height_map))

@@ -13,7 +13,7 @@ from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_fit import LensFit
 from gelpolight_core.optics.lens_views import MIN_VIEWS, LensView, more_views_advice
 from gelpolight_core.quality import Figure, judge
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, pattern, tr
 
 Array = NDArray[np.float64]
 
@@ -136,13 +136,17 @@ def view_figures(
         Variation of the board tilt.
     """
     used = sum(view.used for view in views)
-    refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
+    refused = [
+        pattern("{name} ({reason})", name=view.name, reason=view.reason)
+        for view in views
+        if not view.used
+    ]
     edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
     return (
         judge("views_used", tr("Views used"), used,
               warn=8, fail=MIN_VIEWS, higher_is_better=True, advice=more_views_advice()),
         judge("views_left_out", tr("Views left out"), len(refused), warn=0,
-              advice=tr("Left out: {names}").format(names="; ".join(refused))),
+              advice=tr("Left out: {names}").format(names=joined("; ", refused))),
         judge("normal_spread", tr("Variation of the board tilt"), spread_deg, "deg",
               warn=10.0, fail=MIN_NORMAL_SPREAD_DEG, higher_is_better=True,
               advice=tr("Tilt the board more and in different directions")),

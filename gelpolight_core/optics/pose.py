@@ -25,7 +25,7 @@ from gelpolight_core.optics.mirrored_pose import SURE_MARGIN, choose_side, neare
 from gelpolight_core.optics.plane_pose import PlanePose, angle_between_deg, as_plane, find_poses
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, pattern, tr
 
 MOST_LENS_BLUR_PX = 1.0
 """The reconstruction removes up to this blur; the rest of a larger blur makes walls too flat."""
@@ -335,14 +335,18 @@ def _plane_figures(
 def _view_figures(
     views: Sequence[TopPoseView], rms: float, spread_deg: float, decision: Decision, margin: float
 ) -> tuple[Figure, ...]:
-    refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
+    refused = [
+        pattern("{name} ({reason})", name=view.name, reason=view.reason)
+        for view in views
+        if not view.used
+    ]
     figures = [
         judge("reprojection_rms", tr("Reprojection error"), rms, "px", warn=0.3, fail=1.0,
               advice=tr("Use a flat board and check its square size; calibrate the lens again")),
         judge("view_spread", tr("Largest angle between a view and the average"), spread_deg, "deg",
               warn=0.25, fail=1.0, advice=tr("Press the board flat onto the surface in each view")),
         judge("views_left_out", tr("Views left out"), len(refused), warn=0,
-              advice=tr("Left out: {names}").format(names="; ".join(refused))),
+              advice=tr("Left out: {names}").format(names=joined("; ", refused))),
     ]  # fmt: skip
     if decision is not Decision.SINGLE:
         figures.append(

@@ -51,14 +51,14 @@ def evaluation_record(
         return None
     quantities = tuple(Quantity(NAMES[direction], error) for direction, error in found.items())
     within = all(error <= limits[direction] for direction, error in found.items())
-    failed = len(evaluation.failed)
+    failed = evaluation.failure
     return MeasurementRecord(
         serial=serial,
         calibration_id=calibration_id,
         shape=SHAPE,
         quantities=quantities,
         verdict=DOUBTFUL if failed else (PASSED if within else FAILED),
-        reason="" if not failed else f"{failed} of {len(evaluation.results)} not measured",
+        reason=failed,
         settings={"limits_percent": limits},
         details={"groups": [_plain(group) for group in evaluation.groups]},
         operator=operator,

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from gelpolight_core.io.reading import parse_json, written_text
+from gelpolight_core.io.texts import as_line, from_line
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
 # The size limit of one value of the database.
@@ -27,7 +28,7 @@ def row_of(record: MeasurementRecord) -> tuple[str | None, ...]:
         record.calibration_id or None,
         record.shape,
         record.verdict,
-        record.reason,
+        as_line(record.reason),
         json.dumps(dict(record.settings), allow_nan=False),
         json.dumps(dict(record.details), allow_nan=False),
         record.operator,
@@ -65,7 +66,7 @@ def _quantity(row: sqlite3.Row) -> Quantity:
     return Quantity(written_text(row["name"]), *numbers)
 
 
-_TEXTS = ("serial", "shape", "verdict", "reason", "operator", "picture", "note")
+_TEXTS = ("serial", "shape", "verdict", "operator", "picture", "note")
 
 
 def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRecord:
@@ -75,6 +76,7 @@ def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRe
     texts = {name: written_text(row[name], MOST_TEXT) for name in _TEXTS}
     return MeasurementRecord(
         **texts,
+        reason=from_line(written_text(row["reason"], MOST_TEXT)),
         calibration_id=written_text(row["calibration_id"] or ""),
         quantities=quantities,
         settings=settings,
