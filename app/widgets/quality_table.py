@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -58,6 +58,13 @@ class _Grid(QTableWidget):
     """A table whose copy shortcut copies whole rows instead of a single cell."""
 
     copy_asked = Signal()
+    resized = Signal()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Announce the new width once the columns have it."""
+        super().resizeEvent(event)
+        if event.size().width() != event.oldSize().width():
+            self.resized.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Copy the rows, or handle the key as usual."""
@@ -108,6 +115,7 @@ class QualityTableWidget(QWidget):
         self._grid.verticalHeader().setMinimumSectionSize(1)
         make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
         self._grid.copy_asked.connect(self.copy)
+        self._grid.resized.connect(self._fit)
         self._grid.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         layout = QVBoxLayout(self)
