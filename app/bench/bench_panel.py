@@ -60,6 +60,9 @@ def _fault_names() -> dict[str, tuple[str, str]]:
         "room_light": (tr("Room light on"), tr("Light from outside falls into the sensor")),
         "membrane_on": (tr("Membrane mounted"), tr("The membrane hides the mirror")),
         "too_bright": (tr("Overexposed"), tr("Three times too much light")),
+        "led_off": (tr("Blue LED off"), tr("The blue LED gives no light")),
+        "defocused": (tr("Out of focus"), tr("The lens is turned away from its focus")),
+        "dust": (tr("Dust"), tr("Specks of dust between camera and membrane")),
     }
 
 

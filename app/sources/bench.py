@@ -21,9 +21,12 @@ FLAT = ("mirror", "whiteboard", "bare")
 PRESSED = ("ball", "cylinder", "cuboid", "coin", "nut")
 ITEMS = (*BOARDS, *FLAT, *PRESSED)
 
-FAULTS = ("camera_stops", "room_light", "membrane_on", "too_bright")
+FAULTS = (
+    "camera_stops", "room_light", "membrane_on", "too_bright", "led_off", "defocused", "dust",
+)  # fmt: skip
 """Faults that can be switched on: the camera stops delivering images; light from the room falls in;
-the membrane is still mounted under the mirror; three times too much light.
+the membrane is still mounted under the mirror; three times too much light; the blue LED is dead;
+the lens is out of focus; dust in the light path.
 """
 
 STAGES = {

@@ -11,22 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sources.bench import (
-    BOARDS,
-    CONDITION_RANGES,
-    NOMINAL_EXPOSURE_MS,
-    Bench,
-    Conditions,
-)
+from app.sources.bench import CONDITION_RANGES, NOMINAL_EXPOSURE_MS, Bench, Conditions
+from app.sources.bench_faults import with_faults
 from app.sources.noise import NoiseLevel, noisy, rgb_of
 from app.sources.rendering import Renderer, Rendering
 from app.sources.source import Frame, Rgb, Setting, SourceLost
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
-
-ROOM_LIGHT = (0.066, 0.060, 0.050)
-"""Light of a lit room in the three channels at the nominal exposure; 1 is full scale."""
-TOO_BRIGHT = 3.0
 
 _SETTINGS: dict[str, tuple[Callable[[], str], str, float]] = {
     "exposure_ms": (lambda: tr("Exposure"), "ms", 0.1),
@@ -158,7 +149,9 @@ class VirtualSource:
         if old and old.rendering is rendering and old.conditions == conditions:
             return old
         self._developed = _Developed(
-            rendering, conditions, self._maker(_exposed(rendering, conditions), conditions)
+            rendering,
+            conditions,
+            self._maker(_exposed(rendering, conditions, self.bench), conditions),
         )
         return self._developed
 
@@ -187,12 +180,9 @@ def _period_s(conditions: Conditions) -> float:
     return max(1.0 / conditions.rate_hz, 1e-3 * conditions.exposure_ms)
 
 
-def _exposed(rendering: Rendering, conditions: Conditions) -> NDArray[np.float64]:
+def _exposed(rendering: Rendering, conditions: Conditions, bench: Bench) -> NDArray[np.float64]:
     """Return the signal at the camera's exposure and gain; 1 is full scale."""
     factor = conditions.exposure_ms / NOMINAL_EXPOSURE_MS * _amplification(conditions)
-    if "too_bright" in conditions.faults:
-        factor *= TOO_BRIGHT
-    signal = rendering.signal
-    if "room_light" in conditions.faults and rendering.scene.item not in BOARDS:
-        signal = signal + np.array(ROOM_LIGHT)
+    item, faults = rendering.scene.item, conditions.faults
+    signal = with_faults(rendering.signal, faults, item=item, design=bench.design, seed=bench.seed)
     return np.asarray(signal * factor)

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from app.sources.bench import ITEMS, Bench
+from app.sources.bench_faults import ROOM_LIGHT
 from app.sources.noise import NoiseLevel, noisy
 from app.sources.rendering import state_of
 from app.sources.source import Frame, SourceLost
 from app.sources.stream import Stream
-from app.sources.virtual import ROOM_LIGHT, VirtualSource
+from app.sources.virtual import VirtualSource
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor, Whiteboard
@@ -209,6 +210,40 @@ def test_too_much_light_saturates(source: VirtualSource) -> None:
     source.bench.lay("whiteboard")
     source.bench.switch("too_bright", True)
     assert (settled(source).rgb == 255).any(axis=2).mean() > 0.1
+
+
+def test_the_light_of_a_dead_led_is_missing_in_every_channel(source: VirtualSource) -> None:
+    source.bench.adjust(noise=0.0)
+    source.bench.lay("whiteboard")
+    lit = settled(source).rgb.astype(float)
+    source.bench.switch("led_off", True)
+    dead = settled(source).rgb.astype(float)
+    mixed = np.array(source.bench.design.photometry.crosstalk)
+    seen = np.linalg.solve(mixed, dead.reshape(-1, 3).mean(axis=0))
+    before = np.linalg.solve(mixed, lit.reshape(-1, 3).mean(axis=0))
+    assert seen[2] == pytest.approx(0.0, abs=0.01 * before[2] + 0.5)
+    assert seen[:2] == pytest.approx(before[:2], abs=1.0)
+
+
+def test_a_defocused_lens_widens_edges_and_keeps_the_light(source: VirtualSource) -> None:
+    source.bench.adjust(noise=0.0)
+    source.bench.lay("checkerboard")
+    sharp = settled(source).rgb.astype(float)
+    source.bench.switch("defocused", True)
+    soft = settled(source).rgb.astype(float)
+    steepest = [np.abs(np.diff(image[..., 1], axis=1)).max() for image in (sharp, soft)]
+    assert steepest[1] < 0.4 * steepest[0]
+    assert soft.mean() == pytest.approx(sharp.mean(), rel=0.02)
+
+
+def test_dust_darkens_specks_and_nothing_else(source: VirtualSource) -> None:
+    source.bench.adjust(noise=0.0)
+    source.bench.lay("whiteboard")
+    clean = settled(source).rgb.astype(float)
+    source.bench.switch("dust", True)
+    dusty = settled(source).rgb.astype(float)
+    changed = (dusty != clean).any(axis=2)
+    assert 0.0005 < changed.mean() < 0.05 and (dusty <= clean).all()
 
 
 def test_unread_frames_are_counted_as_made(source: VirtualSource) -> None:
