@@ -20,6 +20,7 @@ from gelpolight_core.health.judging import (
     dark_finding,
     dirt_finding,
     far_moved_finding,
+    led_off_findings,
     light_findings,
     light_gain,
     may_have_moved,
@@ -162,6 +163,8 @@ class HealthCheck:
         seen = 1.0 + self._run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
         if (seen < DARK).all():
             return health_of([dark_finding()], untouched=share)
+        if off := led_off_findings(seen - 1.0):
+            return health_of(off, untouched=share)
         for order in ORDERS:
             turned = self._common(np.ascontiguousarray(raw[..., order]), light[list(order)])
             if turned.share > SWAPPED_UNTOUCHED:

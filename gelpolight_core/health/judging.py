@@ -46,7 +46,8 @@ LEAST_SHIFT_PX = 0.5
 """0.6 px cost 10 um."""
 LEAST_BLUR_PX = 1.0
 """A blur of 1.4 px costs 10 um."""
-LED_OFF = -0.8
+LED_OFF, LEAST_LIT = -0.8, -0.5
+"""Change of a channel below which its LED is off, and above which the others are on."""
 FAR_GAIN, FAR_OFFSET = 0.05, 0.005
 """Above these, the error of the depth is a third of its value or more."""
 FAR_SHIFT_PX, FAR_BLUR_PX = 10.0, 6.0
@@ -169,12 +170,7 @@ def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:
     if abs(change - middle) < limits.channel + SIGMAS * float(sd[k]):
         return None
     if change < LED_OFF:
-        return Finding(
-            "led_off",
-            tr("the {name} LED is off").format(name=channel_name(k)),
-            tr("Check its cable and driver, then calibrate again"),
-            Verdict.FAIL, True, 100.0 * change, "%",
-        )  # fmt: skip
+        return _led_off_finding(k, change)
     far = abs(change - middle) > 2.0 * FAR_GAIN
     text = tr("the {name} LED is {p:.1f} % {how} than at calibration").format(
         name=channel_name(k),
@@ -185,6 +181,30 @@ def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:
     return Finding(
         "led_weak", text, remedy.format(again=BACKGROUND), _severity(far), far, 100.0 * change, "%"
     )
+
+
+def led_off_findings(change: Array) -> list[Finding]:
+    """Return the LEDs that are off, where crosstalk changes the pattern of all channels.
+
+    Parameters
+    ----------
+    change : (3,)
+        Change of all light of each channel over that at calibration; -1 is no light.
+    """
+    off = change < LED_OFF
+    lit = change > LEAST_LIT
+    if not off.any() or not (off | lit).all():
+        return []
+    return [_led_off_finding(int(k), float(change[k])) for k in np.flatnonzero(off)]
+
+
+def _led_off_finding(k: int, change: float) -> Finding:
+    return Finding(
+        "led_off",
+        tr("the {name} LED is off").format(name=channel_name(k)),
+        tr("Check its cable and driver, then calibrate again"),
+        Verdict.FAIL, True, 100.0 * change, "%",
+    )  # fmt: skip
 
 
 def _exposure_finding(change: float) -> Finding:

@@ -110,9 +110,18 @@ def test_each_fault_is_found_where_it_costs_ten_micrometres(
     assert found.findings[0].remedy
 
 
+def dead_led(k: int) -> Change:
+    """Return the loss of the light of one LED, also in the channels that see it by crosstalk."""
+    mixed, kept = np.array(SensorDesign().photometry.crosstalk), np.eye(3)
+    kept[k, k] = 0.0
+    change = mixed @ kept @ np.linalg.inv(mixed)
+    return lambda frame: np.asarray(frame @ change.T, np.float32)
+
+
 MEANINGLESS: list[tuple[str, Change]] = [
     ("dark", light(0.01, 0.01, 0.01)),
     ("led_off", light(1.0, 0.0, 1.0)),
+    *(("led_off", dead_led(k)) for k in range(3)),
     ("led_weak", light(0.7, 1.0, 1.0)),
     ("exposure", light(0.8, 0.8, 0.8)),
     ("exposure", light(1.3, 1.3, 1.3)),
