@@ -25,6 +25,9 @@ POINT_COUNTS: dict[str, tuple[int, int | None]] = {
     "angle": (3, 3),
     "circle": (3, None),
     "rectangle": (1, 1),
+    "pit": (1, 1),
+    "scratch": (2, 2),
+    "edge-radius": (2, 2),
     "ball": (0, 1),
     "cylinder": (0, 1),
     "cuboid": (0, 1),
@@ -103,17 +106,20 @@ def _geometry(options: argparse.Namespace) -> dict[str, Any]:
                 least=least if most == least else tr("{n} or more").format(n=least)
             ),
         )
-    if name in ("step-height", "rectangle"):
+    if name in ("step-height", "rectangle", "pit"):
         allowed = {"at", "size", "yaw"} | ({"edge"} if name == "rectangle" else set())
         _refuse_rest(options, allowed, name)
         areas = [_rectangle(options, point) for point in placed]
-        keys = ("rectangle",) if name == "rectangle" else ("first", "second")
+        keys = ("first", "second") if name == "step-height" else ("rectangle",)
         return dict(zip(keys, areas, strict=True)) | _given(edge=options.edge)
     if name.startswith("profile-"):
         allowed = {"at", "width", "range"} | ({"level"} if name == "profile-width" else set())
         _refuse_rest(options, allowed, name)
         ends = {"start_mm": placed[0], "end_mm": placed[1]}
         return ends | _given(width_mm=options.width, level_mm=options.level) | _ranges(options)
+    if name in ("scratch", "edge-radius"):
+        _refuse_rest(options, {"at", "width"}, name)
+        return {"start_mm": placed[0], "end_mm": placed[1]} | _given(width_mm=options.width)
     _refuse_rest(options, {"at"} | ({"edge"} if name == "circle" else set()), name)
     if name == "circle":
         return {"points_mm": placed} | _given(edge=options.edge)

@@ -12,9 +12,12 @@ from gelpolight_core.measurement.tools import (
     Cuboid,
     Cylinder,
     Distance,
+    EdgeRadius,
+    Pit,
     ProfileWidth,
     Rectangle,
     RectangleTool,
+    Scratch,
     StepHeight,
     Tool,
 )
@@ -46,7 +49,7 @@ def grips_of(tool: Tool) -> tuple[Grip, ...]:
     match tool:
         case Distance():
             return Grip("a", tool.a_mm), Grip("b", tool.b_mm)
-        case ProfileWidth():
+        case ProfileWidth() | Scratch() | EdgeRadius():
             return Grip("start", tool.start_mm), Grip("end", tool.end_mm)
         case Angle():
             return (
@@ -56,7 +59,7 @@ def grips_of(tool: Tool) -> tuple[Grip, ...]:
             )
         case Circle():
             return tuple(Grip(str(i), point) for i, point in enumerate(tool.points_mm))
-        case RectangleTool():
+        case RectangleTool() | Pit():
             return _of_rectangle(tool.rectangle, "")
         case StepHeight():
             return (*_of_rectangle(tool.first, "first."), *_of_rectangle(tool.second, "second."))
@@ -68,13 +71,13 @@ def grips_of(tool: Tool) -> tuple[Grip, ...]:
 def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:
     """Return a tool with one of its grips moved."""
     match tool:
-        case Distance() | ProfileWidth() | Angle():
+        case Distance() | ProfileWidth() | Scratch() | EdgeRadius() | Angle():
             return replace(tool, **{f"{grip}_mm": to_mm})
         case Circle():
             points = list(tool.points_mm)
             points[int(grip)] = to_mm
             return replace(tool, points_mm=tuple(points))
-        case RectangleTool():
+        case RectangleTool() | Pit():
             return replace(tool, rectangle=_rectangle_moved(tool.rectangle, grip, to_mm))
         case StepHeight():
             which, _, part = grip.partition(".")
@@ -89,11 +92,11 @@ def outline_of(tool: Tool) -> tuple[tuple[Point, ...], ...]:
     match tool:
         case Distance():
             return ((tool.a_mm, tool.b_mm),)
-        case ProfileWidth():
+        case ProfileWidth() | Scratch() | EdgeRadius():
             return ((tool.start_mm, tool.end_mm),)
         case Angle():
             return ((tool.first_mm, tool.apex_mm, tool.second_mm),)
-        case RectangleTool():
+        case RectangleTool() | Pit():
             return (_corners(tool.rectangle),)
         case StepHeight():
             return _corners(tool.first), _corners(tool.second)

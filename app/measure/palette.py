@@ -34,7 +34,7 @@ class Palette(QWidget):
         column.setSpacing(3)
         for kind in kinds():
             column.addWidget(self._make_button(kind, owner))
-            if kind.name in ("angle", "rectangle"):
+            if kind.name in ("angle", "rectangle", "edge-radius"):
                 column.addSpacing(8)
         column.addStretch(1)
 

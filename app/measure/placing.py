@@ -12,9 +12,12 @@ from gelpolight_core.measurement.tools import (
     Cuboid,
     Cylinder,
     Distance,
+    EdgeRadius,
+    Pit,
     ProfileWidth,
     Rectangle,
     RectangleTool,
+    Scratch,
     StepHeight,
     Tool,
 )
@@ -97,6 +100,33 @@ def kinds() -> tuple[Kind, ...]:
             "R",
             (tr("Click one corner"), tr("Click the opposite corner")),
         ),
+        Kind(
+            "pit",
+            tr("Pit or bump"),
+            "I",
+            (
+                tr("Click one corner, beside the pit or bump"),
+                tr("Click the opposite corner, on the other side"),
+            ),
+        ),
+        Kind(
+            "scratch",
+            tr("Scratch or ridge"),
+            "X",
+            (
+                tr("Click the surface on one side of the scratch"),
+                tr("Click the surface on the other side"),
+            ),
+        ),
+        Kind(
+            "edge-radius",
+            tr("Edge radius"),
+            "E",
+            (
+                tr("Click where the rounding begins"),
+                tr("Click across the edge, where the rounding ends"),
+            ),
+        ),
         Kind("ball", tr("Ball"), "B", on_it),
         Kind("cylinder", tr("Cylinder"), "Y", on_it),
         Kind("cuboid", tr("Cuboid"), "U", on_it),
@@ -123,10 +153,21 @@ def make_tool(name: str, points: Sequence[Point]) -> Tool:
         case "circle":
             return Circle(tuple(points))
         case "rectangle":
-            (x0, y0), (x1, y1) = points
-            sides = max(abs(x1 - x0), LEAST_SIDE_MM), max(abs(y1 - y0), LEAST_SIDE_MM)
-            return RectangleTool(Rectangle(((x0 + x1) / 2.0, (y0 + y1) / 2.0), sides))
+            return RectangleTool(_rectangle(points))
+        case "pit":
+            return Pit(_rectangle(points))
+        case "scratch":
+            return Scratch(points[0], points[1])
+        case "edge-radius":
+            return EdgeRadius(points[0], points[1])
     return {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}[name](points[0])
+
+
+def _rectangle(corners: Sequence[Point]) -> Rectangle:
+    """Return the rectangle between two opposite corners."""
+    (x0, y0), (x1, y1) = corners
+    sides = max(abs(x1 - x0), LEAST_SIDE_MM), max(abs(y1 - y0), LEAST_SIDE_MM)
+    return Rectangle(((x0 + x1) / 2.0, (y0 + y1) / 2.0), sides)
 
 
 def first_points(name: str, middle_mm: Point) -> tuple[Point, ...]:
@@ -138,7 +179,7 @@ def first_points(name: str, middle_mm: Point) -> tuple[Point, ...]:
             return (x - r, y - r), (x, y), (x + r, y - r)
         case "circle":
             return (x - r, y), (x, y - r), (x + r, y)
-        case "rectangle":
+        case "rectangle" | "pit":
             return (x - r, y - r), (x + r, y + r)
         case "ball" | "cylinder" | "cuboid":
             return (middle_mm,)

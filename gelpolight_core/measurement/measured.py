@@ -86,6 +86,9 @@ def figure_labels() -> dict[str, str]:
         "sq": tr("roughness Sq"),
         "sz": tr("roughness Sz"),
         "height": tr("height"),
+        "feature_height": tr("feature height"),
+        "radius": tr("radius"),
+        "arc": tr("arc of the section"),
         "drape_decay": tr("drape decay"),
     }
 

@@ -10,6 +10,7 @@ from typing import Any, cast
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import brief
 from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.measurement.feature_tools import EdgeRadius, Pit, Scratch
 from gelpolight_core.measurement.indenter_tools import Ball, Cuboid, Cylinder
 from gelpolight_core.measurement.outline_tools import EDGES, Circle, RectangleTool
 from gelpolight_core.measurement.point_tools import Angle, Distance, StepHeight
@@ -25,11 +26,14 @@ __all__ = [
     "Cuboid",
     "Cylinder",
     "Distance",
+    "EdgeRadius",
+    "Pit",
     "ProfileAngle",
     "ProfileStep",
     "ProfileWidth",
     "Rectangle",
     "RectangleTool",
+    "Scratch",
     "StepHeight",
     "Tool",
     "ToolResult",
@@ -51,6 +55,9 @@ TOOLS: Mapping[str, type[Tool]] = MappingProxyType(
             Angle,
             Circle,
             RectangleTool,
+            Pit,
+            Scratch,
+            EdgeRadius,
             Ball,
             Cylinder,
             Cuboid,

@@ -1,0 +1,275 @@
+"""Tools for features of a surface: pit or bump, scratch, and the radius of an edge.
+
+Heights are those of the object: positive where it stands out, and so presses deeper into the gel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
+from gelpolight_core.measurement.edges import fit_circle
+from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
+from gelpolight_core.measurement.measured import Measured, map_errors, measured
+from gelpolight_core.measurement.profile import Profile, take_profile
+from gelpolight_core.measurement.roughness import ERROR_NODES, fit_plane
+from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.translation import joined, tr
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+SURROUNDINGS = 0.2
+"""Share of the half sides of a rectangle, or of the length of a section at each end, that shows the
+surface around the feature."""
+CORE = 0.8
+"""Nodes above this share of the height belong to the core of a pit or bump. Its height is that of a
+smooth surface through the core, because the highest node is high by its noise."""
+LEAST_CORE = 12
+CLEAR = 3.0
+"""Standard deviations by which a feature must stand out."""
+BRIDGED = 6.0
+"""Width of a pit or scratch, in decay lengths of the drape, below which the membrane does not reach
+its bottom: at this width it reaches 80 % of the depth of a round pit, and 90 % of a scratch."""
+LEAST_ARC_DEG = 30.0
+"""With a shorter arc, the radius depends on single nodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pit:
+    """A pit or bump inside a rectangle whose margin shows the surface around it.
+
+    Attributes
+    ----------
+    rectangle : Rectangle
+        Around the feature, with a margin of a fifth of its half sides.
+    """
+
+    name: ClassVar[str] = "pit"
+    rectangle: Rectangle
+
+    def apply(self, heightmap: HeightMap) -> ToolResult:
+        """Measure height against the surroundings, and diameter at half of it."""
+        nodes = nodes_inside(heightmap, self.rectangle)
+        around = _margin(nodes, self.rectangle)
+        relief = _relief_of_area(nodes, around, self.rectangle)
+        sign = _sign_of(relief[~around])
+        core = ~around & (sign * relief > CORE * _extreme(sign * relief[~around]))
+        few = nodes.thinned(ERROR_NODES)
+        margin = _margin(few, self.rectangle)
+        x, y, depth = (
+            np.concatenate([part[margin], whole[core]])
+            for part, whole in (
+                (few.x_mm, nodes.x_mm), (few.y_mm, nodes.y_mm), (few.depth_mm, nodes.depth_mm)
+            )
+        )  # fmt: skip
+        count = int(margin.sum())
+        beside = np.arange(x.size) < count
+
+        def height(depth: Array, stretch: float) -> float:
+            relief = _above_plane(x, y, depth, beside)[count:]
+            return sign * float((sign * _smooth(x[count:], y[count:], relief)).max())
+
+        figure = measured("feature_height", "mm", height, depth, map_errors(heightmap, x, y))
+        wide = ~around & (sign * relief > 0.5 * abs(figure.value))
+        area = float(wide.sum()) * heightmap.pitch_mm**2
+        diameter = 2.0 * math.sqrt(area / math.pi)
+        figures = (figure, _width(heightmap, diameter, "diameter"))
+        found = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
+        return _doubted(found, figure, diameter)
+
+
+@dataclass(frozen=True, slots=True)
+class Scratch:
+    """A scratch or ridge that a section crosses.
+
+    Attributes
+    ----------
+    start_mm, end_mm, width_mm
+        The section, as in :func:`~gelpolight_core.measurement.profile.take_profile`. A fifth of its
+        length at each end shows the surface beside the feature.
+    """
+
+    name: ClassVar[str] = "scratch"
+    start_mm: Point
+    end_mm: Point
+    width_mm: float = 0.0
+
+    def apply(self, heightmap: HeightMap) -> ToolResult:
+        """Measure height against the surroundings, and width at half of it."""
+        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        there = _complete(profile)
+        along, length = profile.along_mm[there], float(profile.along_mm[-1])
+        beside = (along < SURROUNDINGS * length) | (along > (1.0 - SURROUNDINGS) * length)
+
+        def relief_of(depth: Array) -> Array:
+            return _above_line(along, depth[there], beside)
+
+        relief = relief_of(profile.depth_mm)
+        extreme = int(np.argmax(np.where(beside, 0.0, np.abs(relief))))
+
+        def height(depth: Array, stretch: float) -> float:
+            return float(relief_of(depth)[extreme])
+
+        figure = measured("feature_height", "mm", height, profile.depth_mm, profile.errors)
+        left, right = _half_crossings(along, relief, extreme)
+        figures = (figure, _width(heightmap, right - left, "width"))
+        start, end = np.array(self.start_mm), np.array(self.end_mm)
+        ends = start + np.array([[left], [right]]) / length * (end - start)
+        lines = (np.stack([start, end]), ends)
+        found = tool_result(self, figures, lines, profile.flags[there], profile=profile)
+        return _doubted(found, figure, right - left)
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeRadius:
+    """The radius of a rounded edge or groove, from a section across the rounding.
+
+    Attributes
+    ----------
+    start_mm, end_mm, width_mm
+        The section, as in :func:`~gelpolight_core.measurement.profile.take_profile`; it begins and
+        ends where the rounding does.
+    """
+
+    name: ClassVar[str] = "edge-radius"
+    start_mm: Point
+    end_mm: Point
+    width_mm: float = 0.0
+
+    def apply(self, heightmap: HeightMap) -> ToolResult:
+        """Fit a circle to the section."""
+        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        there = _complete(profile)
+        along = profile.along_mm[there]
+        circle = fit_circle(np.stack([along, profile.depth_mm[there]], axis=1))
+
+        def radius(depth: Array, stretch: float) -> float:
+            points = np.stack([stretch * along, depth[there]], axis=1)
+            return fit_circle(points).radius_mm
+
+        figure = measured("radius", "mm", radius, profile.depth_mm, profile.errors)
+        if figure.sd is not None:
+            figure = replace(figure, sd=math.hypot(figure.sd, circle.sd_mm[2]))
+        spread = circle.points_mm - np.array(circle.centre_mm)
+        turns = np.unwrap(np.arctan2(spread[:, 1], spread[:, 0]))
+        arc = math.degrees(float(np.ptp(turns)))
+        figures = (
+            figure,
+            Measured(arc, None, "deg", "arc"),
+            Measured(circle.rms_mm, None, "mm", "roundness"),
+        )
+        line = np.stack([self.start_mm, self.end_mm])
+        found = tool_result(self, figures, (line,), profile.flags[there], profile=profile)
+        if arc >= LEAST_ARC_DEG:
+            return found
+        text = tr("the section shows {arc:.0f} degrees of the arc; at least {least:.0f} are needed")
+        return _doubtful(found, text.format(arc=arc, least=LEAST_ARC_DEG))
+
+
+def _margin(nodes: AreaNodes, area: Rectangle) -> Mask:
+    """Return which nodes lie in the margin of a rectangle."""
+    yaw = math.radians(area.yaw_deg)
+    dx, dy = nodes.x_mm - area.centre_mm[0], nodes.y_mm - area.centre_mm[1]
+    along = np.abs(math.cos(yaw) * dx + math.sin(yaw) * dy) / (0.5 * area.sides_mm[0])
+    across = np.abs(math.cos(yaw) * dy - math.sin(yaw) * dx) / (0.5 * area.sides_mm[1])
+    return np.asarray(np.maximum(along, across) > 1.0 - SURROUNDINGS)
+
+
+def _relief_of_area(nodes: AreaNodes, around: Mask, area: Rectangle) -> Array:
+    """Return the height of nodes above the plane of the margin."""
+    if min(int(around.sum()), int((~around).sum())) < LEAST_CORE:
+        raise InputError(
+            tr("the rectangle contains {n} points of the map").format(n=nodes.x_mm.size),
+            where=tr("rectangle at ({x:g}, {y:g}) mm").format(
+                x=area.centre_mm[0], y=area.centre_mm[1]
+            ),
+            advice=tr("Make it larger, or move it into the working area"),
+        )
+    return _above_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm, around)
+
+
+def _extreme(relief: Array) -> float:
+    """Return a height that at least a few nodes have."""
+    return float(np.sort(relief)[-LEAST_CORE])
+
+
+def _sign_of(relief: Array) -> float:
+    """Return 1 for a bump, -1 for a pit."""
+    return 1.0 if _extreme(relief) >= _extreme(-relief) else -1.0
+
+
+def _smooth(x: Array, y: Array, relief: Array) -> Array:
+    """Return the least-squares surface of second order at its points."""
+    u, v = x - x.mean(), y - y.mean()
+    terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
+    return np.asarray(terms @ np.linalg.lstsq(terms, relief)[0])
+
+
+def _above_plane(x: Array, y: Array, depth: Array, around: Mask) -> Array:
+    level, slope_x, slope_y = fit_plane(x[around], y[around], depth[around])
+    plane = level + slope_x * (x - x[around].mean()) + slope_y * (y - y[around].mean())
+    return np.asarray(depth - plane)
+
+
+def _above_line(along: Array, depth: Array, beside: Mask) -> Array:
+    slope, level = np.polyfit(along[beside], depth[beside], 1)
+    return np.asarray(depth - (level + slope * along))
+
+
+def _complete(profile: Profile) -> Mask:
+    """Return which points of a section are on the map; refuse one that is cut off."""
+    there = np.isfinite(profile.depth_mm)
+    if not (there[0] and there[-1]):
+        raise InputError(
+            tr("the section ends outside the working area"),
+            where=tr("profile of {length:.2f} mm").format(length=profile.along_mm[-1]),
+            advice=tr("Move its ends into the working area"),
+        )
+    return there
+
+
+def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, float]:
+    """Return where the feature around its extreme falls to half of its height."""
+    share = relief / relief[extreme] - 0.5
+    ends = []
+    for step in (-1, 1):
+        k = extreme
+        while 0 < k + step < len(share) - 1 and share[k + step] > 0.0:
+            k += step
+        near, far = share[k], share[k + step]
+        part = near / (near - far) if near > far else 1.0
+        ends.append(float(along[k] + part * (along[k + step] - along[k])))
+    return ends[0], ends[1]
+
+
+def _width(heightmap: HeightMap, width: float, name: str) -> Measured:
+    """Return a width between two edges, each with an uncertainty of one node."""
+    share = heightmap.lateral_scale_sd
+    if share is None or heightmap.noise_mm is None:
+        return Measured(width, None, "mm", name)
+    sd = math.hypot(math.sqrt(2.0) * heightmap.pitch_mm, share * width)
+    return Measured(width, sd, "mm", name)
+
+
+def _doubted(found: ToolResult, height: Measured, width: float) -> ToolResult:
+    """Return a result that is doubtful if nothing stands out, or if the membrane bridges it."""
+    if height.sd is not None and abs(height.value) < CLEAR * height.sd:
+        found = _doubtful(found, tr("nothing stands out from the surface around it"))
+    if height.value < 0.0 and width < BRIDGED * TYPICAL_DECAY_MM:
+        text = tr(
+            "the membrane bridges a feature of {width:.2f} mm: it is at least as deep as measured"
+        )
+        found = _doubtful(found, text.format(width=width))
+    return found
+
+
+def _doubtful(found: ToolResult, why: str) -> ToolResult:
+    reason = joined("; ", (text for text in (found.reason, why) if text))
+    return replace(found, verdict="doubtful", reason=reason)
