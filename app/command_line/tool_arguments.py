@@ -3,35 +3,23 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from app.command_line.common import numbers, points
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.measurement.outline_tools import EDGES
+from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
 from gelpolight_core.translation import tr
 
 JSON_LIMIT = 50_000_000
 
-# Number of points of each tool. None: no upper limit.
-POINT_COUNTS: dict[str, tuple[int, int | None]] = {
-    "distance": (2, 2),
-    "step-height": (2, 2),
-    "profile-step": (2, 2),
-    "profile-width": (2, 2),
-    "profile-angle": (2, 2),
-    "angle": (3, 3),
-    "circle": (3, None),
-    "rectangle": (1, 1),
-    "pit": (1, 1),
-    "scratch": (2, 2),
-    "edge-radius": (2, 2),
-    "ball": (0, 1),
-    "cylinder": (0, 1),
-    "cuboid": (0, 1),
-}
+LEAST_POINTS = 3
+"""Number of points that a tool with any number of them needs."""
 
 
 def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
@@ -94,39 +82,46 @@ def chosen_tools(options: argparse.Namespace) -> tuple[Tool, ...]:
 
 
 def _geometry(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the tool's geometry in the form of :func:`tool_from_dict`."""
-    name = options.tool
+    """Return the tool's geometry in the form of :func:`tool_from_dict`, by the fields of the tool.
+
+    ``--at`` fills its places in their order; each option fills the field with its name.
+    """
+    name, kind = options.tool, TOOLS[options.tool]
+    types = {field.name: str(field.type) for field in fields(cast(Any, kind))}
+    ranges = [field for field in fields(cast(Any, kind)) if str(field.type).startswith("Range")]
+    rectangles = "Rectangle" in types.values()
+    plain = {"width": "width_mm", "level": "level_mm", "edge": "edge"}
+    allowed = {option for option, field in plain.items() if field in types}
+    allowed |= {"size", "yaw"} if rectangles else set()
+    allowed |= {"range"} if ranges else set()
+    placed = _placed(options)
+    _refuse_rest(options, {"at", *allowed}, name)
+    if POINTS in types.values():
+        content: dict[str, Any] = {places(kind)[0].name: placed}
+    else:
+        content = {
+            field.name: _rectangle(options, at) if types[field.name] == "Rectangle" else at
+            for field, at in zip(places(kind), placed, strict=False)
+        }
+    given = {field: getattr(options, option) for option, field in plain.items() if field in types}
+    return content | _given(**given) | _ranges(options, ranges)
+
+
+def _placed(options: argparse.Namespace) -> list[tuple[float, float]]:
+    """Return the points of the tool, as many as it has places."""
     placed = points(options.at, where="--at") if options.at else []
-    least, most = POINT_COUNTS[name]
+    kinds = [str(field.type) for field in places(TOOLS[options.tool])]
+    least = LEAST_POINTS if POINTS in kinds else sum("None" not in kind for kind in kinds)
+    most = None if POINTS in kinds else len(kinds)
     if len(placed) < least or (most is not None and len(placed) > most):
         raise InputError(
             tr("Number of points: {n}").format(n=len(placed)),
-            where=tr("Measuring tool {name}").format(name=name),
+            where=tr("Measuring tool {name}").format(name=options.tool),
             advice=tr("It needs {least}: --at X Y ...").format(
                 least=least if most == least else tr("{n} or more").format(n=least)
             ),
         )
-    if name in ("step-height", "rectangle", "pit"):
-        allowed = {"at", "size", "yaw"} | ({"edge"} if name == "rectangle" else set())
-        _refuse_rest(options, allowed, name)
-        areas = [_rectangle(options, point) for point in placed]
-        keys = ("first", "second") if name == "step-height" else ("rectangle",)
-        return dict(zip(keys, areas, strict=True)) | _given(edge=options.edge)
-    if name.startswith("profile-"):
-        allowed = {"at", "width", "range"} | ({"level"} if name == "profile-width" else set())
-        _refuse_rest(options, allowed, name)
-        ends = {"start_mm": placed[0], "end_mm": placed[1]}
-        return ends | _given(width_mm=options.width, level_mm=options.level) | _ranges(options)
-    if name in ("scratch", "edge-radius"):
-        _refuse_rest(options, {"at", "width"}, name)
-        return {"start_mm": placed[0], "end_mm": placed[1]} | _given(width_mm=options.width)
-    _refuse_rest(options, {"at"} | ({"edge"} if name == "circle" else set()), name)
-    if name == "circle":
-        return {"points_mm": placed} | _given(edge=options.edge)
-    keys = {"distance": ("a_mm", "b_mm"), "angle": ("apex_mm", "first_mm", "second_mm")}.get(
-        name, ("at_mm",)
-    )
-    return dict(zip(keys, placed, strict=False))
+    return placed
 
 
 def _rectangle(options: argparse.Namespace, centre_mm: tuple[float, float]) -> dict[str, Any]:
@@ -139,19 +134,18 @@ def _rectangle(options: argparse.Namespace, centre_mm: tuple[float, float]) -> d
     return {"centre_mm": centre_mm, "sides_mm": options.size, **_given(yaw_deg=options.yaw)}
 
 
-def _ranges(options: argparse.Namespace) -> dict[str, Any]:
+def _ranges(options: argparse.Namespace, wanted: Sequence[Field[Any]]) -> dict[str, Any]:
     """Return the ranges along a profile."""
     given = options.range or []
-    keys = ("between_mm",) if options.tool == "profile-width" else ("first_mm", "second_mm")
-    if options.tool == "profile-width" and not given:
+    if not given and all(field.default is not MISSING for field in wanted):
         return {}
-    if len(given) != 2 * len(keys):
+    if len(given) != 2 * len(wanted):
         raise InputError(
             tr("Number of values: {n}").format(n=len(given)),
             where="--range",
-            advice=tr("The tool {name} needs {n}").format(name=options.tool, n=2 * len(keys)),
+            advice=tr("The tool {name} needs {n}").format(name=options.tool, n=2 * len(wanted)),
         )
-    return {key: given[2 * k : 2 * k + 2] for k, key in enumerate(keys)}
+    return {field.name: given[2 * k : 2 * k + 2] for k, field in enumerate(wanted)}
 
 
 def _given(**values: Any) -> dict[str, Any]:

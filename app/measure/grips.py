@@ -4,26 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any, cast
 
-from gelpolight_core.measurement.tools import (
-    Angle,
-    Ball,
-    Circle,
-    Cuboid,
-    Cylinder,
-    Distance,
-    EdgeRadius,
-    Pit,
-    ProfileWidth,
-    Rectangle,
-    RectangleTool,
-    Scratch,
-    StepHeight,
-    Tool,
-)
+from gelpolight_core.measurement.tool import POINTS, places
+from gelpolight_core.measurement.tools import Angle, Rectangle, Tool
 
 Point = tuple[float, float]
 LEAST_SIDE_MM = 0.1
+RECTANGLE_GRIPS = ("centre", "corner", "turn")
 TURN_REACH = 0.35
 """Distance of a rectangle's rotation grip from the middle of its first side's end."""
 
@@ -46,61 +34,50 @@ class Grip:
 
 def grips_of(tool: Tool) -> tuple[Grip, ...]:
     """Return the grips of a tool in the order of the keyboard selection."""
-    match tool:
-        case Distance():
-            return Grip("a", tool.a_mm), Grip("b", tool.b_mm)
-        case ProfileWidth() | Scratch() | EdgeRadius():
-            return Grip("start", tool.start_mm), Grip("end", tool.end_mm)
-        case Angle():
-            return (
-                Grip("first", tool.first_mm),
-                Grip("apex", tool.apex_mm),
-                Grip("second", tool.second_mm),
-            )
-        case Circle():
-            return tuple(Grip(str(i), point) for i, point in enumerate(tool.points_mm))
-        case RectangleTool() | Pit():
-            return _of_rectangle(tool.rectangle, "")
-        case StepHeight():
-            return (*_of_rectangle(tool.first, "first."), *_of_rectangle(tool.second, "second."))
-        case Ball() | Cylinder() | Cuboid():
-            return () if tool.at_mm is None else (Grip("at", tool.at_mm),)
-    raise TypeError(f"{tool.name} has no grips")
+    found: list[Grip] = []
+    areas = _areas(tool)
+    for field in places(type(tool)):
+        value = getattr(tool, field.name)
+        if isinstance(value, Rectangle):
+            found += _of_rectangle(value, f"{field.name}." if len(areas) > 1 else "")
+        elif str(field.type) == POINTS:
+            found += [Grip(str(i), point) for i, point in enumerate(value)]
+        elif value is not None:
+            found.append(Grip(field.name.removesuffix("_mm"), value))
+    return tuple(found)
 
 
 def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:
     """Return a tool with one of its grips moved."""
-    match tool:
-        case Distance() | ProfileWidth() | Scratch() | EdgeRadius() | Angle():
-            return replace(tool, **{f"{grip}_mm": to_mm})
-        case Circle():
-            points = list(tool.points_mm)
-            points[int(grip)] = to_mm
-            return replace(tool, points_mm=tuple(points))
-        case RectangleTool() | Pit():
-            return replace(tool, rectangle=_rectangle_moved(tool.rectangle, grip, to_mm))
-        case StepHeight():
-            which, _, part = grip.partition(".")
-            return replace(tool, **{which: _rectangle_moved(getattr(tool, which), part, to_mm)})
-        case Ball() | Cylinder() | Cuboid():
-            return replace(tool, at_mm=to_mm)
-    raise TypeError(f"{tool.name} has no grips")
+    changed: Any = tool
+    area, _, part = grip.rpartition(".")
+    if part in RECTANGLE_GRIPS:
+        name = area or next(iter(_areas(tool)))
+        return cast(
+            Tool, replace(changed, **{name: _rectangle_moved(_areas(tool)[name], part, to_mm)})
+        )
+    if grip.isdigit():
+        (field,) = places(type(tool))
+        points = list(getattr(tool, field.name))
+        points[int(grip)] = to_mm
+        return cast(Tool, replace(changed, **{field.name: tuple(points)}))
+    return cast(Tool, replace(changed, **{f"{grip}_mm": to_mm}))
 
 
 def outline_of(tool: Tool) -> tuple[tuple[Point, ...], ...]:
     """Return the lines of a tool as it was placed, before anything is measured."""
-    match tool:
-        case Distance():
-            return ((tool.a_mm, tool.b_mm),)
-        case ProfileWidth() | Scratch() | EdgeRadius():
-            return ((tool.start_mm, tool.end_mm),)
-        case Angle():
-            return ((tool.first_mm, tool.apex_mm, tool.second_mm),)
-        case RectangleTool() | Pit():
-            return (_corners(tool.rectangle),)
-        case StepHeight():
-            return _corners(tool.first), _corners(tool.second)
-    return ()
+    if isinstance(tool, Angle):
+        return ((tool.first_mm, tool.apex_mm, tool.second_mm),)
+    if areas := _areas(tool):
+        return tuple(_corners(area) for area in areas.values())
+    ends = [getattr(tool, f.name) for f in places(type(tool)) if str(f.type) == "Point"]
+    return (tuple(ends),) if len(ends) > 1 else ()
+
+
+def _areas(tool: Tool) -> dict[str, Rectangle]:
+    """Return the rectangles of a tool by the names of their fields."""
+    values = {field.name: getattr(tool, field.name) for field in places(type(tool))}
+    return {name: value for name, value in values.items() if isinstance(value, Rectangle)}
 
 
 def nearest_grip(grips: tuple[Grip, ...], at_mm: Point, *, reach_mm: float) -> Grip | None:

@@ -4,23 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
-from gelpolight_core.measurement.tools import (
-    Angle,
-    Ball,
-    Circle,
-    Cuboid,
-    Cylinder,
-    Distance,
-    EdgeRadius,
-    Pit,
-    ProfileWidth,
-    Rectangle,
-    RectangleTool,
-    Scratch,
-    StepHeight,
-    Tool,
-)
+from gelpolight_core.measurement.tools import TOOLS, Angle, Circle, Rectangle, StepHeight, Tool
 from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
@@ -140,27 +126,18 @@ def kind_label(name: str) -> str:
 
 def make_tool(name: str, points: Sequence[Point]) -> Tool:
     """Return the tool through points, as many as its kind needs."""
+    made: Any = TOOLS[name]
     match name:
-        case "distance":
-            return Distance(points[0], points[1])
         case "step-height":
             sides = (STEP_SIDE_MM, STEP_SIDE_MM)
             return StepHeight(Rectangle(points[0], sides), Rectangle(points[1], sides))
-        case "profile-width":
-            return ProfileWidth(points[0], points[1])
         case "angle":
             return Angle(apex_mm=points[1], first_mm=points[0], second_mm=points[2])
         case "circle":
             return Circle(tuple(points))
-        case "rectangle":
-            return RectangleTool(_rectangle(points))
-        case "pit":
-            return Pit(_rectangle(points))
-        case "scratch":
-            return Scratch(points[0], points[1])
-        case "edge-radius":
-            return EdgeRadius(points[0], points[1])
-    return {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}[name](points[0])
+        case "rectangle" | "pit":
+            return cast(Tool, made(_rectangle(points)))
+    return cast(Tool, made(*points))
 
 
 def _rectangle(corners: Sequence[Point]) -> Rectangle:

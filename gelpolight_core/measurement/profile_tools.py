@@ -16,7 +16,7 @@ from gelpolight_core.measurement.profile import (
     width_at,
     width_ends,
 )
-from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
+from gelpolight_core.measurement.tool import Point, Range, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -35,8 +35,8 @@ class ProfileStep:
     name: ClassVar[str] = "profile-step"
     start_mm: Point
     end_mm: Point
-    first_mm: Point
-    second_mm: Point
+    first_mm: Range
+    second_mm: Range
     width_mm: float = 0.0
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -65,7 +65,7 @@ class ProfileWidth:
     end_mm: Point
     width_mm: float = 0.0
     level_mm: float | None = None
-    between_mm: Point | None = None
+    between_mm: Range | None = None
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
@@ -91,8 +91,8 @@ class ProfileAngle:
     name: ClassVar[str] = "profile-angle"
     start_mm: Point
     end_mm: Point
-    first_mm: Point
-    second_mm: Point
+    first_mm: Range
+    second_mm: Range
     width_mm: float = 0.0
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -103,7 +103,7 @@ class ProfileAngle:
 
 
 def _profile_result(
-    tool: Tool, profile: Profile, figures: tuple[Measured, ...], parts: tuple[Point, ...]
+    tool: Tool, profile: Profile, figures: tuple[Measured, ...], parts: tuple[Range, ...]
 ) -> ToolResult:
     """Return a result drawn as the line, and the parts of it that count."""
     start, end = np.array(profile.start_mm), np.array(profile.end_mm)

@@ -6,8 +6,8 @@ command line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from dataclasses import Field, dataclass, fields
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,15 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 Point = tuple[float, float]
+Range = tuple[float, float]
+"""Begin and end of a part of a section, in mm from its start."""
 
 UNKNOWN = int(Flag.SATURATED | Flag.NOT_OBSERVABLE | Flag.INVALID | Flag.UNANCHORED)
 """Flags of points whose depth is uncertain. Walls in the shadow of one LED are not among them,
 because the model does not need this LED."""
+POINTS = "tuple[Point, ...]"
+PLACES = ("Point", "Point | None", POINTS, "Rectangle")
+"""Types of the fields that are places, as they are written."""
 FLAGGED_SHARE = 0.1
 """Share of such points above which a result is doubtful."""
 
@@ -81,6 +86,16 @@ class Tool(Protocol):
             If there is nothing to measure at this position of the map.
         """
         ...
+
+
+def places(kind: type[Tool]) -> tuple[Field[Any], ...]:
+    """Return the fields of a tool that say where it lies on the membrane, in their order.
+
+    Each is a `Point`, an optional one, several, or a `Rectangle`. Clicks, grips, and the arguments
+    of the command line follow from them.
+    """
+    found: tuple[Field[Any], ...] = fields(cast(Any, kind))
+    return tuple(field for field in found if str(field.type) in PLACES)
 
 
 def tool_result(

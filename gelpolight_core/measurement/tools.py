@@ -166,7 +166,7 @@ def _value(field: Field[Any], value: Any, tool: Any) -> Any:
             return value
         if kind.startswith("tuple"):
             return tuple(_point(part) for part in value)
-        return _point(value) if kind.startswith("Point") else _number(value)
+        return _point(value) if kind.startswith(("Point", "Range")) else _number(value)
     except (TypeError, ValueError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
             tr("{key} is {value}").format(key=field.name, value=brief(value)),
