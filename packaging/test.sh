@@ -38,7 +38,7 @@ fi
 # Two processes share the cores, so that neither needs threads of its own for small matrices.
 # Files stay whole, so that what their tests share is made once; tests/conftest.py sets their order.
 check "tests" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile \
-    --no-loadscope-reorder "$@"
+    --no-loadscope-reorder --max-worker-restart 0 "$@"
 if [ $# -eq 0 ]; then
     wait "$oldest"
     cat "$results/oldest"

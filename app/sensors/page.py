@@ -21,11 +21,12 @@ from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
 from app.sensors.model import LibraryModel
-from app.sensors.report_writer import ReportWriter
+from app.sensors.report_writer import write_entry_report
 from app.sensors.sessions_box import SessionsBox
 from app.sensors.tables import CellsTable
 from app.sensors.trash_dialog import TrashDialog
 from app.sensors.welcome import Welcome
+from app.services.jobs import Job, Jobs
 from app.widgets.actions import make_action
 from app.widgets.naming import named
 from app.workspace.entries import Entry
@@ -54,9 +55,7 @@ class SensorsPage(QWidget):
         self._table.doubleClicked.connect(lambda _: self.use.trigger())
         self._sessions = SessionsBox(self)
         self._sessions.wanted.connect(context.requests.session)
-        self._reports = ReportWriter(self)
-        self._reports.busy_changed.connect(self._show_busy)
-        self._reports.written.connect(self._report_written)
+        self._reports = Jobs("report", self)
         self._reports.refused.connect(lambda text: context.toasts.show(text, "fail"))
         self._details = Details((self.use, self.report, self.reveal, self.remove))
         self._details.gel.renamed.connect(self._on_elastomer)
@@ -235,11 +234,23 @@ class SensorsPage(QWidget):
         )
         if name:
             settings.keep_folder("report", Path(name).parent)
-            self._reports.write(entry, Path(name))
+            self._write_report(entry, Path(name))
+
+    def _write_report(self, entry: Entry, path: Path) -> None:
+        self._show_busy(True)
+        self._reports.submit(
+            Job(
+                tr("Writing the report"),
+                lambda _progress: write_entry_report(entry, path),
+                lambda _nothing: self._report_written(str(path)),
+                ended=lambda: self._show_busy(False),
+                must=True,
+            )
+        )
 
     def may_close(self) -> bool:
         """Wait a short time for a file that is being written."""
-        self._reports.stop()
+        self._reports.close()
         self._library.jobs.close()
         return True
 

@@ -109,7 +109,9 @@ class Jobs(QObject):
         job.future = Future()
         self._waiting.append(job)
         if self._thread is None:
-            self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+            self._thread = threading.Thread(
+                target=_work, args=(self._queue,), name=self._name, daemon=True
+            )
             self._thread.start()
         self._queue.put(job)
         self._timer.start()
@@ -154,31 +156,6 @@ class Jobs(QObject):
         future, job.future, job.over = job.future, None, True
         if (error := future.exception()) is not None:
             self._report_failure(job, error)
-
-    def _work(self) -> None:
-        """Run the jobs in order, in the thread."""
-        while (job := self._queue.get()) is not None:
-            self._do(job)
-            del job  # otherwise the thread would keep the result until the next job
-
-    def _do(self, job: Job) -> None:
-        future = job.future
-        if future is None or not future.set_running_or_notify_cancel():
-            return
-        try:
-            future.set_result(job.work(partial(self._report, job)))
-        except BaseException as error:  # passed to the GUI thread, which reports it
-            future.set_exception(error)
-        finally:
-            # The traceback refers to this frame. Together with the objects of the work this would
-            # be a reference cycle that stays until the garbage collector runs.
-            del future, job
-
-    def _report(self, job: Job, share: float) -> None:
-        """Store the progress. Called in the worker thread."""
-        if job.cancel.is_set():
-            raise Cancelled
-        job.share = share
 
     def _poll(self) -> None:
         while self._waiting and self._waiting[0].future is not None:
@@ -225,6 +202,34 @@ class Jobs(QObject):
         if progress != self._progress:
             self._progress = progress
             self.progressed.emit(*progress)
+
+
+def _work(jobs: queue.SimpleQueue[Job | None]) -> None:
+    """Run jobs in order, in their thread, which holds no QObject: it could be the last to do so."""
+    while (job := jobs.get()) is not None:
+        _do(job)
+        del job  # otherwise the thread would keep the result until the next job
+
+
+def _do(job: Job) -> None:
+    future = job.future
+    if future is None or not future.set_running_or_notify_cancel():
+        return
+    try:
+        future.set_result(job.work(partial(_report, job)))
+    except BaseException as error:  # passed to the GUI thread, which reports it
+        future.set_exception(error)
+    finally:
+        # The traceback refers to this frame. Together with the objects of the work this would
+        # be a reference cycle that stays until the garbage collector runs.
+        del future, job
+
+
+def _report(job: Job, share: float) -> None:
+    """Store the progress. Called in the worker thread."""
+    if job.cancel.is_set():
+        raise Cancelled
+    job.share = share
 
 
 def _stopped(job: Job) -> str:

@@ -10,6 +10,7 @@ import traceback
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from shiboken6 import isValid
 
 from app.context.context import AppContext
 from app.desktop import make_application, make_context
+from app.services import log as program_log
 from app.theme import theme
 from gelpolight_core.drawing_thread import THREAD_NAME as DRAWING_THREAD
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
@@ -53,6 +55,13 @@ def _folders_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     ):
         (home / folder).mkdir(parents=True, exist_ok=True)
         monkeypatch.setenv(variable, str(home / folder))
+
+
+@pytest.fixture(autouse=True)
+def _a_crash_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep pytest's own crash reports on; the log of the program would redirect them to a file."""
+    quiet = SimpleNamespace(enable=lambda _file: None, disable=lambda: None)
+    monkeypatch.setattr(program_log, "faulthandler", quiet)
 
 
 @pytest.fixture
