@@ -109,7 +109,9 @@ def solve_near_light(
     slope_x, slope_y, weight = (np.zeros(shape, np.float32) for _ in range(3))
     normals = np.zeros((*shape, 3), np.float32)
     flags = np.zeros(shape, np.uint8)
-    shape_of = np.array([membrane.exponent, membrane.gloss, membrane.roughness], np.float64)
+    shape_of = np.array(
+        [membrane.exponent, membrane.gloss, membrane.roughness, membrane.interreflection], np.float64
+    )
     curves = membrane.curves if membrane.diffuse else None
     dark = np.ascontiguousarray(dark_brightness(membrane))
     depth = np.ascontiguousarray(depth_mm, np.float32)
