@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from pytestqt.qtbot import QtBot
@@ -11,6 +13,9 @@ from technician import ScriptedCamera, Technician
 from app.calibrate.page import CalibratePage
 from app.context.context import AppContext
 from app.sources.source import SourceInfo
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.session.description import create_session
+from gelpolight_core.session.session import read_session
 
 LAPTOP = (1180, 740)
 """The size that the window leaves for a page on a screen of 1280 x 800."""
@@ -39,3 +44,11 @@ def technician(context: AppContext, qtbot: QtBot) -> Iterator[Technician]:
     page.may_close()
     page.close()
     page.deleteLater()
+
+
+@pytest.fixture
+def fresh(small_session: Path, tmp_path: Path) -> CalibrationProject:
+    """Return a new session of the small sensor without images."""
+    folder = tmp_path / "fresh"
+    create_session(replace(read_session(small_session), folder=folder))
+    return CalibrationProject(folder)

@@ -19,19 +19,11 @@ from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
-from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
 
 WAIT_MS = 60_000
 TEXTS = {"name": "C310", "identity": "x", "control.gain": "3"}
 Made = Callable[[], CalibrationProject]
-
-
-@pytest.fixture
-def fresh(small_session: Path, tmp_path: Path) -> CalibrationProject:
-    folder = tmp_path / "fresh"
-    create_session(replace(read_session(small_session), folder=folder))
-    return CalibrationProject(folder)
 
 
 @pytest.fixture

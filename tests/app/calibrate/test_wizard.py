@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,18 +22,9 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
 
 Made = Callable[[], CalibrationProject]
-
-
-@pytest.fixture
-def fresh(small_session: Path, tmp_path: Path) -> CalibrationProject:
-    """Return a new session of the small sensor without images."""
-    folder = tmp_path / "fresh"
-    create_session(replace(read_session(small_session), folder=folder))
-    return CalibrationProject(folder)
 
 
 def test_a_reported_capture_is_on_disk_with_its_radius(

@@ -110,7 +110,8 @@ def solve_near_light(
     normals = np.zeros((*shape, 3), np.float32)
     flags = np.zeros(shape, np.uint8)
     shape_of = np.array(
-        [membrane.exponent, membrane.gloss, membrane.roughness, membrane.interreflection], np.float64
+        [membrane.exponent, membrane.gloss, membrane.roughness, membrane.interreflection],
+        np.float64,
     )
     curves = membrane.curves if membrane.diffuse else None
     dark = np.ascontiguousarray(dark_brightness(membrane))

@@ -1,0 +1,42 @@
+"""The example of a wizard step in CONTRIBUTING.md works in the wizard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from technician import Technician
+
+from app.calibrate import steps
+from gelpolight_core.calibration.project import CalibrationProject
+
+CONTRIBUTING = Path(__file__).parents[3] / "CONTRIBUTING.md"
+
+
+def example(name: str) -> Any:
+    """Return a class that an example of CONTRIBUTING.md defines."""
+    for text in CONTRIBUTING.read_text("utf-8").split("```python\n")[1:]:
+        code = text.partition("```")[0]
+        if f"class {name}(" in code:
+            defined: dict[str, Any] = {"__name__": "example"}
+            exec(compile(code, str(CONTRIBUTING), "exec"), defined)
+            return defined[name]
+    raise AssertionError(f"CONTRIBUTING.md defines no {name}")
+
+
+def test_the_example_step_keeps_the_notes(
+    technician: Technician, fresh: CalibrationProject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    route = (steps.SetupStep, example("NotesStep"), *steps.OPEN_ROUTE[1:])
+    monkeypatch.setattr(steps, "OPEN_ROUTE", route)
+    technician.begin(fresh, "notes")
+    assert technician.state("notes") == "empty"
+    technician.wizard.at("notes").editor.setPlainText("Zweiter Würfel, neue Membran")
+    technician.wizard.go_to("lens")
+    assert (technician.session / "notes.txt").read_text("utf-8") == "Zweiter Würfel, neue Membran"
+    assert technician.state("notes") == "pass"
+    technician.wizard.at("notes").editor.clear()
+    technician.wizard.go_to("notes")
+    assert technician.wizard.at("notes").editor.toPlainText().startswith("Zweiter")
+    technician.rest()
