@@ -1,4 +1,4 @@
-"""Actions of the Inspect page: export, screenshots, profiles."""
+"""Actions of the Inspect page: screenshots, profiles, references and movies."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.context.context import AppContext
-from app.inspect.export import ExportChoice, export_frame, export_recording, frame_name
-from app.inspect.export_dialog import ExportDialog
 from app.inspect.movie_source import play_surfaces
 from app.inspect.views import Views
 from app.live.depth import LiveDepth
@@ -34,7 +32,7 @@ from gelpolight_core.translation import tr
 
 
 class FileActions(QObject):
-    """The actions of the page that write a file.
+    """The actions of the page that write an image, a table or a movie, or read a reference.
 
     Parameters
     ----------
@@ -62,10 +60,6 @@ class FileActions(QObject):
         super().__init__(owner)
         self._depth, self._views, self._jobs = depth, views, jobs
         self._owner, self._context = owner, context
-        self.export_action = make_action(
-            owner, "inspect.export", tr("Export…"), self.export, keys=("Ctrl+E",),
-            icon_name="export", tip=tr("Write the depth to files (Ctrl+E)"),
-        )  # fmt: skip
         self.image_action = make_action(
             owner, "inspect.screenshot", tr("Screenshot…"), self.screenshot,
             keys=("Ctrl+Shift+P",), icon_name="picture",
@@ -81,64 +75,9 @@ class FileActions(QObject):
         self.saving.reported.connect(self._report)
         views.surface.menu.reference_wanted.connect(self.take_reference)
         views.processing.hold_wanted.connect(self.hold_reference)
-        views.surface.menu.mesh_wanted.connect(self.export)
-        views.surface.menu.offer_mesh()
         views.section.save_wanted.connect(self.save_profile)
 
-    # Export
-
-    def export(self) -> None:
-        """Ask what to export, and export it."""
-        if self._depth.last is None or self._depth.last.heightmap is None:
-            self._report(tr("There is no depth to export yet."), "warn")
-            return
-        source, count, at = self._depth.live.source, 0, 0
-        if isinstance(source, RecordingSource):
-            now = source.playback()
-            count, at = now.count, now.position
-        folder = self._context.settings.folder("height_map") / "depth"
-        dialog = ExportDialog(folder, count=count, at=at, parent=self._owner)
-        dialog.chosen.connect(self.run_export)
-        dialog.open()
-
-    def run_export(self, choice: ExportChoice) -> None:
-        """Write the chosen files."""
-        last, source = self._depth.last, self._depth.live.source
-        reconstructor = self._depth.reconstructor
-        self._context.settings.keep_folder("height_map", choice.folder.parent)
-        if choice.frames is not None and isinstance(source, RecordingSource):
-            path = source.path
-            if reconstructor is None:
-                return
-            # The page's own processing is paused: a reconstructor serves one thread.
-            self._depth.live.rest(True)
-
-            def work(progress: Any) -> list[Path]:
-                return export_recording(path, reconstructor, choice, progress)
-
-        elif last is not None and last.heightmap is not None:
-            heightmap = last.heightmap
-            name = frame_name(last.frame, source, processed=bool(last.processed))
-
-            def work(progress: Any) -> list[Path]:
-                return export_frame(heightmap, choice, name)
-
-        else:
-            return
-        self._jobs.submit(
-            Job(
-                tr("Exporting"),
-                work,
-                self._on_exported,
-                lambda sentence: self._report(sentence, "fail"),
-                ended=lambda: self._depth.live.rest(False),
-            )
-        )
-
-    def _on_exported(self, files: list[Path]) -> None:
-        self._report(
-            tr("{n} files written to {folder}").format(n=len(files), folder=files[0].parent), "pass"
-        )
+    # Profiles
 
     def save_profile(self) -> None:
         """Ask for a file, and write the profiles of all lines as a table."""

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.context.context import AppContext
 from app.inspect.actions import FileActions
+from app.inspect.export_control import ExportControl
 from app.inspect.modes import ModeChoice
 from app.inspect.processing_panel import ProcessedLine
 from app.inspect.record_control import RecordControl
@@ -101,15 +102,18 @@ class InspectPage(QWidget):
         self.file_actions = FileActions(
             self.depth, self.views, self.jobs, self, context=self.context
         )
-        file_actions = self.file_actions
+        self.export = ExportControl(self.depth, self.jobs, self, context=self.context)
+        surface_menu = self.views.surface.menu
+        surface_menu.mesh_wanted.connect(self.export.ask)
+        surface_menu.offer_mesh()
         self.views.bar.insertActions(
             self.views.bar.actions()[0],
             [
                 self.pause_action,
                 self.recorder.action,
                 zero_action,
-                file_actions.export_action,
-                file_actions.image_action,
+                self.export.action,
+                self.file_actions.image_action,
             ],
         )
         # Its text is the state of the recording.
@@ -201,7 +205,7 @@ class InspectPage(QWidget):
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
         files = self.file_actions
-        return files.export_action, files.image_action, files.profile_action
+        return self.export.action, files.image_action, files.profile_action
 
     # The image
 
@@ -209,6 +213,7 @@ class InspectPage(QWidget):
         """Freeze the image, or continue."""
         self.pause_action.setChecked(on)
         self.live.pause(on)
+        self.second.pause(on)
         self._want()
 
     def _want(self) -> None:

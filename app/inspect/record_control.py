@@ -22,6 +22,19 @@ POLL_MS = 300
 class RecordControl(QObject):
     """Records the frames of the source.
 
+    Parameters
+    ----------
+    depth : LiveDepth
+        Holds the open source.
+    owner : QWidget
+        Gets the action.
+    context : AppContext
+        Holds the library and the messages.
+    page : str, optional
+        Start of the name of the action.
+    key : str, optional
+        Shortcut of the action. Empty for none.
+
     Signals
     -------
     reported(str)
@@ -30,14 +43,23 @@ class RecordControl(QObject):
 
     reported = Signal(str)
 
-    def __init__(self, depth: LiveDepth, owner: QWidget, *, context: AppContext) -> None:
+    def __init__(
+        self,
+        depth: LiveDepth,
+        owner: QWidget,
+        *,
+        context: AppContext,
+        page: str = "inspect",
+        key: str = "R",
+    ) -> None:
         super().__init__(owner)
         self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
         self._warned = False
+        tip = tr("Record every frame without loss")
         self.action: QAction = make_action(
-            owner, "inspect.record", tr("Record"), self.toggle, keys=("R",), icon_name="record",
-            tip=tr("Record every frame without loss (R)"),
+            owner, f"{page}.record", tr("Record"), self.toggle, keys=(key,) if key else (),
+            icon_name="record", tip=f"{tip} ({key})" if key else tip,
         )  # fmt: skip
         self.action.setCheckable(True)
         self._timer = QTimer(self)

@@ -107,6 +107,11 @@ class SecondDock(QObject):
         if self.pane is not None:
             self.pane.leave()
 
+    def pause(self, on: bool) -> None:
+        """Freeze the image of the second sensor, or continue."""
+        if self.pane is not None:
+            self.pane.pause(on)
+
     def finish(self) -> None:
         """Release everything. The dock stays, so that its place is saved with the layout."""
         pane, self.pane = self.pane, None

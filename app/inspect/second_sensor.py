@@ -5,12 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QGridLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QDialog,
+    QGridLayout,
+    QSizePolicy,
+    QToolBar,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext, SourceChoice
 from app.context.source_button import SourceButton
+from app.inspect.export_control import ExportControl
 from app.inspect.quality_panel import legend
+from app.inspect.record_control import RecordControl
 from app.live.advice import advise
 from app.live.banner import Banner
 from app.live.calibration_choice import CalibrationBox
@@ -70,6 +80,11 @@ class SecondSensor(QWidget):
         live = LiveSession(context=self.context, name="second sensor", parent=self)
         self.depth = LiveDepth(live, self.jobs, self.box, context=self.context)
         self.zero = ZeroControl(live, self.jobs, context=self.context, suffix=SECOND_SUFFIX)
+        self.recorder = RecordControl(self.depth, self, context=self.context, page="second", key="")
+        self.export = ExportControl(
+            self.depth, self.jobs, self, context=self.context, page="second", key="",
+            folder="depth-2",
+        )  # fmt: skip
         self.banner = Banner(
             self.jobs, idle=tr("Press an object into the membrane."), page="second", narrow=True
         )
@@ -79,7 +94,8 @@ class SecondSensor(QWidget):
         self._bench_key.setText(tr("Bench…"))
         self._depth_text = named(PlainLabel(), "second.depth", tr("Largest depth"))
         self._flags = named(MarkupLabel(), "second.flags", tr("Flags"))
-        self._display = Display()
+        self._display, self._visible = Display(), False
+        self._recorded = ""
         self._shown: Shown | None = None
         self._lay_out()
         self._connect()
@@ -91,17 +107,17 @@ class SecondSensor(QWidget):
             tip=tr("Use the current image as the zero reference"),
         )  # fmt: skip
         self.box.setMinimumContentsLength(8)
-        zero_key = named(QToolButton(), "second.zero.button", tr("Zero"))
-        zero_key.setDefaultAction(zero)
-        zero_key.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._bench_key.clicked.connect(self.show_bench)
-        for widget in (source, self.box, self._bench_key, zero_key):
+        for widget in (source, self.box, self._bench_key):
             widget.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        bar = QToolBar()
+        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        bar.addActions((zero, self.recorder.action, self.export.action))
         rows = QGridLayout()
         rows.addWidget(source, 0, 0)
         rows.addWidget(self._bench_key, 0, 1)
-        rows.addWidget(self.box, 1, 0)
-        rows.addWidget(zero_key, 1, 1)
+        rows.addWidget(self.box, 1, 0, 1, 2)
+        rows.addWidget(bar, 2, 0, 1, 2)
         rows.setColumnStretch(0, 1)
         rows.setContentsMargins(4, 4, 4, 0)
         foot = QVBoxLayout()
@@ -124,7 +140,8 @@ class SecondSensor(QWidget):
         depth.calibration_loaded.connect(depth.choose)
         depth.calibration_switched.connect(self._forget)
         depth.changed.connect(lambda: self.banner.advise(advise(depth.state)))
-        depth.live.source_changed.connect(self._forget)
+        depth.live.source_changed.connect(self._on_source)
+        self.recorder.reported.connect(self._on_recorded)
         depth.live.switched.connect(self._follow_source)
         self.banner.act_wanted.connect(self._on_act)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
@@ -140,10 +157,12 @@ class SecondSensor(QWidget):
 
     def leave(self) -> None:
         """Release the source."""
+        self.recorder.stop()
         self.depth.live.enter(False)
 
     def finish(self) -> None:
         """Release the source, the threads and the camera for good."""
+        self.recorder.close()
         self._first.source.other = None
         self._first.requests.calibrations_changed.disconnect(self._follow_workspace)
         self.context.source.changed.disconnect(self._remember)
@@ -153,8 +172,14 @@ class SecondSensor(QWidget):
 
     def want(self, display: Display, *, visible: bool) -> None:
         """Use the display settings of the first sensor, and compute only what is visible."""
-        self._display = display
-        self.depth.want(Wanted(height=visible, display=display))
+        self._display, self._visible = display, visible
+        still = self.depth.live.paused
+        self.depth.want(Wanted(height=visible, display=display, still=still))
+
+    def pause(self, on: bool) -> None:
+        """Freeze the image at full detail, or continue."""
+        self.depth.live.pause(on)
+        self.want(self._display, visible=self._visible)
 
     def show_texts(self) -> None:
         """Show the largest depth and the flags of the newest height map."""
@@ -171,7 +196,7 @@ class SecondSensor(QWidget):
         info, note = self.context.source.info, self.context.status.value.camera_note
         if note and info is not None and info.kind == "camera":
             texts.append(tr("camera {note}").format(note=note))
-        self._depth_text.setText("    ".join(texts))
+        self._depth_text.setText("    ".join(filter(None, (*texts, self._recorded))))
         self._flags.setText(legend(heightmap.flags))
 
     def show_again(self) -> None:
@@ -184,7 +209,15 @@ class SecondSensor(QWidget):
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
-        self.height.show_frame(shown, self._display.colours, still=False)
+        self.height.show_frame(shown, self._display.colours, still=self.depth.live.paused)
+
+    def _on_source(self) -> None:
+        self.recorder.stop()
+        self._forget()
+
+    def _on_recorded(self, text: str) -> None:
+        self._recorded = text
+        self.show_texts()
 
     def _forget(self) -> None:
         """Clear the depth, because it belongs to another calibration or source."""
@@ -204,6 +237,8 @@ class SecondSensor(QWidget):
         self._bench.raise_()
 
     def _follow_source(self) -> None:
+        # The frozen image belongs to the closed stream and cannot be processed again.
+        self.pause(False)
         info = self.context.source.info
         virtual = info is not None and info.kind == "virtual"
         self._bench_key.setVisible(virtual)

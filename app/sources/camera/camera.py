@@ -166,6 +166,7 @@ class Camera:
             self._reopen.set()
         if thread is not None:
             join(thread, CLOSE_S)
+        self._on_change()
 
     def want(self, settings: CameraSettings | None) -> None:
         """Apply settings now and whenever the camera is opened; another format reopens it."""

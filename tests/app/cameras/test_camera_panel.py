@@ -99,6 +99,14 @@ def test_the_dialog_opens_once_and_releases_the_camera(
     assert fake.opened == 1
 
 
+def test_a_closed_camera_leaves_no_note(
+    context: AppContext, panel: CameraPanel, qtbot: QtBot
+) -> None:
+    assert context.status.value.camera_note == "not locked"
+    panel.watch(False)
+    qtbot.waitUntil(lambda: context.status.value.camera_note == "", timeout=WAIT_MS)
+
+
 def test_locking_fixes_the_automatic_settings(
     context: AppContext, panel: CameraPanel, qtbot: QtBot
 ) -> None:

@@ -299,7 +299,7 @@ def test_the_frame_that_is_shown_is_exported_as_reconstructed(
     qtbot.wait(300)
     last = page.depth.last
     assert last is not None and last.heightmap is not None
-    page.file_actions.run_export(ExportChoice(tmp_path / "out", ("npz",)))
+    page.export.run(ExportChoice(tmp_path / "out", ("npz",)))
     path = tmp_path / "out" / f"frame-{last.frame.number:05d}.npz"
     qtbot.waitUntil(path.is_file, timeout=WAIT_MS)
     with np.load(path, allow_pickle=False) as stored:

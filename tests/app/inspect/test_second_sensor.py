@@ -19,6 +19,7 @@ from PySide6.QtWidgets import QAbstractButton, QComboBox, QDockWidget, QLabel, Q
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
+from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
 from app.inspect.second_sensor import SecondSensor
 from app.live.zero import FRAMES, SECOND_SUFFIX, original_of, zero_calibration
@@ -27,6 +28,7 @@ from app.sources.source import SourceInfo
 from app.workspace.workspace import SECOND_STATE, Workspace
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.export.raster import read_npz
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
@@ -295,3 +297,42 @@ def test_the_layout_is_reset_around_it(page: InspectPage, pane: SecondSensor) ->
     dock = page.findChild(QDockWidget, "inspect.dock.second")
     assert dock is not None and dock in page.views.tabifiedDockWidgets(page.views.docks["look"])
     assert pane.isVisible() and page.second.pane is pane
+
+
+def test_pause_freezes_both_sensors(
+    page: InspectPage, pane: SecondSensor, context: AppContext, small_session: Path,
+    small_calibration: Calibration, tmp_path: Path, qtbot: QtBot,
+) -> None:  # fmt: skip
+    (path, *_) = sorted((small_session / "balls").glob("*.png"))
+    for part, name in ((page, "one"), (pane, "two")):
+        part.context.source.choose(_still(path, tmp_path / name))
+        _use(part, small_calibration)
+    qtbot.waitUntil(lambda: _depth(page) is not None and _depth(pane) is not None, timeout=WAIT_MS)
+    page.pause_action.trigger()
+    assert page.live.paused and pane.depth.live.paused
+    assert pane.depth._maker.wanted.still
+    pane.context.source.choose(_still(path, tmp_path / "three"))
+    assert not pane.depth.live.paused and page.live.paused, "another source starts live"
+    page.pause_action.trigger()
+    assert not page.live.paused and not pane.depth._maker.wanted.still
+
+
+def test_it_records_and_exports_on_its_own(
+    page: InspectPage, pane: SecondSensor, context: AppContext, small_session: Path,
+    other_calibration: Calibration, tmp_path: Path, qtbot: QtBot,
+) -> None:  # fmt: skip
+    (path, *_) = sorted((small_session / "balls").glob("*.png"))
+    pane.context.source.choose(_still(path, tmp_path / "two"))
+    _use(pane, other_calibration)
+    qtbot.waitUntil(lambda: _depth(pane) is not None, timeout=WAIT_MS)
+    pane.recorder.action.trigger()
+    assert not page.recorder.busy
+    qtbot.waitUntil(lambda: "MB" in pane._recorded, timeout=WAIT_MS)
+    pane.recorder.action.trigger()
+    qtbot.waitUntil(lambda: not pane.recorder.busy, timeout=WAIT_MS)
+    (recorded,) = context.workspace.recordings_folder("finger-2").iterdir()
+    assert recorded.stat().st_size > 0
+    pane.export.run(ExportChoice(tmp_path / "out", ("npz",)))
+    qtbot.waitUntil(lambda: (tmp_path / "out").is_dir() and not pane.jobs.busy, timeout=WAIT_MS)
+    (exported,) = (tmp_path / "out").glob("*.npz")
+    assert read_npz(exported).calibration_id == other_calibration.identity
