@@ -89,6 +89,32 @@ def test_light_that_is_stronger_all_over_is_no_contact() -> None:
     assert found.rounds is None
 
 
+@pytest.mark.parametrize("off", [0.97, 1.03])
+def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_in(
+    off: float,
+) -> None:
+    known = sensor(0.25)
+    full = known.calibration.full
+    assert full is not None
+    brighter = np.float32(1.1 / full.background.max())
+    true = full.background * brighter
+    filled = np.where(true > 1.0, off * true, true).astype(np.float32)
+    calibration = replace(known.calibration, full=replace(full, background=filled))
+    solver = Reconstructor(calibration).near_light
+    frame = np.minimum(known.bare() * brighter, 1.0)
+    assert (frame == 1.0).any(axis=2).sum() > 100
+    assert solver.depth(known.noisy(frame)).rounds is None
+    led_x, led_y = np.argwhere((true > 1.0).any(axis=2)).mean(axis=0)[::-1]
+    grid = calibration.table.grid
+    at_mm = (
+        float(np.interp(led_x, np.arange(grid.x_mm.size), grid.x_mm)),
+        float(np.interp(led_y, np.arange(grid.y_mm.size), grid.y_mm)),
+    )
+    press = known.pressed(Ball(3.0, 0.1), x_mm=at_mm[0], y_mm=at_mm[1], samples=1)
+    pressed = np.minimum(press.frame * brighter, 1.0)
+    assert solver.depth(known.noisy(pressed)).rounds is not None, "other channels show it"
+
+
 def test_a_shallow_face_beside_a_deep_one_is_seen() -> None:
     known = sensor(0.5)
     deep = known.pressed(Cylinder(4.0, 0.5), x_mm=-7.0, samples=1)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, lit
+from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, SATURATED, lit
 from gelpolight_core.optics.refraction import camera_to_membrane
 from gelpolight_core.reconstruction.near_light.sampling import block_means
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -35,6 +35,9 @@ AREA_CHANGE = 2.5e-3
 LEDs that warm up unevenly cause as much."""
 AREA_SIGMAS = 6.0
 """With half a million areas, noise alone causes a contact in less than one of a thousand images."""
+FILLED_CHANGE = 0.05
+"""Change of a channel that does not count where the background may be saturated: its light there is
+filled in from the model and the surroundings."""
 MEDIAN_OF_NOISE = 0.6745
 """Median size of normal noise, in standard deviations."""
 STATED_NOISE = 1.4
@@ -249,7 +252,10 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
     # Stated at the median brightness; it grows with the light, and the background has its own.
     median = np.median(expected[inside], axis=0) if inside.any() else np.ones(3)
     noise = calibration.noise * np.sqrt(2.0 * np.maximum(expected / median, 1.0))
+    full_scale = blocks((image > SATURATED - FILLED_CHANGE).astype(np.float32)) > 0.0
+    filled = FILLED_CHANGE * cv2.dilate(full_scale.astype(np.float32), np.ones((3, 3), np.uint8))
     limit = np.maximum(least * expected, CONTACT_SIGMAS / block * noise) + 2.0 * unsure
+    limit += filled * expected
     per_light = np.where(inside[..., None], 1.0 / np.maximum(expected, LEAST_LIGHT), 0.0)
     most = (limit * per_light).astype(np.float32)
     limit[~inside] = np.inf
@@ -262,7 +268,7 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
         variance = np.maximum(cv2.blur((noise * per_light) ** 2, (side, side)), 0.0)
         change = AREA_CHANGE + CHANGE_BY_INTERREFLECTION * full.membrane.interreflection
         share = np.maximum(change, AREA_SIGMAS / (block * side) * np.sqrt(variance))
-        share += 2.0 / side * unsure * per_light
+        share += 2.0 / side * unsure * per_light + cv2.blur(filled, (side, side))
         share[~inside] = np.inf
         areas.append(Area(side, share.astype(np.float32)))
     return ContactFinder(
