@@ -26,7 +26,7 @@ Points = tuple[tuple[float, float], ...]
 
 
 class ProcessingPanel(QWidget):
-    """Lets the user choose levelling, filter and a reference to subtract.
+    """Lets the user choose mask, levelling, filter and a reference to subtract.
 
     Signals
     -------
@@ -45,6 +45,7 @@ class ProcessingPanel(QWidget):
         self._reference: Reference | None = None
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self._make_mask(form)
         self._make_level(form)
         self._make_filter(form)
         self._make_reference(form)
@@ -63,6 +64,35 @@ class ProcessingPanel(QWidget):
         form.addRow(self._state)
         form.addRow(self._reset)
         self.show_reference(None)
+
+    def _make_mask(self, form: QFormLayout) -> None:
+        self._mask = named(
+            ComboBox(), "inspect.processing.mask", tr("Mask"),
+            tr("Keep a part of the points only. The others have no depth, and are left out of "
+               "levelling, filter, histogram and export"),
+        )  # fmt: skip
+        for key, text in (
+            ("none", tr("none")),
+            ("inside", tr("keep the rectangle")),
+            ("outside", tr("leave out the rectangle")),
+            ("deeper", tr("keep deeper points")),
+            ("sure", tr("leave out flagged points")),
+        ):
+            self._mask.addItem(text, key)
+        self._deeper = named(
+            DoubleSpinBox(), "inspect.processing.deeper", tr("Smallest depth of the mask")
+        )
+        self._deeper.setRange(-5.0, 5.0)
+        self._deeper.setDecimals(3)
+        self._deeper.setSingleStep(0.05)
+        self._deeper.setSuffix(tr(" mm"))
+        self._deeper.setPrefix(tr("deeper than "))
+        self._deeper.setValue(Processing().deeper_mm)
+        self._deeper.setKeyboardTracking(False)
+        self._mask.currentIndexChanged.connect(self._on_changed)
+        self._deeper.valueChanged.connect(self._on_changed)
+        form.addRow(tr("Mask"), self._mask)
+        form.addRow("", self._deeper)
 
     def _make_level(self, form: QFormLayout) -> None:
         self._level = named(
@@ -131,12 +161,24 @@ class ProcessingPanel(QWidget):
         """The levelling, one of LEVELLINGS."""
         return str(self._level.currentData())
 
+    @property
+    def mask(self) -> str:
+        """The mask, one of MASKS."""
+        return str(self._mask.currentData())
+
+    @property
+    def has_rectangle(self) -> bool:
+        """Whether the rectangle on the map is used."""
+        return self.level == "rectangle" or self.mask in ("inside", "outside")
+
     def processing(self, rectangle: Rectangle, points_mm: Points) -> Processing:
         """Return what is to be done, with the rectangle and the points on the map."""
         return Processing(
             reference=self._reference if self._subtract.isChecked() else None,
+            mask=self.mask,
+            deeper_mm=self._deeper.value(),
             level=self.level,
-            rectangle=rectangle if self.level == "rectangle" else None,
+            rectangle=rectangle if self.has_rectangle else None,
             points_mm=points_mm if self.level == "points" else (),
             filter=str(self._filter.currentData()),
             sigma_mm=self._sigma.value(),
@@ -158,8 +200,9 @@ class ProcessingPanel(QWidget):
 
     def reset(self) -> None:
         """Do nothing to the height map. The reference is kept."""
-        inputs = self._level, self._filter, self._subtract
+        inputs = self._mask, self._level, self._filter, self._subtract
         blocked = [QSignalBlocker(widget) for widget in inputs]
+        self._mask.setCurrentIndex(0)
         self._level.setCurrentIndex(0)
         self._filter.setCurrentIndex(0)
         self._subtract.setChecked(False)
@@ -178,10 +221,11 @@ class ProcessingPanel(QWidget):
     def _follow(self) -> None:
         """Show only the inputs that count."""
         chosen = self._filter.currentData()
+        self._form.setRowVisible(self._deeper, self.mask == "deeper")
         self._form.setRowVisible(self._sigma, chosen == "gaussian")
         self._form.setRowVisible(self._nodes, chosen == "median")
-        chosen_any = self.level != "none" or chosen != "none" or self._subtract.isChecked()
-        self._reset.setEnabled(chosen_any)
+        any_step = {self.mask, self.level, chosen} != {"none"}
+        self._reset.setEnabled(any_step or self._subtract.isChecked())
 
 
 class ProcessedLine(QWidget):

@@ -356,10 +356,9 @@ class Views(QMainWindow):
         self.lines.show(self._visible["section"] and self._has_depth)
         self.lines.set_width(self.section.width_mm)
         self.section.choice.show_lines(self.lines)
-        level = self.processing.level
-        region = self._measures_region() or level == "rectangle"
+        region = self._measures_region() or self.processing.has_rectangle
         self.region.show(region and self._has_depth)
-        self.level_points.show(level == "points" and self._has_depth)
+        self.level_points.show(self.processing.level == "points" and self._has_depth)
         self._lay_lines()
         self.wanted_changed.emit()
 

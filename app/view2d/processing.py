@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.view2d.quantities import Reference
 from gelpolight_core.errors import InputError
@@ -13,27 +14,34 @@ from gelpolight_core.measurement.map_processing import (
     difference,
     level_by_plane,
     level_by_points,
+    masked,
     smooth_gaussian,
     smooth_median,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 Point = tuple[float, float]
+MASKS = ("none", "inside", "outside", "deeper", "sure")
 LEVELLINGS = ("none", "plane", "rectangle", "points")
 
 
 @dataclass(frozen=True, slots=True)
 class Processing:
-    """The steps, in this order: difference, levelling, filter. By default nothing is done.
+    """The steps, in this order: difference, mask, levelling, filter. By default nothing is done.
 
     Attributes
     ----------
     reference : Reference or None
         Its depth is subtracted.
+    mask : str
+        One of MASKS, what is kept: the inside or outside of the rectangle, points that are deeper
+        than a limit, or points without a flag.
+    deeper_mm : float
+        The limit for ``deeper``.
     level : str
         One of LEVELLINGS: by a plane of the untouched surface, of a rectangle, or three points.
     rectangle : Rectangle or None
-        For ``rectangle``.
+        For mask and levelling, if they need it.
     points_mm : tuple of (x, y)
         For ``points``.
     filter : str
@@ -45,6 +53,8 @@ class Processing:
     """
 
     reference: Reference | None = None
+    mask: str = "none"
+    deeper_mm: float = 0.1
     level: str = "none"
     rectangle: Rectangle | None = None
     points_mm: tuple[Point, ...] = ()
@@ -55,7 +65,7 @@ class Processing:
     @property
     def does_nothing(self) -> bool:
         """Whether the height map stays as reconstructed."""
-        return self.reference is None and self.level == "none" and self.filter == "none"
+        return self.reference is None and {self.mask, self.level, self.filter} == {"none"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +92,9 @@ def processed(heightmap: HeightMap, processing: Processing) -> Processed:
     if processing.does_nothing:
         return Processed(heightmap)
     try:
-        done = _filtered(_levelled(_compared(heightmap, processing), processing), processing)
+        done = heightmap
+        for step in (_compared, _masked, _levelled, _filtered):
+            done = step(done, processing)
     except InputError as error:
         return Processed(heightmap, refused=str(error))
     return Processed(done, done.notes[len(heightmap.notes) :])
@@ -110,15 +122,32 @@ def _compared(heightmap: HeightMap, processing: Processing) -> HeightMap:
     return heightmap if reference is None else difference(heightmap, reference.heightmap)
 
 
+def _masked(heightmap: HeightMap, processing: Processing) -> HeightMap:
+    match processing.mask:
+        case "inside" if processing.rectangle is not None:
+            return masked(heightmap, _inside(heightmap, processing.rectangle))
+        case "outside" if processing.rectangle is not None:
+            return masked(heightmap, ~_inside(heightmap, processing.rectangle))
+        case "deeper":
+            return masked(heightmap, heightmap.depth_mm > processing.deeper_mm)
+        case "sure":
+            return masked(heightmap, heightmap.flags == 0)
+    return heightmap
+
+
+def _inside(heightmap: HeightMap, rectangle: Rectangle) -> NDArray[np.bool_]:
+    (x, y), (wide, high) = rectangle.centre_mm, rectangle.sides_mm
+    across = np.abs(heightmap.x_mm - x) <= 0.5 * wide
+    down = np.abs(heightmap.y_mm - y) <= 0.5 * high
+    return np.asarray(down[:, None] & across)
+
+
 def _levelled(heightmap: HeightMap, processing: Processing) -> HeightMap:
     match processing.level:
         case "plane":
             return level_by_plane(heightmap)
         case "rectangle" if processing.rectangle is not None:
-            (x, y), (wide, high) = processing.rectangle.centre_mm, processing.rectangle.sides_mm
-            across = np.abs(heightmap.x_mm - x) <= 0.5 * wide
-            down = np.abs(heightmap.y_mm - y) <= 0.5 * high
-            return level_by_plane(heightmap, mask=down[:, None] & across)
+            return level_by_plane(heightmap, mask=_inside(heightmap, processing.rectangle))
         case "points":
             return level_by_points(heightmap, processing.points_mm)
     return heightmap

@@ -36,6 +36,36 @@ def usable(heightmap: HeightMap) -> Mask:
     return np.asarray(np.isfinite(heightmap.depth_mm) & ((heightmap.flags & out) == 0))
 
 
+def masked(heightmap: HeightMap, keep: Mask) -> HeightMap:
+    """Return a height map that has a depth only at the points to keep.
+
+    All others are flagged as outside. Levelling, filters, histogram and export leave them out.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The surface.
+    keep : (rows, columns) bool
+        The points to keep.
+
+    Raises
+    ------
+    InputError
+        If no point with a depth is kept.
+    """
+    before = usable(heightmap)
+    if not (before & keep).any():
+        raise InputError(
+            tr("the mask leaves out all points with a depth"),
+            where=tr("mask"),
+            advice=tr("Choose a larger area or a smaller depth"),
+        )
+    flags = heightmap.flags | np.where(keep, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
+    percent = 100.0 * float((before & ~keep).sum() / before.sum())
+    note = tr("Masked: {percent:.0f} % of the points are left out.").format(percent=percent)
+    return replace(heightmap, flags=flags, notes=(*heightmap.notes, note))
+
+
 def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
     """Subtract the least-squares plane of the untouched surface from a height map.
 

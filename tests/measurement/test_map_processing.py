@@ -14,6 +14,7 @@ from gelpolight_core.measurement.map_processing import (
     histogram,
     level_by_plane,
     level_by_points,
+    masked,
     smooth_gaussian,
     smooth_median,
     usable,
@@ -42,6 +43,20 @@ def test_a_plane_can_be_fitted_to_a_chosen_area() -> None:
     assert np.abs(level_by_plane(press, mask=mask).depth_mm[mask]).max() < 1e-5
     with pytest.raises(InputError, match="fewer than three"):
         level_by_plane(press, mask=np.zeros_like(mask))
+
+
+def test_a_mask_keeps_points_and_leaves_the_others_out_of_every_later_step() -> None:
+    press = tilted_press()
+    face = press.depth_mm > 0.45
+    bare = masked(press, ~face)
+    np.testing.assert_array_equal(usable(bare), usable(press) & ~face)
+    level = level_by_plane(bare, mask=np.ones_like(face))
+    assert np.abs(level.depth_mm[~face]).max() < 1e-5, "the face has no part in the plane"
+    counts, _ = histogram(masked(press, face))
+    assert counts.sum() == face.sum()
+    assert f"{100.0 * face.mean():.0f} %" in bare.notes[-1]
+    with pytest.raises(InputError, match="mask"):
+        masked(press, np.zeros_like(face))
 
 
 def test_three_points_read_zero_afterwards() -> None:

@@ -419,8 +419,14 @@ def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstruct
     assert last.processed[0] in line.text()
     assert not np.array_equal(last.raw.depth_mm, last.heightmap.depth_mm)
     assert "(processed)" in page.views.docks["surface"].windowTitle()
+    mask = page.findChild(QComboBox, "inspect.processing.mask")
+    assert mask is not None
+    mask.setCurrentIndex(mask.findData("outside"))
+    qtbot.waitUntil(lambda: len(page.depth.last.processed) == 2, timeout=WAIT_MS)  # type: ignore[union-attr]
+    assert page.views.region._roi.isVisible()
     reset.click()
     qtbot.waitUntil(lambda: not page.processed.isVisible(), timeout=WAIT_MS)
+    assert mask.currentData() == "none" and not page.views.region._roi.isVisible()
     assert page.depth.last is not None and page.depth.last.heightmap is last.raw
     assert "(processed)" not in page.views.docks["surface"].windowTitle()
 

@@ -9,7 +9,8 @@ import pytest
 
 from app.view2d.processing import Processing, Processor, processed
 from gelpolight_core.measurement.area import Rectangle
-from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.measurement.map_processing import usable
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 
 @pytest.fixture
@@ -33,6 +34,32 @@ def test_each_levelling_leaves_the_dome_on_a_level_surface(
     done = processed(tilted, steps)
     assert done.refused == "" and len(done.steps) == 1
     np.testing.assert_allclose(done.heightmap.depth_mm, dome.depth_mm, atol=2e-3)
+
+
+RECTANGLE = Rectangle((0.0, 1.0), (3.0, 2.0))
+
+
+def test_each_mask_keeps_what_its_name_says(dome: HeightMap) -> None:
+    x, y = np.meshgrid(dome.x_mm, dome.y_mm)
+    inside = (np.abs(x) <= 1.5) & (np.abs(y - 1.0) <= 1.0)
+    flags = dome.flags.copy()
+    flags[10:20, 30:40] |= np.uint8(Flag.DARK)
+    flagged = replace(dome, flags=flags)
+    for mask, expected in (
+        ("inside", inside),
+        ("outside", ~inside),
+        ("deeper", dome.depth_mm > 0.2),
+        ("sure", flags == 0),
+    ):
+        steps = Processing(mask=mask, rectangle=RECTANGLE, deeper_mm=0.2)
+        done = processed(flagged, steps)
+        assert done.refused == "" and len(done.steps) == 1, mask
+        np.testing.assert_array_equal(usable(done.heightmap), usable(flagged) & expected)
+
+
+def test_a_mask_that_leaves_nothing_is_refused(dome: HeightMap) -> None:
+    done = processed(dome, Processing(mask="deeper", deeper_mm=5.0))
+    assert done.refused and done.heightmap is dome
 
 
 def test_a_median_removes_single_points_and_both_steps_are_named(tilted: HeightMap) -> None:
