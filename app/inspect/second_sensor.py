@@ -95,7 +95,6 @@ class SecondSensor(QWidget):
         self._depth_text = named(PlainLabel(), "second.depth", tr("Largest depth"))
         self._flags = named(MarkupLabel(), "second.flags", tr("Flags"))
         self._display, self._visible = Display(), False
-        self._recorded = ""
         self._shown: Shown | None = None
         self._lay_out()
         self._connect()
@@ -111,8 +110,11 @@ class SecondSensor(QWidget):
         for widget in (source, self.box, self._bench_key):
             widget.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         bar = QToolBar()
-        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        bar.addActions((zero, self.recorder.action, self.export.action))
+        bar.addActions((self.recorder.action, zero, self.export.action))
+        # Its text is the state of the recording.
+        bar.widgetForAction(self.recorder.action).setToolButtonStyle(
+            Qt.ToolButtonStyle.ToolButtonTextBesideIcon
+        )
         rows = QGridLayout()
         rows.addWidget(source, 0, 0)
         rows.addWidget(self._bench_key, 0, 1)
@@ -141,7 +143,6 @@ class SecondSensor(QWidget):
         depth.calibration_switched.connect(self._forget)
         depth.changed.connect(lambda: self.banner.advise(advise(depth.state)))
         depth.live.source_changed.connect(self._on_source)
-        self.recorder.reported.connect(self._on_recorded)
         depth.live.switched.connect(self._follow_source)
         self.banner.act_wanted.connect(self._on_act)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
@@ -196,7 +197,7 @@ class SecondSensor(QWidget):
         info, note = self.context.source.info, self.context.status.value.camera_note
         if note and info is not None and info.kind == "camera":
             texts.append(tr("camera {note}").format(note=note))
-        self._depth_text.setText("    ".join(filter(None, (*texts, self._recorded))))
+        self._depth_text.setText("    ".join(texts))
         self._flags.setText(legend(heightmap.flags))
 
     def show_again(self) -> None:
@@ -214,10 +215,6 @@ class SecondSensor(QWidget):
     def _on_source(self) -> None:
         self.recorder.stop()
         self._forget()
-
-    def _on_recorded(self, text: str) -> None:
-        self._recorded = text
-        self.show_texts()
 
     def _forget(self) -> None:
         """Clear the depth, because it belongs to another calibration or source."""

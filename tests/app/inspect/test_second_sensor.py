@@ -327,7 +327,7 @@ def test_it_records_and_exports_on_its_own(
     qtbot.waitUntil(lambda: _depth(pane) is not None, timeout=WAIT_MS)
     pane.recorder.action.trigger()
     assert not page.recorder.busy
-    qtbot.waitUntil(lambda: "MB" in pane._recorded, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "left" in pane.recorder.action.text(), timeout=WAIT_MS)
     pane.recorder.action.trigger()
     qtbot.waitUntil(lambda: not pane.recorder.busy, timeout=WAIT_MS)
     (recorded,) = context.workspace.recordings_folder("finger-2").iterdir()
