@@ -53,7 +53,7 @@ def usable(
     return np.asarray(valid & lit(background) & (factors > 0.0).all(axis=-1))
 
 
-def throws_light(valid: Mask, background: NDArray[np.floating[Any]]) -> Mask:
+def reflects_light(valid: Mask, background: NDArray[np.floating[Any]]) -> Mask:
     """Return the nodes (rows, columns) that reflect light onto other parts of the membrane.
 
     Unlike :func:`usable` nodes, they can be saturated or lack a channel: only holes reflect none.

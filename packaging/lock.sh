@@ -5,7 +5,7 @@
 #     sh packaging/lock.sh         every version anew
 #     sh packaging/lock.sh keep    versions that are locked stay; only what is missing or no longer allowed changes
 #
-# Needs Python 3.11 to 3.13 with venv, and the network. The tool that resolves (uv) lives in a folder that is thrown away.
+# Needs Python 3.11 to 3.13 with venv, and the network. The tool that resolves (uv) lives in a folder that is deleted.
 set -eu
 cd "$(dirname "$0")/.."
 

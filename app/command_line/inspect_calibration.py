@@ -126,7 +126,8 @@ def _print_calibration(path: Path) -> None:
     if c.full is not None:
         m = c.full.membrane
         shown = tr(
-            "{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, interreflection {thrown:.2f}"
+            "{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, "
+            "interreflection {interreflection:.2f}"
         )
         rows.append(
             (
@@ -135,7 +136,7 @@ def _print_calibration(path: Path) -> None:
                     kept=label(c.full.membrane_kept),
                     gloss=m.gloss,
                     roughness=m.roughness,
-                    thrown=m.interreflection,
+                    interreflection=m.interreflection,
                 ),
             )
         )

@@ -34,7 +34,7 @@ def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
         nargs="+",
         metavar="X Y",
         default=[],
-        help=tr("the tool's points in mm: ends, centres, apex and arms, or points of a rim"),
+        help=tr("the tool's points in mm: ends, centres, apex and arms, or points of an edge"),
     )
     parser.add_argument(
         "--width",

@@ -4,7 +4,7 @@
 
 The whole guide is walked through, from the first start to the evaluation: a sensor is calibrated
 step by step, saved, validated, looked at and measured with. Settings and workspace are in a folder
-that is thrown away. On a quiet machine it takes about ten minutes. Pictures go to docs/pictures,
+that is deleted. On a quiet machine it takes about ten minutes. Pictures go to docs/pictures,
 those that no scene makes any more are removed.
 """
 

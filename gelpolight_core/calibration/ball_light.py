@@ -62,7 +62,7 @@ def with_light_from_around(
     def lit(pair: tuple[BallPixels, BallPose]) -> BallPixels:
         own, ball = pair
         surface, normals, _ = draped_ball(view.points_mm, view.ray_slope, ball, decay_mm=decay_mm)
-        shape = view.throwing.shape
+        shape = view.reflecting.shape
         field = Surface(
             surface.reshape(*shape, 3),
             normals.reshape(*shape, 3),
@@ -94,7 +94,7 @@ def flat_light(
     leds_mm, membrane, slab
         As in :func:`with_light_from_around`.
     """
-    shape = view.throwing.shape
+    shape = view.reflecting.shape
     points = np.concatenate([view.points_mm, np.zeros((len(view.points_mm), 1))], axis=1)
     light, distance = light_directions(leds_mm, points)
     up = np.tile([0.0, 0.0, -1.0], (len(points), 1))
@@ -102,7 +102,7 @@ def flat_light(
     flat = (-bright * light[..., 2] / distance**2).reshape(*shape, 3)
     grid, returned = points.reshape(*shape, 3), np.zeros_like(flat)
     for _ in range(2):
-        seen = (flat + membrane.interreflection * returned) * view.throwing[..., None]
+        seen = (flat + membrane.interreflection * returned) * view.reflecting[..., None]
         returned = np.asarray(
             returned_to_flat(seen, grid, view.view, leds_mm, membrane, view.pitch_mm, slab),
             np.float64,

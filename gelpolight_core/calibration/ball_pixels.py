@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.reflectance.gathered_light import ratio_thrown
+from gelpolight_core.reflectance.gathered_light import ratio_reflected
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
 from gelpolight_core.reflectance.surroundings import view_directions
 
@@ -39,7 +39,7 @@ class CoarseView:
         Where the rays meet the flat membrane, and their slope.
     view : (rows, columns, 3)
         Unit directions back to the camera.
-    throwing : (rows, columns) float32
+    reflecting : (rows, columns) float32
         Share of each facet that reflects light onto other parts of the membrane.
     pitch_mm : float
         Distance between nodes.
@@ -50,16 +50,16 @@ class CoarseView:
     points_mm: Array
     ray_slope: Array
     view: Array
-    throwing: Map
+    reflecting: Map
     pitch_mm: float
     factor: int
 
     @classmethod
-    def of(cls, table: ResamplingTable, throwing: NDArray[np.bool_]) -> CoarseView:
+    def of(cls, table: ResamplingTable, reflecting: NDArray[np.bool_]) -> CoarseView:
         """Return the coarse view of a table's grid with its reflecting nodes (rows, columns)."""
         grid = table.grid
         factor = max(round(FIELD_PITCH_MM / grid.pitch_mm), 1)
-        share = block_means(throwing.astype(np.float32), factor)
+        share = block_means(reflecting.astype(np.float32), factor)
         ray_slope = np.nan_to_num(block_means(table.ray_slope, factor)).astype(np.float64)
         x, y = (
             axis[: axis.size // factor * factor].reshape(-1, factor).mean(axis=1)
@@ -147,7 +147,7 @@ def gather_ball_pixels(
     ratio = np.asarray(image / base, np.float32)
     whole = block_means(usable.astype(np.float32), view.factor)[..., None] > 0.99
     seen = np.minimum(block_means(ratio, view.factor), np.float32(MOST_RATIO))
-    field = ratio_thrown(seen, whole, view.throwing)
+    field = ratio_reflected(seen, whole, view.reflecting)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])

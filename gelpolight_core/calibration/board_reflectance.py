@@ -19,7 +19,7 @@ THIN = 8
 """Nodes between those at which membrane and white board are compared."""
 BOARD_REFLECTANCE, BOARD_SD = 0.92, 0.05
 """Of matt white boards, papers and paints, which reflect 0.85 to 0.99 of the light."""
-BELIEVED_SDS = 3.0
+AGREEING_SDS = 3.0
 """An expected reflectance that differs by more standard deviations from that of the balls is left
 out: board and membrane had different exposures, or the board is not white."""
 
@@ -110,5 +110,5 @@ class BesideBoard(NamedTuple):
         """
         seen = self.reflectance(leds_mm, membrane)
         expected, sd = BOARD_REFLECTANCE * seen, BOARD_SD * seen
-        agrees = abs(expected - shown[0]) <= BELIEVED_SDS * float(np.hypot(sd, shown[1]))
+        agrees = abs(expected - shown[0]) <= AGREEING_SDS * float(np.hypot(sd, shown[1]))
         return (expected, sd) if agrees else None

@@ -291,14 +291,14 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     scale = _scale(full, field)
     membrane, steps = membrane_numbers(full), Steps(STEPS, SETTLED**2, True, False)
     rows, columns = depth_mm.shape
-    thrown = membrane.interreflection is not None
+    reflected = membrane.interreflection is not None
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     x, y = np.meshgrid(field.x_mm, field.y_mm)
     normals = surface_normals(depth_mm, np.s_[:rows, :columns], field.ray_slope, scale.pitch_mm)
-    for _ in range(ROUNDS_WITH_AROUND if thrown else ROUNDS):
+    for _ in range(ROUNDS_WITH_AROUND if reflected else ROUNDS):
         image = field.image
-        if thrown:
+        if reflected:
             ray_slope, (nx, ny) = field.ray_slope, normals
             points = np.stack(
                 [x + depth_mm * ray_slope[0], y + depth_mm * ray_slope[1], -depth_mm], -1

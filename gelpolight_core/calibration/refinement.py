@@ -20,7 +20,7 @@ from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import LightResult
-from gelpolight_core.masks import throws_light
+from gelpolight_core.masks import reflects_light
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import (
@@ -91,7 +91,7 @@ def refine_with(
     crosstalk = found.matrix
     background = unmix(bare, crosstalk)
     noise = press_noise(results.presses)
-    view = CoarseView.of(table, throws_light(table.valid, background))
+    view = CoarseView.of(table, reflects_light(table.valid, background))
     pixels = [
         gather_ball_pixels(
             press, unmix(image, crosstalk), background, table, view, factors.usable, noise

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.known_sensor import KnownSensor, exact_calibration
-from gelpolight_core.measurement.score import TrueDepth, score_depth
+from gelpolight_core.measurement.score import TrueDepth, score_depth, scored_radius_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.directional import directional_lamps, shadow_areas
 from gelpolight_core.simulation.indenters import Cylinder, press
@@ -29,7 +29,6 @@ Progress = Callable[[str, float], None]
 FAR_MM = 1e4
 WIDTH_PX = 320
 TOUCHED_MM = 0.02
-RIM_MM = 1.0
 HEIGHT_SHARES = (0.6, 1.0, 1.5)
 """LED heights that are compared, over those of the design."""
 ELEVATIONS_DEG = (15.0, 30.0, 45.0)
@@ -209,7 +208,7 @@ def _score(known: KnownSensor, surface: PressedSurface, depth_mm: float) -> tupl
     """Return the RMS of the depth in um, and the error of the plateau in percent."""
     seen = known.showing(surface, samples=1)
     found = Reconstructor(known.calibration).depth(seen.frame, normals=False)
-    radius_mm = 0.5 * known.calibration.sensor.working_diameter_mm - RIM_MM
+    radius_mm = scored_radius_mm(known.calibration.sensor)
     truth = TrueDepth(surface.depth_mm, surface.x_mm, surface.y_mm)
     score = score_depth(
         found.depth_mm, found.x_mm, found.y_mm, truth, height_mm=depth_mm, radius_mm=radius_mm

@@ -29,6 +29,7 @@ from gelpolight_core.measurement.score import (
     TrueDepth,
     read_true_depth,
     score_depth,
+    scored_radius_mm,
     summarise,
 )
 from gelpolight_core.measurement.truth import PressTruth, read_truth
@@ -40,8 +41,6 @@ from gelpolight_core.session.images import require_colour
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import marked, tr
 
-RIM_MM = 1.0
-"""Nodes closer to the edge of the working circle are not scored: the true depth has no edge."""
 CALIBRATING = 0.6
 """Share of the calibrations in the total work, for the progress."""
 
@@ -85,7 +84,7 @@ VARIANTS = (
     Variant("shadows", marked("dark channels used"), Terms(shadows=False)),
     Variant("saturation", marked("saturated channels used"), Terms(saturation=False)),
     Variant("weights", marked("plain sine transform, no weights"), Terms(weights=False)),
-    Variant("free_rim", marked("boundary fixed at depth 0"), Terms(free_rim=False)),
+    Variant("free_boundary", marked("boundary fixed at depth 0"), Terms(free_boundary=False)),
     Variant("denoising", marked("uniform areas not averaged"), Terms(denoising=False)),
     Variant("sharpening", marked("images not sharpened"), Terms(sharpening=False)),
     Variant(
@@ -218,7 +217,7 @@ def ablate(
         If the session cannot be calibrated, or a press has no image or no truth.
     """
     progress = progress or (lambda _what, _share: None)
-    radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
+    radius_mm = scored_radius_mm(session.sensor)
     seen = run_stage(Stage.RESPONSE, session, StageResults()).response
     linear = session if seen is None else replace(session, response=seen.response)
     presses = read_presses(linear, radius_mm)

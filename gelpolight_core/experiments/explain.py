@@ -17,16 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.board_reflectance import BesideBoard
-from gelpolight_core.experiments.ablation import RIM_MM, TruePress, read_presses
+from gelpolight_core.experiments.ablation import TruePress, read_presses
 from gelpolight_core.experiments.true_view import TrueView, lit_by, true_view
 from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.measurement.score import TrueDepth
+from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.misfit import direct_light
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.region_solver import Solved
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
-from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered, ratio_thrown
+from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered, ratio_reflected
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 from gelpolight_core.session.session import Session
@@ -152,7 +152,7 @@ def explain(
     full = calibration.full
     assert full is not None
     progress = progress or (lambda _what, _share: None)
-    radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
+    radius_mm = scored_radius_mm(session.sensor)
     presses = read_presses(replace(session, response=calibration.response), radius_mm)
     solver = NearLightSolver(calibration, full, workers=2)
     losses, parts = [], []
@@ -190,9 +190,9 @@ def membrane_reflectance(calibration: Calibration, full: FullModel) -> float:
 def _needed(values: Array) -> float:
     """Return `Explanation.reflectance_needed`."""
     steep = values[values[:, 1] >= STEEP_DEG]
-    left, thrown = steep[:, 2] - steep[:, 3], steep[:, 5]
-    size = float(thrown @ thrown)
-    return float(left @ thrown) / size if size > 0.0 else float("nan")
+    left, reflected = steep[:, 2] - steep[:, 3], steep[:, 5]
+    size = float(reflected @ reflected)
+    return float(left @ reflected) / size if size > 0.0 else float("nan")
 
 
 def _view(solved: Solved, truth: TrueDepth) -> tuple[TrueView, Array]:
@@ -242,13 +242,13 @@ def _light_at(maps: SensorMaps, truth: TrueDepth, solved: Solved) -> Array:
     around = np.moveaxis(np.broadcast_to(solved.compared.fine.around, image.ratio.shape), 0, -1)
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     towards_camera = view_directions(ray_slope)
-    sent = ratio_thrown(seen, usable[..., None], maps.throwing) * flat
+    sent = ratio_reflected(seen, usable[..., None], maps.reflecting) * flat
     facets = Surface(view.points_mm, view.normals, towards_camera, sent)
     where = usable & view.known & (slope >= BANDS[0])
     thinned = np.zeros_like(where)
     thinned[::2, ::2] = where[::2, ::2]
     at = Receivers.on(facets, thinned)
-    thrown = (
+    reflected = (
         gathered(facets, at, leds, full.membrane, scale.pitch_mm, slab=maps.slab) / flat[thinned]
     )
     points, normals = view.points_mm[thinned], view.normals[thinned]
@@ -259,7 +259,7 @@ def _light_at(maps: SensorMaps, truth: TrueDepth, solved: Solved) -> Array:
     tilted = np.einsum("nkc,nc->nk", light, normals) > -light[..., 2]
     side = np.where(lit, np.where(tilted, 0, 1), 2)
     steep = np.broadcast_to(slope[thinned][:, None], lit.shape)
-    parts = (side, steep, seen[thinned], np.where(lit, direct, 0.0), around[thinned], thrown)
+    parts = (side, steep, seen[thinned], np.where(lit, direct, 0.0), around[thinned], reflected)
     return np.stack([part.ravel() for part in parts], axis=1)
 
 
@@ -270,6 +270,6 @@ def _in_bands(values: Array) -> tuple[Light, ...]:
         for low, high in pairwise(BANDS):
             part = values[(values[:, 0] == number) & (values[:, 1] >= low) & (values[:, 1] < high)]
             if len(part) >= LEAST_NODES:
-                seen, direct, model, thrown = np.median(part[:, 2:], axis=0).tolist()
-                found.append(Light(side, low, high, seen, direct, model, thrown, len(part)))
+                seen, direct, model, reflected = np.median(part[:, 2:], axis=0).tolist()
+                found.append(Light(side, low, high, seen, direct, model, reflected, len(part)))
     return tuple(found)

@@ -20,7 +20,7 @@ from gelpolight_core.experiments.known_sensor import (
 from gelpolight_core.experiments.stability import ModeSeen, Seen
 from gelpolight_core.lights.positions import direction_condition
 from gelpolight_core.measurement.indenter_tools import mode_error
-from gelpolight_core.measurement.score import TrueDepth
+from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
 from gelpolight_core.measurement.spread import BALL_SLOPE
 from gelpolight_core.reconstruction.checks import accepted, free_boundary_note
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, Flag, HeightMap
@@ -31,7 +31,6 @@ from gelpolight_core.simulation.indenters import Ball
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
-RIM_MM = 1.0
 SCALE = 0.25
 MOST_OWN_SHARE = 0.1
 BALL = Ball(4.0, 1.0)
@@ -154,7 +153,7 @@ def judged(
     """
     image = press.frame if frame is None else frame
     calibration = known.calibration
-    radius = radius_mm or 0.5 * calibration.sensor.working_diameter_mm - RIM_MM
+    radius = radius_mm or scored_radius_mm(calibration.sensor)
     by = {m: Reconstructor(calibration, model=m) for m in models}
     found = {m: reconstructor.depth(image) for m, reconstructor in by.items()}
     best = found["full"] if "full" in found else found[models[0]]

@@ -311,5 +311,5 @@ def _no_circle() -> InputError:
     return InputError(
         tr("no circle goes through these points"),
         where=tr("circle"),
-        advice=tr("Give three or more points of the rim that do not lie on one line"),
+        advice=tr("Give three or more points of the edge that do not lie on one line"),
     )

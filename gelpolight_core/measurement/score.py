@@ -15,12 +15,15 @@ from gelpolight_core.calibration.manifest import UNREADABLE, read_member
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.npy import array_of
 from gelpolight_core.io.reading import open_file
+from gelpolight_core.session.session import SensorData
 from gelpolight_core.translation import tr
 
 PLATEAU = 0.98
 # 64 megapixels of 8 bytes.
 MOST_BYTES = 512_000_000 + 4096
 KEYS = ("depth_mm", "x0_mm", "y0_mm", "pitch_mm")
+EDGE_MM = 1.0
+"""Width of the edge of the working circle in which no depth is compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +133,11 @@ def score_depth(
         float(100.0 * (np.sqrt(area[0] / area[1]) - 1.0)),
         float(1e3 * np.sqrt(np.mean((found - true)[counts] ** 2))),
     )
+
+
+def scored_radius_mm(sensor: SensorData) -> float:
+    """Return the radius in which a depth is compared with its truth, which has no edge."""
+    return 0.5 * sensor.working_diameter_mm - EDGE_MM
 
 
 def summarise(scores: Iterable[DepthScore]) -> ScoreSummary:

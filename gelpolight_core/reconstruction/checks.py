@@ -89,7 +89,7 @@ def free_boundary_note() -> str:
     return tr("a contact crosses the boundary of the field: the boundary is free there")
 
 
-def held_boundary_note() -> str:
+def fixed_boundary_note() -> str:
     """Return the note on a map of the paper's model whose boundary a contact crosses."""
     return tr(
         "a contact crosses the boundary of the field, where the paper's model holds depth 0: "

@@ -22,7 +22,7 @@ from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibrati
 from gelpolight_core.reconstruction.linear import as_linear
 from gelpolight_core.reconstruction.near_light.maps import COARSE, LEAST_SHARE, SensorMaps
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered, ratio_thrown
+from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered, ratio_reflected
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 
@@ -137,10 +137,10 @@ def _image_misfit(
         maps = SensorMaps(calibration, full)
         scale = maps.scale(COARSE)
         at = (np.asarray((m + 0.5) / COARSE - 0.5, np.float32) for m in (column, row))
-        sources = (-scale.flat, maps.returned, maps.throwing[None])
-        flat, returned, throwing = _between(sources, *at)
+        sources = (-scale.flat, maps.returned, maps.reflecting[None])
+        flat, returned, reflecting = _between(sources, *at)
         points = np.stack([x, y, -depth], axis=-1)
-        seen = ratio_thrown(ratio, of_use, throwing[..., 0]) * flat
+        seen = ratio_reflected(ratio, of_use, reflecting[..., 0]) * flat
         surface = Surface(points, normals, view_directions(ray_slope), seen)
         receivers = Receivers.on(surface, inside)
         leds, membrane, slab = full.led_positions_mm, full.membrane, maps.slab

@@ -30,7 +30,7 @@ class Terms:
     weights : bool
         Slopes are weighted by their reliability; otherwise all have the same weight, and one sine
         transform integrates them, with a fixed boundary.
-    free_rim : bool
+    free_boundary : bool
         The boundary is free where a contact crosses it; otherwise the whole boundary is at depth 0.
     denoising : bool
         Uniform areas of the image are averaged over a few nodes.
@@ -44,7 +44,7 @@ class Terms:
     shadows: bool = True
     saturation: bool = True
     weights: bool = True
-    free_rim: bool = True
+    free_boundary: bool = True
     denoising: bool = True
     sharpening: bool = True
 

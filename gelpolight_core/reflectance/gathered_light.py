@@ -108,7 +108,7 @@ class Receivers(NamedTuple):
         return cls(surface.points_mm[where], surface.normals[where], surface.view[where], place)
 
 
-def ratio_thrown(ratio: NDArray[np.floating], known: NDArray[np.bool_], throwing: Map) -> Map:
+def ratio_reflected(ratio: NDArray[np.floating], known: NDArray[np.bool_], reflecting: Map) -> Map:
     """Return press over background (rows, columns, 3) of the light that facets reflect onto others.
 
     Parameters
@@ -117,10 +117,10 @@ def ratio_thrown(ratio: NDArray[np.floating], known: NDArray[np.bool_], throwing
         As the camera sees it.
     known : (rows, columns, 3) or (rows, columns, 1) bool
         Where the ratio is known; elsewhere facets reflect as much as untouched ones.
-    throwing : (rows, columns) float32
+    reflecting : (rows, columns) float32
         Share of each facet that reflects light.
     """
-    return np.asarray(np.where(known, np.maximum(ratio, 0.0), 1.0) * throwing[..., None])
+    return np.asarray(np.where(known, np.maximum(ratio, 0.0), 1.0) * reflecting[..., None])
 
 
 def facets(

@@ -107,8 +107,8 @@ def _joint_facts(c: Calibration) -> Facts:
         *_loss_facts(c.full),
         (
             tr("Membrane ({form})").format(form=label(c.full.membrane_kept)),
-            tr("gloss {gloss:.3f}, roughness {roughness:.3f}, interreflection {thrown:.3f}").format(
-                gloss=m.gloss, roughness=m.roughness, thrown=m.interreflection
+            tr("gloss {a:.3f}, roughness {b:.3f}, interreflection {c:.3f}").format(
+                a=m.gloss, b=m.roughness, c=m.interreflection
             ),
         ),
     )

@@ -135,5 +135,5 @@ def scattered(
     spread = n_h * n_h * (a2 - 1.0) + 1.0
     seen = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_v * n_v) - 1.0)))
     facets = a2 / (spread * spread) * seen / (4.0 * n_v)
-    thrown = diffuse + specular * metallic_rise(v_h) * lobe
-    return lx, ly, lz, thrown * n_l / ((1.0 - glossy) * n_l + glossy * facets)
+    reflected = diffuse + specular * metallic_rise(v_h) * lobe
+    return lx, ly, lz, reflected * n_l / ((1.0 - glossy) * n_l + glossy * facets)

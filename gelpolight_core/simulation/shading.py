@@ -107,7 +107,7 @@ def point_brightness(
     n_l = normal[0] * lx + normal[1] * ly + normal[2] * lz
     if n_l <= 0.0:
         return 0.0
-    thrown = material[0]
+    reflected = material[0]
     n_v = normal[0] * to_camera[0] + normal[1] * to_camera[1] + normal[2] * to_camera[2]
     if material[1] > 0.0 and n_v > 1e-6:
         hx, hy, hz = lx + to_camera[0], ly + to_camera[1], lz + to_camera[2]
@@ -115,8 +115,8 @@ def point_brightness(
         v_h = (to_camera[0] * hx + to_camera[1] * hy + to_camera[2] * hz) / h
         n_h = (normal[0] * hx + normal[1] * hy + normal[2] * hz) / h
         metal = material[1] * metallic_rise(v_h)
-        thrown += metal * metallic_lobe(n_l, n_v, n_h, v_h, material[2])
-    return float(strength * n_l * thrown)
+        reflected += metal * metallic_lobe(n_l, n_v, n_h, v_h, material[2])
+    return float(strength * n_l * reflected)
 
 
 @compiled

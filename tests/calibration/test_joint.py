@@ -138,8 +138,8 @@ def pixels_of(
     ratio = shaded(truth, seen, normals, view) / shaded(truth, flat, up, view)
     field = np.ones((NODES, NODES, 3), np.float32)
     if truth.interreflection > 0.0:
-        thrown, field = thrown_light(truth, pose, seen, normals)
-        ratio += truth.interreflection * thrown / shaded(truth, flat, up, view)
+        reflected, field = reflected_light(truth, pose, seen, normals)
+        ratio += truth.interreflection * reflected / shaded(truth, flat, up, view)
     runs = random.normal(size=(-(-len(r) // TOGETHER), 3)).repeat(TOGETHER, axis=0)
     ratio += noise * runs[: len(r)]
     weight = np.full_like(ratio, 1.0 / max(noise, 0.01))
@@ -149,7 +149,7 @@ def pixels_of(
     )
 
 
-def thrown_light(
+def reflected_light(
     truth: Truth, pose: BallPose, points: Array, normals: Array
 ) -> tuple[Array, NDArray[np.float32]]:
     """Return what points receive of a matt membrane, facet by facet; press over background."""

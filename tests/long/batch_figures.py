@@ -83,7 +83,7 @@ def measure(options: argparse.Namespace, out: Path) -> None:
 
 
 def main() -> None:
-    """Measure one way in a folder that is thrown away."""
+    """Measure one way in a folder that is deleted."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("calibration", type=Path)
     parser.add_argument("recording", type=Path)

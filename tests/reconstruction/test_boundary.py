@@ -19,8 +19,8 @@ from gelpolight_core.experiments.known_sensor import (
 from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.checks import (
+    fixed_boundary_note,
     free_boundary_note,
-    held_boundary_note,
     unanchored_note,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
@@ -165,7 +165,7 @@ def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
     press = scene("cylinder 12 at 10.5")
     paper = Reconstructor(sensor().calibration, model="paper")
     found = paper.depth(press.frame)
-    assert held_boundary_note() in found.notes
+    assert fixed_boundary_note() in found.notes
     measured = measure_object(
         found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=found.flags
     )
@@ -196,8 +196,8 @@ STRIPS = region_strips(rim_distance_mm(FIELD, PITCH_MM), WHOLE, PITCH_MM)
 
 def test_the_strip_lies_inside_the_field_next_to_its_boundary() -> None:
     radius = np.hypot(*np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))) * PITCH_MM
-    assert (STRIPS.rim <= FIELD).all()
-    assert radius[STRIPS.rim].min() > 12.0 - 0.5 - PITCH_MM
+    assert (STRIPS.edge <= FIELD).all()
+    assert radius[STRIPS.edge].min() > 12.0 - 0.5 - PITCH_MM
     assert not STRIPS.inner.any()
     half = Region((20, 30), (40, 50))
     inner = region_strips(rim_distance_mm(FIELD, PITCH_MM), half, PITCH_MM).inner
@@ -211,7 +211,7 @@ def test_only_the_pressed_part_of_the_boundary_is_free() -> None:
     held_mm = np.where(x > 8.0, 0.5, 0.0).astype(np.float32)
     found = find_boundary(held_mm, STRIPS, lambda free: open_mm, PITCH_MM)
     assert found.free is not None
-    assert found.free[STRIPS.rim & (x > 8.0)].all()
+    assert found.free[STRIPS.edge & (x > 8.0)].all()
     assert not found.free[x < 5.0].any()
     assert found.level_sd_mm == 0.0
 

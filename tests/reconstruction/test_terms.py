@@ -176,7 +176,7 @@ def test_a_rim_that_is_held_pulls_a_contact_that_crosses_it_down(
     frame = VirtualSensor(design, 0).frame(PressedMembrane(surface), stream="rim")
     rgb = frame.astype(np.float32) / 255.0
     free = solved(rgb, virtual_calibration)
-    held = solved(rgb, virtual_calibration, free_rim=False)
+    held = solved(rgb, virtual_calibration, free_boundary=False)
     assert free.boundary.free is not None
     assert held.boundary.free is None
     grid = virtual_calibration.table.grid

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gelpolight_core.masks import throws_light
+from gelpolight_core.masks import reflects_light
 from gelpolight_core.optics.refraction import LayerStack
-from gelpolight_core.reflectance.gathered_light import Slab, ratio_thrown, returned_to_flat
+from gelpolight_core.reflectance.gathered_light import Slab, ratio_reflected, returned_to_flat
 from gelpolight_core.reflectance.membrane import Membrane
 
 LEDS = np.array([[0.0, 10.0, -8.0], [-9.0, -5.0, -8.0], [9.0, -5.0, -8.0]])
@@ -55,13 +55,13 @@ def test_a_window_counts_by_its_optical_thickness() -> None:
     assert slab == pytest.approx((14.0 + 2.0 * 1.41 / 1.49, 1.41))
 
 
-def test_a_saturated_or_dim_part_throws_light_and_a_hole_throws_none() -> None:
+def test_a_saturated_or_dim_part_reflects_light_and_a_hole_reflects_none() -> None:
     valid = np.array([[True, True, True, False]])
     # Saturated; without green and blue; a hole; outside.
     background = np.array([[[1.0, 0.3, 0.3], [0.4, 0.0, 0.0], [0.0, 0.0, 0.0], [0.5, 0.5, 0.5]]])
-    throwing = throws_light(valid, background)
-    assert throwing.tolist() == [[True, True, False, False]]
+    reflecting = reflects_light(valid, background)
+    assert reflecting.tolist() == [[True, True, False, False]]
     ratio = np.full((1, 4, 3), 0.7)
     known = np.array([[[False], [True], [False], [False]]])
-    sent = ratio_thrown(ratio, known, throwing.astype(np.float32))
+    sent = ratio_reflected(ratio, known, reflecting.astype(np.float32))
     assert sent[0, :, 0] == pytest.approx([1.0, 0.7, 0.0, 0.0])

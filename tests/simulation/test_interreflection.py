@@ -242,8 +242,8 @@ def test_drawn_directions_scatter_as_much_as_the_integral_over_the_hemisphere(
             h /= np.linalg.norm(h)
             v_h = float(h @ view)
             lobe = metallic_lobe(cosine, math.cos(tilt), -h[2], v_h, material[2])
-            thrown = material[0] + material[1] * metallic_rise(v_h) * lobe
-            total += thrown * cosine / math.pi * step * (2.0 * math.pi / 120)
+            reflected = material[0] + material[1] * metallic_rise(v_h) * lobe
+            total += reflected * cosine / math.pi * step * (2.0 * math.pi / 120)
     assert np.mean([some[3] for some in drawn]) == pytest.approx(total, rel=0.01)
 
 

@@ -17,11 +17,10 @@ import cv2
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.ablation import RIM_MM
 from gelpolight_core.experiments.front.methods import Method, Slopes, Solve
 from gelpolight_core.experiments.front.scene import Press, Scene
 from gelpolight_core.experiments.orders import Order, fit_order
-from gelpolight_core.measurement.score import DepthScore, TrueDepth, score_depth
+from gelpolight_core.measurement.score import DepthScore, TrueDepth, score_depth, scored_radius_mm
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.translation import tr
 
@@ -123,7 +122,7 @@ def measure_scene(
         progress(method.label, 0.2 * number / len(methods))
         runs.append(_ready(method, scene))
     grid = scene.full.table.grid
-    radius_mm = 0.5 * scene.full.sensor.working_diameter_mm - RIM_MM
+    radius_mm = scored_radius_mm(scene.full.sensor)
     total = (1 + repeats) * len(presses)
     for turn in range(total):
         press, round_ = presses[turn % len(presses)], turn // len(presses)

@@ -85,21 +85,21 @@ class Strips(NamedTuple):
     ----------
     inside : bool
         All of the field.
-    rim : bool
+    edge : bool
         Inside the field, next to its boundary.
     beyond : bool
-        `rim`, and all that lies outside the field.
+        `edge`, and all that lies outside the field.
     inner : bool
         Next to where the region ends inside the field.
-    rim_nodes : int
+    edge_nodes : int
         Nodes of such a strip around the whole field.
     """
 
     inside: Mask
-    rim: Mask
+    edge: Mask
     beyond: Mask
     inner: Mask
-    rim_nodes: int
+    edge_nodes: int
 
 
 def rim_distance_mm(inside: Mask, pitch_mm: float) -> Map:
@@ -156,21 +156,21 @@ def find_boundary(
     pitch_mm : float
         Distance between nodes.
     """
-    if not (_left(held_mm, strips.rim) or _hollow(held_mm)):
+    if not (_left(held_mm, strips.edge) or _hollow(held_mm)):
         return Boundary(cut=_left(held_mm, strips.inner))
     ends_inside = bool(strips.inner.any())
     open_mm = integrate(strips.beyond)
     # Where the region ends inside the field, the membrane there is at rest.
     lowest = 0.0 if ends_inside else np.percentile(open_mm[strips.inside], LOWEST_PERCENT)
     above_mm = open_mm - np.float32(lowest)
-    highest_mm = float(above_mm[strips.rim].max(initial=0.0))
-    pressed = strips.rim & (above_mm > max(LEFT_MM, PRESSED_SHARE * highest_mm))
+    highest_mm = float(above_mm[strips.edge].max(initial=0.0))
+    pressed = strips.edge & (above_mm > max(LEFT_MM, PRESSED_SHARE * highest_mm))
     if not pressed.any():
         return Boundary(cut=_left(held_mm, strips.inner))
     size = 2 * max(round(REACH_MM / pitch_mm), 1) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     free = (cv2.dilate(pressed.astype(np.uint8), disc) > 0) & strips.beyond
-    share = np.count_nonzero(strips.rim & free) / strips.rim_nodes
+    share = np.count_nonzero(strips.edge & free) / strips.edge_nodes
     if ends_inside:
         cut = _left(integrate(free), strips.inner)
         return Boundary(free, cut, depth_sd=ONE_SIDED_SD * share)

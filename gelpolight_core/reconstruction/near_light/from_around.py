@@ -20,7 +20,7 @@ from gelpolight_core.reflectance.gathered_light import (
     Receivers,
     Surface,
     gathered,
-    ratio_thrown,
+    ratio_reflected,
 )
 from gelpolight_core.reflectance.surroundings import view_directions
 
@@ -105,9 +105,9 @@ class FromAround:
         split = int(some.sum())
         place = some.nonzero()
         coarse = found[:split].reshape(len(np.unique(place[0])), -1, 3)
-        thrown = np.asarray(cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR))
-        thrown[tilted] = found[split:]
-        around = np.moveaxis(thrown, -1, 0) / -scale.flat[(slice(None), *at)] * reflectance
+        reflected = np.asarray(cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR))
+        reflected[tilted] = found[split:]
+        around = np.moveaxis(reflected, -1, 0) / -scale.flat[(slice(None), *at)] * reflectance
         around *= scale.kind[at] == 2
         return np.ascontiguousarray(around, np.float32), self._clearance(whole, at)
 
@@ -125,7 +125,7 @@ class FromAround:
             flat = np.stack([*np.meshgrid(x, y), np.zeros(scale.kind.shape)], -1)
             up = np.zeros_like(flat)
             up[..., 2] = -1.0
-            light = -np.moveaxis(scale.flat, 0, -1) * self.maps.throwing[..., None]
+            light = -np.moveaxis(scale.flat, 0, -1) * self.maps.reflecting[..., None]
             parts = (flat, up, view_directions(self._ray_slope.astype(np.float64)), light)
             self._flat = Surface(*(part.astype(np.float32) for part in parts))
         depth, nx, ny = surface
@@ -135,8 +135,10 @@ class FromAround:
         down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
         normals[at] = np.stack([nx, ny, down], axis=-1)
         known = (scale.kind[at] == 2)[..., None]
-        thrown = ratio_thrown(np.moveaxis(image.ratio, 0, -1), known, self.maps.throwing[at])
-        seen[at] = -np.moveaxis(scale.flat, 0, -1)[at] * thrown
+        reflected = ratio_reflected(
+            np.moveaxis(image.ratio, 0, -1), known, self.maps.reflecting[at]
+        )
+        seen[at] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
         return Surface(points, normals, view, seen)
 
     def _clearance(self, whole: Surface, at: tuple[slice, slice]) -> Map:

@@ -307,7 +307,7 @@ def _channels(w, j, dark, interreflection, shadows):  # type: ignore[no-untyped-
 
 
 @_part
-def _begin_block(w, rays, position, leds, dark, curves, table, gloss, thrown, shadows, warm):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _begin_block(w, rays, position, leds, dark, curves, table, gloss, reflected, shadows, warm):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find lights, view and a first normal of a block's nodes.
 
     Started `warm`, the stored normals are used where all three lights count.
@@ -325,7 +325,7 @@ def _begin_block(w, rays, position, leds, dark, curves, table, gloss, thrown, sh
         l2, near2 = _light(leds[2], x, y + d * wy, d)
         s0, s1, s2 = _triple(w, _SCALE, j)
         _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
-        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, thrown, shadows)
+        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, reflected, shadows)
         f0 = _response(l0, flat, v, curves[0], table, gloss, 0)[0]
         f1 = _response(l1, flat, v, curves[1], table, gloss, 1)[0]
         f2 = _response(l2, flat, v, curves[2], table, gloss, 2)[0]

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_fill_holes
 
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.masks import DARK_COSINE, throws_light, usable
+from gelpolight_core.masks import DARK_COSINE, reflects_light, usable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
 from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers, Scale
@@ -78,9 +78,9 @@ class SensorMaps:
         return membrane_numbers(self.full, self.calibration.reflectance.coverage)
 
     @cached_property
-    def throwing(self) -> Map:
+    def reflecting(self) -> Map:
         """Share of each node that reflects light onto others, (rows, columns), coarsest scale."""
-        found = throws_light(self.calibration.table.valid, self.full.background)
+        found = reflects_light(self.calibration.table.valid, self.full.background)
         return block_average(found.astype(np.float32), COARSE)
 
     @property
@@ -139,7 +139,7 @@ class SensorMaps:
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
             return Scale(*position, flat, kind, coarse.rays, factor / COARSE)
         ray_slope = np.moveaxis(block_average(self.calibration.table.ray_slope, factor), -1, 0)
-        returned = (self.slab, self.throwing)
+        returned = (self.slab, self.reflecting)
         return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor, returned=returned)
 
 
@@ -291,10 +291,10 @@ def _flat_brightness(
     direct = (response * light[..., 2] / distance**2).reshape(*shape, 3)
     flat = direct
     if returned is not None and membrane.interreflection > LEAST_SHARE:
-        (slab, throwing), pitch = returned, float(x[1] - x[0])
+        (slab, reflecting), pitch = returned, float(x[1] - x[0])
         for _ in range(2):
             more = returned_to_flat(
-                -flat * throwing[..., None],
+                -flat * reflecting[..., None],
                 points,
                 view,
                 full.led_positions_mm,

@@ -152,9 +152,9 @@ class RegionSolver:
         With interreflection, further rounds include it.
         """
         at = (self.maps.scale(COARSE), region.corner)
-        thrown = self.maps.membrane.interreflection is not None
+        reflected = self.maps.membrane.interreflection is not None
         normals: tuple[Map, Map] | None = None
-        boundary = None if terms.free_rim and terms.weights else Boundary()
+        boundary = None if terms.free_boundary and terms.weights else Boundary()
         tolerances = list(settings.round_tolerances)
 
         def solve(depth: Map) -> Map:
@@ -163,9 +163,9 @@ class RegionSolver:
             normals = slopes.normal_x, slopes.normal_y
             tolerance = tolerances.pop(0) if len(tolerances) > 1 else tolerances[0]
             # Interreflection makes walls too flat at first: they do not determine the boundary.
-            known = Boundary() if thrown else boundary
+            known = Boundary() if reflected else boundary
             found, known = self._bounded(region, slopes, depth, known, (tolerance, settings, terms))
-            boundary = boundary if thrown else known
+            boundary = boundary if reflected else known
             return found
 
         rounds = near_light_rounds(
@@ -175,7 +175,7 @@ class RegionSolver:
             wanted=terms.near_light_rounds,
             shallow_mm=settings.shallow_mm,
         )
-        if thrown and normals is not None:
+        if reflected and normals is not None:
             surface = (rounds.depth_mm, *normals)
             return rounds, self._with_around(region, compared, surface, boundary, settings, terms)
         return rounds, Start(rounds.depth_mm, normals, boundary or Boundary())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.masks import usable
 from gelpolight_core.reconstruction.checks import (
     NearBoundary,
-    held_boundary_note,
+    fixed_boundary_note,
     nodes_near_boundary,
     paper_notes,
 )
@@ -139,7 +139,7 @@ class PaperSolver:
         height_mm = float(-self.calibration.led_positions_mm[:, 2].max())
         notes = paper_notes(depth_mm, field.flags, height_mm)
         if self.boundary_nodes.pressed(depth_mm):
-            notes += (held_boundary_note(),)
+            notes += (fixed_boundary_note(),)
             field.flags[(field.flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
         return PaperDepth(depth_mm, shown, field.flags, notes, tuple(record.steps))
 
