@@ -106,20 +106,30 @@ class SourceChoice(QObject):
         return None if self.info is None else tr("{name}, idle").format(name=self.info.name)
 
     @property
-    def remembered(self) -> tuple[str, Path | None]:
-        """Kind and file of the source, enough to select it again. An empty kind means none."""
-        return ("", None) if self.info is None else (self.info.kind, self.info.file)
+    def remembered(self) -> tuple[str, str]:
+        """Kind and place of the source, enough to select it again. An empty kind means none.
 
-    def choose_again(self, kind: str, file: Path | None) -> None:
+        The place is a file, a folder or the identity of a camera.
+        """
+        if self.info is None:
+            return "", ""
+        place = self.info.detail if self.info.kind == "camera" else str(self.info.file or "")
+        return self.info.kind, place
+
+    def choose_again(self, kind: str, place: str, cameras: CameraManager) -> None:
         """Select the remembered source if it still exists and none is selected."""
         if self.info is not None:
             return
         if kind == "virtual":
             self.choose_virtual_sensor()
-        elif kind == "folder" and file is not None:
-            self.choose_folder(file)
-        elif kind == "recording" and file is not None:
-            self.choose_recording(file)
+        elif kind == "folder" and place:
+            self.choose_folder(Path(place))
+        elif kind == "recording" and place:
+            self.choose_recording(Path(place))
+        elif kind == "camera":
+            for camera in cameras.infos():
+                if camera.detail == place and not self.owner_of(camera):
+                    self.choose(camera)
 
 
 class Requests(QObject):

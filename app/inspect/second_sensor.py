@@ -148,7 +148,7 @@ class SecondSensor(QWidget):
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         source.other, self._first.source.other = self._first.source, source
         source.changed.connect(self._remember)
-        source.choose_again(*self.context.settings.second_source)
+        source.choose_again(*self.context.settings.second_source, self.context.cameras)
 
     # Called by the page
 

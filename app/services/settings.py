@@ -176,21 +176,21 @@ class Settings:
             self._store.remove(f"recent_{kind}")
 
     @property
-    def source(self) -> tuple[str, Path | None]:
-        """Kind and file of the source that was selected last. An empty kind: none."""
+    def source(self) -> tuple[str, str]:
+        """Kind and place of the source that was selected last. An empty kind: none."""
         return self._source("source")
 
     @source.setter
-    def source(self, chosen: tuple[str, Path | None]) -> None:
+    def source(self, chosen: tuple[str, str]) -> None:
         self._keep_source("source", chosen)
 
     @property
-    def second_source(self) -> tuple[str, Path | None]:
+    def second_source(self) -> tuple[str, str]:
         """The same for the second sensor of Inspect."""
         return self._source("second_sensor")
 
     @second_source.setter
-    def second_source(self, chosen: tuple[str, Path | None]) -> None:
+    def second_source(self, chosen: tuple[str, str]) -> None:
         self._keep_source("second_sensor", chosen)
 
     @property
@@ -202,14 +202,12 @@ class Settings:
     def second_sensor(self, on: bool) -> None:
         self._store.setValue("second_sensor/open", "yes" if on else "no")
 
-    def _source(self, group: str) -> tuple[str, Path | None]:
-        file = self._text(f"{group}/file")
-        return self._text(f"{group}/kind"), Path(file) if file else None
+    def _source(self, group: str) -> tuple[str, str]:
+        return self._text(f"{group}/kind"), self._text(f"{group}/file")
 
-    def _keep_source(self, group: str, chosen: tuple[str, Path | None]) -> None:
-        kind, file = chosen
-        self._store.setValue(f"{group}/kind", kind)
-        self._store.setValue(f"{group}/file", "" if file is None else str(file))
+    def _keep_source(self, group: str, chosen: tuple[str, str]) -> None:
+        for key, value in zip(("kind", "file"), chosen, strict=True):
+            self._store.setValue(f"{group}/{key}", value)
 
     @property
     def limits(self) -> Limits:

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 # Image sizes for which the kernels of the sources are compiled.
 SOURCES = ("app.sources.listing", "app.sources.bench")
+CAMERAS = "app.sources.camera.opencv"
 FIRST_SIZE = QSize(1280, 800)
 # Every control of every page can be reached from this size on.
 SMALLEST = QSize(1024, 700)
@@ -265,10 +266,11 @@ class MainWindow(QMainWindow):
 
     def choose_source_again(self) -> None:
         """Select the source of the last run as soon as its modules are loaded."""
-        kind, file = self.context.settings.source
+        kind, place = self.context.settings.source
         if kind:
-            again = partial(self.context.source.choose_again, kind, file)
-            self.loader.when_loaded(SOURCES, again)
+            again = partial(self.context.source.choose_again, kind, place, self.context.cameras)
+            needed = (*SOURCES, CAMERAS) if kind == "camera" else SOURCES
+            self.loader.when_loaded(needed, again)
 
     def _remember_source(self) -> None:
         self.context.settings.source = self.context.source.remembered

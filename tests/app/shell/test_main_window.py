@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import scene
+from fake_camera import C310, FakeCamera, FakeDriver
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import (
     QAction,
@@ -29,7 +30,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext
+from app.context.context import AppContext, SourceChoice
 from app.context.pages import PageEntry
 from app.desktop import open_files
 from app.services.settings import Limits, Settings
@@ -214,20 +215,44 @@ def test_the_source_of_the_last_run_is_selected_again(
     context.source.info = None  # like a new start of the program
     make_window().choose_source_again()
     qtbot.waitUntil(lambda: context.source.info is not None)
-    assert context.source.remembered == ("folder", folder)
+    assert context.source.remembered == ("folder", str(folder))
+
+
+def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected_and_free(
+    context: AppContext, make_window: MakeWindow, qtbot: QtBot
+) -> None:
+    camera = FakeCamera()
+    context.cameras.driver = FakeDriver(camera)
+    window = make_window()
+    context.source.choose(context.cameras.infos()[0])
+    window.close()
+    context.source.info = None  # like a new start of the program
+    camera.plugged = False
+    context.source.choose_again(*context.settings.source, context.cameras)
+    assert context.source.info is None
+    assert context.settings.source == ("camera", C310.identity), "it is kept for the next start"
+    camera.plugged = True
+    other = SourceChoice("the second sensor")
+    other.info, context.source.other = context.cameras.infos()[0], other
+    context.source.choose_again(*context.settings.source, context.cameras)
+    assert context.source.info is None
+    context.source.other = None
+    make_window().choose_source_again()
+    qtbot.waitUntil(lambda: context.source.info is not None)
+    assert context.source.info is not None and context.source.info.detail == C310.identity
 
 
 def test_a_missing_or_deselected_source_is_not_selected_again(
     context: AppContext, make_window: MakeWindow, tmp_path: Path
 ) -> None:
     window = make_window()
-    context.source.choose_again("recording", tmp_path / "gone.gplrec")
+    context.source.choose_again("recording", str(tmp_path / "gone.gplrec"), context.cameras)
     assert context.source.info is None
     context.source.choose_virtual_sensor()
-    assert context.settings.source == ("virtual", None)
+    assert context.settings.source == ("virtual", "")
     context.source.choose(None)
     window.choose_source_again()
-    assert context.settings.source == ("", None)
+    assert context.settings.source == ("", "")
     assert context.source.info is None
 
 
