@@ -25,7 +25,7 @@ from app.measure.judging import Stated
 from app.measure.page import MeasurePage
 from app.services.settings import Limits
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.measurement.tools import ProfileWidth
+from gelpolight_core.measurement.tools import ProfileWidth, tool_from_dict
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
@@ -214,6 +214,31 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     qtbot.keyClick(tool_map, Qt.Key.Key_Escape)
     assert not any(b.isChecked() for b in tool_map.tools.buttons.values())
     _measured(page, qtbot)
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize(
+    ("kind", "quantity", "value"),
+    [("angle", "angle_deg", 45.0)],
+)
+def test_a_tool_of_three_points_is_placed_by_clicks_and_saved(
+    page: MeasurePage, qtbot: QtBot, press: Path, kind: str, quantity: str, value: float
+) -> None:
+    page.open_path(press)
+    work, tool_map = page.press_view.work, page.press_view.map
+    qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
+    tool_map.tools.buttons[kind].click()
+    for x, y in ((2.0, 0.0), (0.0, 0.0), (2.0, 2.0)):
+        tool_map.layer.clicked.emit(x, y)
+    _measured(page, qtbot)
+    page.press_view.keep()
+    _kept(page, qtbot, 1)
+    (record,) = page.book.records
+    first = record.quantities[0]
+    assert first.name == quantity
+    assert first.value == pytest.approx(value)
+    assert first.sd is not None and first.sd > 0.0
+    assert tool_from_dict(record.settings["tool"]) == work.tool
 
 
 @pytest.mark.usefixtures("library")
