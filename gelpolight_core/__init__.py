@@ -3,7 +3,7 @@
 ``import gelpolight_core as gp`` gives the public interface:
 
 - `simulate`, `calibrate`, `read_calibration`, `write_calibration`, `Calibration`, `SensorDesign`
-- `read_image`, `Reconstructor`, `HeightMap`, `Flag`, `write_height_map`
+- `read_image`, `Reconstructor`, `HeightMap`, `Flag`, `read_height_map`, `write_height_map`
 - `measure`, `Measurement`
 - `InputError`
 
@@ -15,7 +15,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gelpolight_core._api import calibrate, measure, read_image, simulate, write_height_map
+    from gelpolight_core._api import (
+        calibrate,
+        measure,
+        read_height_map,
+        read_image,
+        simulate,
+        write_height_map,
+    )
     from gelpolight_core.calibration.file import read_calibration, write_calibration
     from gelpolight_core.design.sensor_design import SensorDesign
     from gelpolight_core.errors import InputError
@@ -37,6 +44,7 @@ __all__ = [
     "calibrate",
     "measure",
     "read_calibration",
+    "read_height_map",
     "read_image",
     "simulate",
     "write_calibration",
@@ -54,6 +62,7 @@ _MODULES = {
     "calibrate": "_api",
     "measure": "_api",
     "read_calibration": "calibration.file",
+    "read_height_map": "_api",
     "read_image": "_api",
     "simulate": "_api",
     "write_calibration": "calibration.file",

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.any_session import calibrate_any
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.heightmap_files import write_heightmap
+from gelpolight_core.export.raster import read_npz
+from gelpolight_core.health.finding import refuse_meaningless
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
@@ -21,6 +23,7 @@ from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.session.closed import read_any_session
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.translation import tr
 
 AnyPath = str | PathLike[str]
 Progress = Callable[[str, float], None]
@@ -150,18 +153,23 @@ def measure(
     Parameters
     ----------
     height_map : HeightMap
-        Result of `Reconstructor.depth`, with ``uncertainty=True`` where the standard deviations
-        should include image noise and calibration.
+        Result of `Reconstructor.depth`, with ``uncertainty=True`` where the part of the image's
+        noise, `noise_sd`, is wanted.
     shape : {"auto", "ball", "cylinder", "cuboid"}, optional
         What is pressed. ``auto`` fits all three and refuses an unclear result.
     at_mm : (float, float), optional
         A point (x, y) on the object, needed where several are pressed.
 
+    Returns
+    -------
+    Measurement
+        Sizes with their standard deviations, and a verdict.
+
     Raises
     ------
     InputError
-        If nothing is pressed, several objects are pressed and `at_mm` is not given, or the shape
-        is unknown or unclear.
+        If the image has a fault that makes its depth meaningless, nothing is pressed, several
+        objects are pressed and `at_mm` is not given, or the shape is unknown or unclear.
 
     Examples
     --------
@@ -172,13 +180,50 @@ def measure(
     >>> found.shape, round(found.diameter_mm)
     ('cylinder', 5)
     """
+    if height_map.health is not None:
+        refuse_meaningless(height_map.health, where=height_map.source or tr("height map"))
     return judged(measure_heightmap(height_map, shape=shape, seed_mm=at_mm), height_map)
 
 
+def read_height_map(path: AnyPath) -> HeightMap:
+    """Read a height map that was written as ``npz``.
+
+    The file holds no examples of the image's noise and no trace: `measure` then states larger
+    standard deviations than for the map before it was written.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or damaged, or is not a height map.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> sensor = gp.Reconstructor(gp.read_calibration("sensor.gplcal"))
+    >>> image = gp.read_image("session/presses/cylinder_s5_d100.png")
+    >>> (path,) = gp.write_height_map(sensor.depth(image, name="press.png"), "maps", formats="npz")
+    >>> gp.read_height_map(path).source
+    'press.png'
+    """
+    return read_npz(Path(path))
+
+
 def write_height_map(
-    height_map: HeightMap, folder: AnyPath, *, formats: Sequence[str] = ("npz",), stride: int = 1
+    height_map: HeightMap,
+    folder: AnyPath,
+    *,
+    formats: Sequence[str] | str = ("npz",),
+    stride: int = 1,
 ) -> list[Path]:
     """Write a height map as ``folder/<image name>.<format>``, one file for each format.
+
+    The image name is the `name` that `Reconstructor.depth` was given; without it, all files are
+    named ``heightmap``. A 16-bit PNG is named ``<image name>.depth.png``.
 
     Parameters
     ----------
@@ -186,9 +231,11 @@ def write_height_map(
         Result of `Reconstructor.depth`.
     folder : path
         Made if it does not exist. Files of the same name are replaced.
-    formats : sequence of str, optional
-        ``npz`` holds everything; ``tif``, ``gsf`` and ``png`` the depth; ``vtp``, ``ply``,
-        ``stl`` and ``glb`` a mesh.
+    formats : sequence of str, or one of them, optional
+        ``npz`` holds depth, flags, normals and standard deviations; ``tif``, ``gsf``, ``png`` and
+        ``csv`` the depth; ``xyz`` points; ``vtp``, ``ply``, ``stl`` and ``glb`` a mesh. Points and
+        meshes are in the sensor frame, z = -depth, in mm (``glb``: in metres), without the nodes
+        outside the working area.
     stride : int, optional
         Meshes use every `stride`-th row and column.
 

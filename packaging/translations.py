@@ -1,7 +1,8 @@
 """Update the catalogues of translations from the source.
 
     python packaging/translations.py           update and compile every catalogue
-    python packaging/translations.py missing   print the texts without a translation, as JSON
+    python packaging/translations.py missing   print the texts without a translation, as JSON;
+                                               nothing is written
 
 Translate with any editor of .po files, then run it again.
 """
@@ -67,20 +68,24 @@ def read(language: str) -> Catalog:
         return read_po(file, locale=language)
 
 
-def update(language: str) -> Catalog:
-    """Write the catalogue of a language with the texts of today, and its compiled form."""
+def updated(language: str) -> Catalog:
+    """Return the catalogue of a language with the texts of today."""
     catalogue = read(language)
     catalogue.update(template(), no_fuzzy_matching=True)
     catalogue.obsolete.clear()
     catalogue.project, catalogue.version, catalogue.fuzzy = "GelPoLight Studio", __version__, False
     catalogue.header_comment = f"# {LANGUAGES[language]}: made by packaging/translations.py."
+    return catalogue
+
+
+def write(catalogue: Catalog, language: str) -> None:
+    """Write the catalogue of a language, and its compiled form."""
     path = catalogue_path(language)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("wb") as file:
         write_po(file, catalogue, width=100, include_lineno=False, sort_output=True)
     with path.with_suffix(".mo").open("wb") as file:
         write_mo(file, catalogue)
-    return catalogue
 
 
 def missing(catalogue: Catalog) -> list[str]:
@@ -89,15 +94,16 @@ def missing(catalogue: Catalog) -> list[str]:
 
 
 def main() -> None:
-    """Update all catalogues, and print what is missing."""
+    """Update all catalogues, or print what is missing."""
     for language in LANGUAGES:
         if language == "en":
             continue
-        catalogue = update(language)
+        catalogue = updated(language)
         absent = missing(catalogue)
         if "missing" in sys.argv[1:]:
             print(json.dumps(absent, ensure_ascii=False, indent=0))
         else:
+            write(catalogue, language)
             print(f"{language}: {len(catalogue)} texts, {len(absent)} without a translation")
 
 

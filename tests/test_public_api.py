@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import gelpolight_core as gp
@@ -51,3 +52,40 @@ def test_unknown_names_are_refused() -> None:
     with pytest.raises(AttributeError, match="mesure"):
         gp.mesure  # noqa: B018
     assert set(gp.__all__) < set(dir(gp))
+
+
+def test_a_fault_of_the_image_is_refused_before_anything_is_measured(
+    small_session: Path, small_calibration: Calibration
+) -> None:
+    image = gp.read_image(small_session / "presses" / "cylinder_s5_d100.png").copy()
+    image[..., 0] = 0
+    height_map = gp.Reconstructor(small_calibration).depth(image, name="dark.png")
+    assert height_map.health is not None and height_map.health.meaningless is not None
+    with pytest.raises(gp.InputError) as refused:
+        gp.measure(height_map)
+    assert refused.value.found == height_map.health.meaningless.cause
+    assert refused.value.where == "dark.png"
+
+
+def test_a_map_that_was_saved_is_trusted_no_more_than_before(
+    small_session: Path, small_calibration: Calibration, tmp_path: Path
+) -> None:
+    image = gp.read_image(small_session / "presses" / "cylinder_s5_d100.png").copy()
+    image[20:60, 100:160] = 255  # a reflection beside the object
+    height_map = gp.Reconstructor(small_calibration).depth(image, name="a.png", uncertainty=True)
+    before = gp.measure(height_map)
+    (path,) = gp.write_height_map(height_map, tmp_path, formats="npz")
+    after = gp.measure(gp.read_height_map(path))
+    assert (before.verdict, after.verdict) == ("doubtful", "doubtful")
+    assert after.reason == before.reason
+    assert after.sd["diameter_mm"] >= before.sd["diameter_mm"]
+
+
+def test_floats_from_0_to_255_are_refused(
+    small_session: Path, small_calibration: Calibration
+) -> None:
+    image = gp.read_image(small_session / "presses" / "cylinder_s5_d100.png")
+    sensor = gp.Reconstructor(small_calibration)
+    with pytest.raises(gp.InputError, match=r"0\.\.1"):
+        sensor.depth(image.astype(np.float32) + 1.0)
+    assert sensor.depth(image / 255.0).depth_mm.max() > 0.9

@@ -34,7 +34,10 @@ def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
         nargs="+",
         metavar="X Y",
         default=[],
-        help=tr("the tool's points in mm: ends, centres, apex and arms, or points of an edge"),
+        help=tr(
+            "the tool's points in mm, in the order of the clicks on the Measure page; of a tool "
+            "with a rectangle, its centre"
+        ),
     )
     parser.add_argument(
         "--width",
@@ -56,11 +59,17 @@ def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
         help=tr("one or two ranges along a profile: A B [C D]"),
     )
     parser.add_argument(
-        "--size", type=float, nargs=2, metavar=("A", "B"), help=tr("sides of rectangles in mm")
+        "--size",
+        type=float,
+        nargs=2,
+        metavar=("A", "B"),
+        help=tr("sides in mm of the area of rectangle, pit and step height"),
     )
     parser.add_argument("--yaw", type=float, metavar="DEG", help=tr("rotation of rectangles"))
     parser.add_argument(
-        "--edge", choices=EDGES, help=tr("depth in mm at which a circle or rectangle is measured")
+        "--edge",
+        choices=EDGES,
+        help=tr("measure a circle or rectangle at the steepest edge nearby, or as it was placed"),
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from gelpolight_core.measurement.tool import POINTS, places
-from gelpolight_core.measurement.tools import Angle, Rectangle, Tool
+from gelpolight_core.measurement.tools import Rectangle, Tool
 
 Point = tuple[float, float]
 LEAST_SIDE_MM = 0.1
@@ -66,8 +66,6 @@ def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:
 
 def outline_of(tool: Tool) -> tuple[tuple[Point, ...], ...]:
     """Return the lines of a tool as it was placed, before anything is measured."""
-    if isinstance(tool, Angle):
-        return ((tool.first_mm, tool.apex_mm, tool.second_mm),)
     if areas := _areas(tool):
         return tuple(_corners(area) for area in areas.values())
     ends = [getattr(tool, f.name) for f in places(type(tool)) if str(f.type) == "Point"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
 
@@ -32,10 +34,10 @@ class Palette(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(4, 6, 4, 6)
         column.setSpacing(3)
-        for kind in kinds():
-            column.addWidget(self._make_button(kind, owner))
-            if kind.name in ("angle", "rectangle", "edge-radius"):
-                column.addSpacing(8)
+        for number, (_, group) in enumerate(groupby(kinds(), key=lambda kind: kind.group)):
+            column.addSpacing(8 if number else 0)
+            for kind in group:
+                column.addWidget(self._make_button(kind, owner))
         column.addStretch(1)
 
     def _make_button(self, kind: Kind, owner: QWidget) -> QToolButton:

@@ -298,7 +298,7 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
     scale = full.scale_sd
     if scale is None:
         return ()
-    lengths = tr("Check the ball radii, Z1 and the refractive index")
+    lengths = tr("Check the ball radii, the LED height and the refractive index")
     stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
     return (
         judge(

@@ -35,7 +35,7 @@ def ending(name: str) -> str:
 
 
 def write_heightmap(
-    heightmap: HeightMap, folder: Path, *, formats: Sequence[str], stride: int = 1
+    heightmap: HeightMap, folder: Path, *, formats: Sequence[str] | str, stride: int = 1
 ) -> list[Path]:
     """Write a height map as ``<folder>/<image without extension>.<format>``, one file per format.
 
@@ -46,8 +46,8 @@ def write_heightmap(
     folder : Path
         Created if it does not exist. Files of the same name are replaced, each completely or not at
         all.
-    formats : sequence of str
-        Out of :data:`FORMATS`: ``npz`` (everything), ``csv`` (the depth as a table, with the
+    formats : sequence of str, or one of them
+        Out of :data:`FORMATS`: ``npz`` (all maps), ``csv`` (the depth as a table, with the
         places of columns and rows), ``xyz`` (one point a line), ``tif``, ``gsf`` and ``png`` (the
         depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera image
         may be in the same folder), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
@@ -65,6 +65,7 @@ def write_heightmap(
     InputError
         If a format is unknown, a file cannot be written, or a mesh would be empty.
     """
+    formats = (formats,) if isinstance(formats, str) else formats
     for name in formats:
         if name not in FORMATS:
             raise InputError(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import read_file
+from gelpolight_core.io.texts import as_line, from_line
 from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
     SD_MAPS,
@@ -63,7 +64,8 @@ def _about(heightmap: HeightMap) -> dict[str, str | float]:
 def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     """Write the contents of the height map; missing parts (None) are left out.
 
-    The standard deviations are described in :class:`HeightMap`. The noise samples are not written.
+    The standard deviations are described in :class:`HeightMap`. The noise samples, the trace and
+    the details of the health check are not written.
 
     Parameters
     ----------
@@ -83,6 +85,8 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         "model": np.array(heightmap.model),
         "source": np.array(heightmap.source),
         "notes": np.array(heightmap.notes, dtype=np.str_),
+        "doubts": np.array([as_line(doubt) for doubt in heightmap.doubts], dtype=np.str_),
+        "lateral_per_mm": np.float64(heightmap.lateral_per_mm),
     }
     if heightmap.normals is not None:
         arrays["normals"] = heightmap.normals.astype(np.float32, copy=False)
@@ -131,6 +135,12 @@ def read_npz(path: Path) -> HeightMap:
                 model=str(stored["model"]),
                 source=str(stored["source"]),
                 notes=tuple(map(str, stored["notes"])) if "notes" in known else (),
+                doubts=tuple(map(from_line, map(str, stored["doubts"])))
+                if "doubts" in known
+                else (),
+                lateral_per_mm=float(stored["lateral_per_mm"])
+                if "lateral_per_mm" in known
+                else 0.0,
                 **{"normals": None} | optional,
             )
         if not heightmap.pitch_mm > 0.0:

@@ -120,13 +120,13 @@ class Angle:
 
     Attributes
     ----------
-    apex_mm, first_mm, second_mm : (float, float)
-        Places, (x, y); the arms end at the second and third.
+    first_mm, apex_mm, second_mm : (float, float)
+        Places, (x, y): the end of one arm, the apex, the end of the other arm.
     """
 
     name: ClassVar[str] = "angle"
-    apex_mm: Point
     first_mm: Point
+    apex_mm: Point
     second_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -148,7 +148,7 @@ class Angle:
             raise InputError(
                 tr("an arm of the angle has no length"),
                 where=tr("angle"),
-                advice=tr("Place three different points, the apex first"),
+                advice=tr("Place three different points, the apex second"),
             )
         x, y = positions.T
         depth = _known_depth(heightmap, x, y)

@@ -36,7 +36,7 @@ def judged(result: Result, height_map: HeightMap) -> Result:
         Doubtful, with the reason, if the calibration's verdict is "fail", the image has a fault, or
         a shape with walls was measured with an in-place calibration; unchanged otherwise.
     """
-    faults: list[str] = [height_map.calibration_fault]
+    faults: list[str] = list(height_map.doubts)
     if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
         faults.append(
             tr(
@@ -44,9 +44,7 @@ def judged(result: Result, height_map: HeightMap) -> Result:
                 "heights are 7 to 10 % too small and sizes 2 to 11 % too large"
             )
         )
-    if height_map.health is not None:
-        faults += [finding.cause for finding in height_map.health.faults]
-    if not any(faults):
+    if not faults:
         return result
     reason = joined("; ", (text for text in (*faults, result.reason) if text))
     doubtful = replace(result, verdict="doubtful", reason=reason)

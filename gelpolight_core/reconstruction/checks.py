@@ -48,6 +48,8 @@ MOST_HIDDEN_MM = 0.1
 """Sensors of 320 x 240 pixels and 50 dB show 25 um; a depth of 0 from a worse one needs a note."""
 LEAST_USABLE = 0.02
 USABLE_STEP = 8
+LARGEST_MEDIAN = 2.0
+"""An image of floats with a larger median is not linear light 0..1, but counts from 0 to 255."""
 
 
 def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
@@ -66,7 +68,7 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     Raises
     ------
     InputError
-        If the frame contains other numbers.
+        If the frame contains other numbers, or floats far above 1.
     """
     kind, size = frame.dtype.kind, frame.dtype.itemsize
     if size not in BYTES_OF_KIND.get(kind, ()):
@@ -79,6 +81,15 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
         return frame.astype(frame.dtype.newbyteorder("="), copy=False)
     if frame.dtype == np.float32 and frame.min() >= 0.0 and frame.max() <= 1.0:
         return frame.astype(np.float32, copy=False)
+    finite = frame[np.isfinite(frame)]
+    if finite.size and (median := float(np.median(finite))) > LARGEST_MEDIAN:
+        raise InputError(
+            tr("the median of the image is {value:.4g}, but floats are linear light 0..1").format(
+                value=median
+            ),
+            where=name or tr("image"),
+            advice=tr("Divide it by its full scale, or use whole numbers as the camera gives them"),
+        )
     limited: Map = np.clip(frame, 0.0, 1.0).astype(np.float32)
     limited[~np.isfinite(frame)] = np.nan
     return limited

@@ -16,6 +16,14 @@ from gelpolight_core.reconstruction.trace import Trace
 class Flag(IntFlag):
     """Reasons why the depth of a pixel is less reliable; a pixel can have several.
 
+    - ``OUTSIDE`` (1): outside the working area or the image; the depth is 0
+    - ``SATURATED`` (2): a saturated channel
+    - ``DARK`` (4): a channel in shadow, as at the walls of every press
+    - ``EXTRAPOLATED`` (8): reflectance table used beyond its data
+    - ``NOT_OBSERVABLE`` (16): wall turned away from the camera
+    - ``INVALID`` (32): not finite, or no light or reflectance factor there
+    - ``UNANCHORED`` (64): the depth may be wrong by a constant
+
     Examples
     --------
     >>> import gelpolight_core as gp
@@ -97,8 +105,9 @@ class HeightMap:
         depth 0. None for the paper's model, which does not detect contacts.
     trace : Trace or None
         Which steps were done, and why the others were left out.
-    calibration_fault : str
-        Why no measurement with the calibration is reliable; empty if the calibration did not fail.
+    doubts : tuple of str
+        Why no measurement of this map is reliable: the fault of a calibration that failed, and the
+        faults of the image. Empty if there are none.
     health : Health or None
         The faults of its frame.
     lateral_per_mm : float
@@ -138,7 +147,7 @@ class HeightMap:
     lateral_scale_sd: float | None = None
     visible_depth_mm: float | None = None
     trace: Trace | None = None
-    calibration_fault: str = ""
+    doubts: tuple[str, ...] = ()
     health: Health | None = None
     lateral_per_mm: float = 0.0
 

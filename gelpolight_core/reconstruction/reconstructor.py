@@ -40,7 +40,7 @@ from gelpolight_core.reconstruction.paper.depth import PAPER_REASON, PAPER_STEPS
 from gelpolight_core.reconstruction.paper.model import SlopeField
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceStep
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.stated_lengths import stated_sd
 from gelpolight_core.translation import tr
 
@@ -97,6 +97,8 @@ class Reconstructor:
             raise ValueError(f"effort = {effort!r}, expected one of {EFFORTS}")
         self.calibration = calibration
         self.model = model or calibration.model
+        if self.model not in (*MODELS, IN_PLACE):
+            raise ValueError(f"model = {model!r}, expected one of {(*MODELS, IN_PLACE)}")
         self.terms = terms
         self.effort = effort
         self.workers = workers
@@ -243,7 +245,7 @@ class Reconstructor:
 
         Parameters
         ----------
-        frame : (height, width, 3) uint8, uint16 or float32
+        frame : (height, width, 3) uint8, uint16 or float
             RGB; whole numbers as the camera encodes them, float frames linear light 0..1.
         name : str, optional
             The image's name, kept in the result.
@@ -271,7 +273,8 @@ class Reconstructor:
             found = self._paper_depth(frame, name, normals, notes, health.light)
         assert found.trace is not None
         trace = replace(found.trace, steps=(_light_step(health.light), *found.trace.steps))
-        return replace(found, health=health, trace=trace)
+        doubts = (*found.doubts, *(finding.cause for finding in health.faults))
+        return replace(found, health=health, doubts=doubts, trace=trace)
 
     def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
         """Return the faults of a frame, each with cause and remedy.
@@ -400,7 +403,7 @@ class Reconstructor:
             model=self.model,
             source=name,
             notes=notes,
-            calibration_fault=self.calibration.fault,
+            doubts=tuple(filter(None, (self.calibration.fault,))),
         )
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:

@@ -45,7 +45,7 @@ ALL: tuple[Tool, ...] = (
     ProfileWidth((-6.0, 0.0), (6.0, 0.0)),
     ProfileWidth((-6.0, 0.0), (6.0, 0.0), 0.2, 0.3, (1.0, 11.0)),
     ProfileAngle((-6.0, 0.0), (0.0, 0.0), (0.0, 1.0), (5.0, 6.0)),
-    Angle((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)),
+    Angle((1.0, 0.0), (0.0, 0.0), (0.0, 1.0)),
     Circle(((3.0, 0.2), (-2.0, 1.5), (0.0, -2.5)), "steepest"),
     RectangleTool(Rectangle((0.0, 0.0), (2.0, 1.0), 10.0)),
     Pit(Rectangle((0.0, 0.0), (2.0, 1.0), 10.0)),
@@ -124,7 +124,7 @@ def test_points_placed_by_hand_are_known_to_one_node_and_no_better() -> None:
     assert result["distance"].sd >= math.sqrt(2.0) * PITCH * 0.999
     assert result["distance"].sd < 3.0 * PITCH
     assert result["depth_difference"].sd == pytest.approx(0.5 * math.sqrt(2.0) * PITCH, rel=0.05)
-    angle = Angle((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)).apply(slope)["angle"]
+    angle = Angle((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(slope)["angle"]
     assert math.radians(angle.sd) == pytest.approx(math.hypot(*[PITCH / 2.0] * 4), rel=0.05)
     drawn = RectangleTool(Rectangle((0.0, 0.0), (2.0, 1.0))).apply(slope)
     assert drawn["side_a"].sd >= math.sqrt(2.0) * PITCH
@@ -132,7 +132,7 @@ def test_points_placed_by_hand_are_known_to_one_node_and_no_better() -> None:
 
 
 def test_an_angle_is_told_in_the_plane_and_in_space() -> None:
-    result = Angle((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
+    result = Angle((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
     assert result["angle"].value == pytest.approx(90.0)
     # (1, 0, 1) and (0, 1, 1) meet at 60 degrees.
     assert result["angle_3d"].value == pytest.approx(60.0, abs=1e-4)

@@ -326,9 +326,11 @@ def test_a_press_almost_to_the_lights_stays_finite(
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-4)
 
 
-def test_an_unknown_effort_is_refused(virtual_calibration: Calibration) -> None:
+def test_an_unknown_effort_or_model_is_refused(virtual_calibration: Calibration) -> None:
     with pytest.raises(ValueError, match="some"):
         Reconstructor(virtual_calibration, effort="some")
+    with pytest.raises(ValueError, match="other"):
+        Reconstructor(virtual_calibration, model="other")
 
 
 def test_warming_up_changes_nothing(frame: Frame, virtual_calibration: Calibration) -> None:
