@@ -12,6 +12,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import SD_MAPS, HeightMap
+from gelpolight_core.reconstruction.near_light.uncertainty import wall_sd_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.exposure import exposed
@@ -195,3 +196,18 @@ def test_an_image_without_information_has_finite_deviations(
     found = Reconstructor(virtual_calibration).depth(rgb, uncertainty=True)
     for name in (*SD_MAPS, "noise_mm"):
         assert np.isfinite(getattr(found, name)).all(), name
+
+
+def test_a_wall_is_known_to_its_node() -> None:
+    """The depth of a step that lies anywhere within a node scatters as stated beside it."""
+    pitch, slope = 0.1, 2.0
+    x = pitch * np.arange(40.0)
+    depth = np.tile(np.clip(slope * (x - 1.5), 0.0, 1.0), (9, 1)).astype(np.float32)
+    stated = wall_sd_mm(depth)
+    places = np.random.default_rng(0).uniform(-0.5, 0.5, 400) * pitch
+    shifted = np.array([np.clip(slope * (x - 1.5 + place), 0.0, 1.0) for place in places])
+    seen = shifted.std(axis=0)
+    middle = (x > 1.65) & (x < 1.85)
+    assert stated[4, middle] == pytest.approx(seen[middle], rel=0.1)
+    assert (stated[4] >= 0.9 * seen).all()
+    assert not stated[4, (x < 1.2) | (x > 2.3)].any()

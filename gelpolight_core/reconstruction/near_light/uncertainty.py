@@ -156,8 +156,10 @@ def depth_noise(
     result.slope_model_sd[here] = _at(slope_model_sd, answer.position)
     result.depth_sd_mm[here] = _root_mean_square(placed, (rows, columns))
     model_sd = _root_mean_square(placed_model, (rows, columns))
-    one_sided = answer.boundary.depth_sd * np.abs(_at(answer.depth_mm, answer.position))
+    depth_mm = _at(answer.depth_mm, answer.position)
+    one_sided = answer.boundary.depth_sd * np.abs(depth_mm)
     level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
+    level_sd = np.hypot(level_sd, wall_sd_mm(depth_mm))
     if light_sd is not None:
         shares = light_sd.astype(np.float32)[:, None, None]
         moved = gain_errors(moves, shares * answer.compared.fine.ratio / sd, answer, coarse)
@@ -167,6 +169,17 @@ def depth_noise(
     (top, left), (rows, columns) = answer.region.corner, answer.region.shape
     result.examples_mm[:, top : top + rows, left : left + columns] = placed
     return result
+
+
+def wall_sd_mm(depth_mm: Map) -> Map:
+    """Return the standard deviation (rows, columns) of the depth at walls, from their position.
+
+    A wall lies somewhere within its node: it can be off by one node over the root of 12, times the
+    slope of the steepest neighbour. Small images of deep presses have few nodes on a wall.
+    """
+    down, across = np.gradient(depth_mm)
+    steepest = cv2.dilate(np.hypot(down, across).astype(np.float32), np.ones((3, 3), np.uint8))
+    return np.asarray(steepest / np.float32(np.sqrt(12.0)))
 
 
 def _ratio_sd(
