@@ -128,8 +128,9 @@ class QualityTable:
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to do, for every figure that did not pass."""
-        return tuple(f.advice for f in self.figures if f.verdict is not Verdict.PASS and f.advice)
+        """What to do, for every figure that did not pass; each advice once."""
+        wanted = (f.advice for f in self.figures if f.verdict is not Verdict.PASS and f.advice)
+        return tuple(dict.fromkeys(wanted))
 
     def __getitem__(self, key: str) -> Figure:
         """Return the figure named `key`."""
