@@ -72,7 +72,7 @@ def judged_by(stage: Stage, table: QualityTable) -> StageStatus:
         Verdict.WARN: StageState.WARN,
         Verdict.FAIL: StageState.FAIL,
     }[table.verdict]
-    advice = ". ".join(dict.fromkeys(table.advice))
+    advice = ". ".join(table.advice)
     sentence = f"{advice}." if advice else tr("Everything is within its limits.")
     return StageStatus(stage, state, sentence, table)
 
