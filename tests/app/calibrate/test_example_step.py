@@ -32,11 +32,14 @@ def test_the_example_step_keeps_the_notes(
     monkeypatch.setattr(steps, "OPEN_ROUTE", route)
     technician.begin(fresh, "notes")
     assert technician.state("notes") == "empty"
-    technician.wizard.at("notes").editor.setPlainText("Zweiter Würfel, neue Membran")
+    technician.wizard.at("notes").editor.insertPlainText("Zweiter Würfel, neue Membran")
     technician.wizard.go_to("lens")
     assert (technician.session / "notes.txt").read_text("utf-8") == "Zweiter Würfel, neue Membran"
     assert technician.state("notes") == "pass"
-    technician.wizard.at("notes").editor.clear()
-    technician.wizard.go_to("notes")
+    notes = technician.session / "notes.txt"
+    technician.begin(CalibrationProject(technician.session), "lens")
+    technician.page.may_close()
+    assert notes.read_text("utf-8").startswith("Zweiter"), "not opened: nothing saved"
+    technician.begin(CalibrationProject(notes.parent), "notes")
     assert technician.wizard.at("notes").editor.toPlainText().startswith("Zweiter")
     technician.rest()
