@@ -116,7 +116,8 @@ class StepPanel(QWidget):
             QPushButton(tr("&Capture")),
             "calibrate.capture",
             tr("Capture"),
-            tr("Capture this image (C)"),
+            tr("Capture this image"),
+            "C",
         )
         self.capture.setMinimumHeight(38)
         self.capture.clicked.connect(self.capture_wanted)

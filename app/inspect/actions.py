@@ -63,7 +63,7 @@ class FileActions(QObject):
         self.image_action = make_action(
             owner, "inspect.screenshot", tr("Screenshot…"), self.screenshot,
             keys=("Ctrl+Shift+P",), icon_name="picture",
-            tip=tr("Save an image of the views or of the surface in any size (Ctrl+Shift+P)"),
+            tip=tr("Save an image of the views or of the surface in any size"),
         )  # fmt: skip
         self.profile_action = make_action(
             owner, "inspect.save_profile", tr("Profile…"), self.save_profile,

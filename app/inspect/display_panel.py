@@ -43,7 +43,7 @@ class DisplayPanel(QWidget):
             self._colour_by.addItem(name, key)
         self._lock = named(
             QCheckBox(tr("Lock")), "inspect.look.lock", tr("Lock the range"),
-            tr("Keep the colour range. If unlocked, it follows the deepest press (K)"),
+            tr("Keep the colour range. If unlocked, it follows the deepest press"), "K",
         )  # fmt: skip
         self._low = self._depth("low", tr("Depth at the low end of the colours"), LIMITS_MM[0])
         self._high = self._depth("high", tr("Depth at the high end of the colours"), 0.01)

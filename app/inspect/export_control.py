@@ -53,10 +53,9 @@ class ExportControl(QObject):
         super().__init__(owner)
         self._depth, self._jobs, self._owner = depth, jobs, owner
         self._context, self._folder = context, folder
-        tip = tr("Write the depth to files")
         self.action = make_action(
-            owner, f"{page}.export", tr("Export…"), self.ask, keys=(key,) if key else (),
-            icon_name="export", tip=f"{tip} ({key})" if key else tip,
+            owner, f"{page}.export", tr("Export…"), self.ask, keys=(key,),
+            icon_name="export", tip=tr("Write the depth to files"),
         )  # fmt: skip
 
     def ask(self) -> None:

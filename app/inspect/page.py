@@ -88,14 +88,14 @@ class InspectPage(QWidget):
         column.setSpacing(0)
         self.pause_action = make_action(
             self, "inspect.pause", tr("Pause"), lambda: self.pause(not self.live.paused),
-            keys=("Space",), icon_name="pause", tip=tr("Freeze the image at full detail (Space)"),
+            keys=("Space",), icon_name="pause", tip=tr("Freeze the image at full detail"),
         )  # fmt: skip
         self.pause_action.setCheckable(True)
         # Other pages use the space bar for something else.
         self.pause_action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         zero_action = make_action(
             self, "inspect.zero", tr("Zero"), self.zero.set_zero, keys=("Ctrl+0",),
-            icon_name="zero", tip=tr("Use the current image as the zero reference (Ctrl+0)"),
+            icon_name="zero", tip=tr("Use the current image as the zero reference"),
         )  # fmt: skip
         self.recorder = RecordControl(self.depth, self, context=self.context)
         self.stream = DepthStream(self.depth, self, context=self.context)

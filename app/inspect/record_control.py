@@ -56,10 +56,9 @@ class RecordControl(QObject):
         self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
         self._warned = False
-        tip = tr("Record every frame without loss")
         self.action: QAction = make_action(
-            owner, f"{page}.record", tr("Record"), self.toggle, keys=(key,) if key else (),
-            icon_name="record", tip=f"{tip} ({key})" if key else tip,
+            owner, f"{page}.record", tr("Record"), self.toggle, keys=(key,),
+            icon_name="record", tip=tr("Record every frame without loss"),
         )  # fmt: skip
         self.action.setCheckable(True)
         self._timer = QTimer(self)

@@ -51,7 +51,7 @@ class SecondDock(QObject):
         self.pane: SecondSensor | None = None
         self.action = make_action(
             owner, "inspect.second", tr("Second sensor"), self._toggle, keys=("Alt+0",),
-            icon_name="two-sensors", tip=tr("Show a second sensor beside the first one (Alt+0)"),
+            icon_name="two-sensors", tip=tr("Show a second sensor beside the first one"),
         )  # fmt: skip
         self.action.setCheckable(True)
         views.offer(self.action)

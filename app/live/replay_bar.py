@@ -50,7 +50,6 @@ class ReplayBar(QWidget):
         ):
             action = make_action(
                 self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name,
-                tip=f"{text} ({keys})",
             )  # fmt: skip
             button = named(QToolButton(), f"{page}.replay.{name}", text)
             button.setDefaultAction(action)

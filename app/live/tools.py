@@ -69,7 +69,7 @@ class ImageTools(QWidget):
 
     def _make_button(self, name: str, text: str, owner: QWidget) -> QToolButton:
         key, stays = TOOLS[name]
-        button = named(QToolButton(), f"live.{name}", text, f"{text} ({key})")
+        button = named(QToolButton(), f"live.{name}", text, text, key)
         button.setAutoRaise(True)
         button.setIconSize(QSize(SIDE, SIDE))
         button.setIcon(self._icon(name))

@@ -120,21 +120,20 @@ class PressViewFrame(QMainWindow):
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         self.freeze_action = make_action(
             self, "measure.hold", tr("Freeze"), self.freeze_pressed.emit, keys=("Space",),
-            icon_name="hold", tip=tr("Freeze the image to measure on it, or continue (Space)"),
+            icon_name="hold", tip=tr("Freeze the image to measure on it, or continue"),
         )  # fmt: skip
         self.freeze_action.setCheckable(True)
         open_action = make_action(
             self, "measure.open", tr("Open image…"), self.open_pressed.emit, keys=("Ctrl+P",),
-            icon_name="folder", tip=tr("Measure on an image from a file (Ctrl+P)"),
+            icon_name="folder", tip=tr("Measure on an image from a file"),
         )  # fmt: skip
         stack = self.work.undo
         undo = make_action(
             self, "measure.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",), icon_name="undo",
-            tip=tr("Undo (Ctrl+Z)"),
         )  # fmt: skip
         redo = make_action(
             self, "measure.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"),
-            icon_name="redo", tip=tr("Redo (Ctrl+Y)"),
+            icon_name="redo",
         )  # fmt: skip
         for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
             action.setEnabled(False)

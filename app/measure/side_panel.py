@@ -67,13 +67,13 @@ class SidePanel(QScrollArea):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setFixedWidth(WIDTH)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.propose = _button("propose", tr("&Detect object"), "propose", tr("(Q)"))
+        self.propose = _button("propose", tr("&Detect object"), "propose", "Q")
         self.propose.clicked.connect(self.propose_wanted)
         self.tools = named(QListWidget(), "measure.tools", tr("Tools on the image"))
         self.tools.setMinimumHeight(LIST_HEIGHT)
         self.tools.setMaximumHeight(TALL_LIST)
         self.tools.currentItemChanged.connect(self._on_tool)
-        self.remove = _button("remove", tr("Remove the tool"), "remove", tr("(Delete)"))
+        self.remove = _button("remove", tr("Remove the tool"), "remove", "Del")
         self.remove.clicked.connect(self.remove_wanted)
         self.figures = _figures_table()
         self.reason = named(PlainLabel(), "measure.reason", tr("Why the result is doubtful"))
@@ -82,7 +82,7 @@ class SidePanel(QScrollArea):
         self.operator = named(QLineEdit(), "measure.operator", tr("Operator"))
         self.note = named(QLineEdit(), "measure.note", tr("Note"))
         self.note.setPlaceholderText(tr("Any remark"))
-        self.keep = _button("keep", tr("Sa&ve to records"), "keep", tr("(Ctrl+Return)"))
+        self.keep = _button("keep", tr("Sa&ve to records"), "keep", "Ctrl+Return")
         self.keep.setMinimumHeight(36)
         self.keep.clicked.connect(self.keep_wanted)
         self.kept = named(MarkupLabel(), "measure.kept", tr("Last saved result"))
@@ -201,7 +201,7 @@ def _line(name: str, found: ToolResult | str | None) -> str:
 
 def _button(name: str, text: str, icon_name: str, key: str) -> QPushButton:
     plain = text.replace("&", "")
-    button = named(QPushButton(text), f"measure.{name}", plain, f"{plain} {key}")
+    button = named(QPushButton(text), f"measure.{name}", plain, plain, key)
     button.setIcon(icon(icon_name))
     button.setAutoDefault(False)
     return button

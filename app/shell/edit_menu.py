@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtGui import QKeySequence, QUndoStack
 from PySide6.QtWidgets import QMenu, QWidget
 
+from app.widgets.label import key_text
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
 from gelpolight_core.translation import tr
@@ -63,7 +64,7 @@ class EditMenu(QMenu):
             (self.redo_action, redo, tr("&Redo {what}"), tr("&Redo"), QKeySequence("Ctrl+Shift+Z")),
         ):
             words = text.format(what=_first_small(can).replace("&", "&&")) if can else empty
-            action.setText(f"{words}\t{key.toString(QKeySequence.SequenceFormat.NativeText)}")
+            action.setText(f"{words}\t{key_text(key)}")
             action.setEnabled(bool(can))
 
     def _act(self, change: Callable[[QUndoStack], None]) -> None:

@@ -136,7 +136,7 @@ class MainWindow(QMainWindow):
             action.setObjectName(f"navigation.{entry.name}")
             action.setCheckable(True)
             action.setShortcut(key)
-            action.setToolTip(plain_tip(f"{entry.title} ({key})"))
+            action.setToolTip(plain_tip(entry.title, key))
             action.triggered.connect(lambda _=False, name=name: self.show_page(name))
             group.addAction(action)
             bar.addAction(action)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence, QShortcut
+from PySide6.QtGui import QAction, QShortcut
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QScrollArea, QVBoxLayout, QWidget
 
-from app.widgets.label import MarkupLabel, escaped
+from app.widgets.label import MarkupLabel, escaped, key_text
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
 from app.widgets.tool_key import PURPOSE
@@ -37,9 +37,7 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
     """
     found = []
     for action in below(window, QAction):
-        keys = ", ".join(
-            s.toString(QKeySequence.SequenceFormat.NativeText) for s in action.shortcuts()
-        )
+        keys = ", ".join(map(key_text, action.shortcuts()))
         if keys and action.objectName() and action.isEnabled():
             group = action.objectName().partition(".")[0]
             found.append(Shortcut(group, keys, action.text().replace("&", "").rstrip(".… ")))
@@ -47,7 +45,7 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
         purpose = shortcut.property(PURPOSE)
         if purpose and shortcut.isEnabled():
             group = shortcut.objectName().partition(".")[0]
-            keys = shortcut.key().toString(QKeySequence.SequenceFormat.NativeText)
+            keys = key_text(shortcut.key())
             found.append(Shortcut(group, keys, purpose))
     return tuple(sorted(dict.fromkeys(found), key=lambda s: s.group))
 

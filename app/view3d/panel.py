@@ -127,7 +127,7 @@ class SurfacePanel(QWidget):
         bar = named(QToolBar(), "view3d.bar", tr("View directions"))
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         for name, (text, keys) in view_names().items():
-            bar.addWidget(self._button(name, text, f"{text} ({keys})"))
+            bar.addWidget(self._button(name, text, text, keys))
         bar.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
         row = QHBoxLayout()
         row.setContentsMargins(4, 2, 4, 2)
@@ -150,8 +150,8 @@ class SurfacePanel(QWidget):
         column.addWidget(self._stack, 1)
         column.addWidget(self._hint)
 
-    def _button(self, name: str, text: str, tip: str) -> QToolButton:
-        button = named(QToolButton(), f"view3d.{name}", text, tip)
+    def _button(self, name: str, text: str, tip: str, key: str = "") -> QToolButton:
+        button = named(QToolButton(), f"view3d.{name}", text, tip, key)
         button.setText(text)
         button.setAutoRaise(True)
         button.clicked.connect(lambda: self.view_from(name))

@@ -34,7 +34,7 @@ def make_action(
     slot : callable
         Called without arguments.
     keys : tuple of str, optional
-        Shortcuts such as ``Ctrl+O``.
+        Shortcuts such as ``Ctrl+O``. The tooltip names the first one. An empty one stands for none.
     icon_name : str, optional
         A name of :mod:`app.theme.icons`.
     tip : str, optional
@@ -42,11 +42,13 @@ def make_action(
     """
     action = QAction(text, parent)
     action.setObjectName(name)
+    keys = tuple(filter(None, keys))
     action.setShortcuts(list(keys))
     if icon_name:
         action.setIcon(icon(icon_name))
-    if tip:
-        action.setToolTip(plain_tip(tip))
+    if tip or keys:
+        words = tip or text.replace("&", "").rstrip("….")
+        action.setToolTip(plain_tip(words, keys[0] if keys else ""))
     action.triggered.connect(lambda _checked=False: slot())
     parent.addAction(action)
     return action

@@ -11,7 +11,7 @@ import html
 import re
 
 from PySide6.QtCore import QEvent
-from PySide6.QtGui import Qt
+from PySide6.QtGui import QKeySequence, Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app.theme import theme
@@ -73,6 +73,17 @@ def escaped(text: str) -> str:
     return html.escape(text).replace("@", "&#64;").replace("\n", "<br>")
 
 
-def plain_tip(text: str) -> str:
-    """Return a text such that a tooltip, which has no format property, shows it literally."""
+def plain_tip(text: str, key: str = "") -> str:
+    """Return a text such that a tooltip, which has no format property, shows it literally.
+
+    A shortcut such as ``Ctrl+O`` follows in brackets, with the names of keys that Qt uses in the
+    language of the user.
+    """
+    if key:
+        text = f"{text} ({key_text(key)})"
     return Qt.convertFromPlainText(text) if Qt.mightBeRichText(text) else text
+
+
+def key_text(key: str | QKeySequence) -> str:
+    """Return a shortcut with the names of keys in the language of the user."""
+    return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)

@@ -11,7 +11,7 @@ from app.widgets.label import plain_tip
 W = TypeVar("W", bound=QWidget)
 
 
-def named(widget: W, name: str, accessible: str, tip: str = "") -> W:
+def named(widget: W, name: str, accessible: str, tip: str = "", key: str = "") -> W:
     """Give a widget its names and return it.
 
     Parameters
@@ -24,9 +24,11 @@ def named(widget: W, name: str, accessible: str, tip: str = "") -> W:
         Text for screen readers.
     tip : str, optional
         Tooltip, if the visible text is not enough.
+    key : str, optional
+        Shortcut that the tooltip names.
     """
     widget.setObjectName(name)
     widget.setAccessibleName(accessible)
     if tip:
-        widget.setToolTip(plain_tip(tip))
+        widget.setToolTip(plain_tip(tip, key))
     return widget

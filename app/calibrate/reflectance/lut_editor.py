@@ -186,8 +186,7 @@ class LutEditor(QWidget):
             action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             if shortcut:
                 action.setShortcut(QKeySequence(shortcut))
-                tip += f" ({action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)})"
-            action.setToolTip(plain_tip(tip))
+            action.setToolTip(plain_tip(tip, shortcut))
             actions[key] = action
             self.addAction(action)
             return action
