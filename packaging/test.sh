@@ -20,6 +20,12 @@ check() { # NAME COMMAND...
     echo "== $name $verdict in $(($(date +%s) - started)) s"
 }
 
+# Beside everything else; not where only some tests are asked for.
+if [ $# -eq 0 ]; then
+    check "oldest libraries, and the core without Qt" sh packaging/oldest.sh thin >"$results/oldest" 2>&1 &
+    oldest=$!
+fi
+
 # One core for the types, and one for the rest.
 check "types of the core" .venv/bin/python -m mypy --strict >"$results/types" 2>&1 &
 types=$!
@@ -28,12 +34,6 @@ check "formatting" .venv/bin/python -m ruff format --check .
 check "import contracts" .venv/bin/lint-imports
 wait "$types"
 cat "$results/types"
-
-# Mostly one long test, beside the others; not where only some tests are asked for.
-if [ $# -eq 0 ]; then
-    check "oldest libraries, and the core without Qt" sh packaging/oldest.sh thin >"$results/oldest" 2>&1 &
-    oldest=$!
-fi
 
 # Two processes share the cores, so that neither needs threads of its own for small matrices.
 # Files stay whole, so that what their tests share is made once; tests/conftest.py sets their order.

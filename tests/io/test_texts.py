@@ -6,19 +6,13 @@ import copy
 import json
 import pickle
 from collections.abc import Iterator
-from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.manifest import read_quality
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.texts import as_line, from_line, restored, stored
-from gelpolight_core.quality import Verdict
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import Text, current_language, joined, pattern, tr, use_language
 
 
@@ -117,35 +111,3 @@ def test_an_error_can_be_shown_in_another_language_later() -> None:
     assert restored(kept) == str(error)
     use_language("de")
     assert tr("Use a shorter exposure") in restored(kept)
-
-
-def test_every_text_of_a_calibration_file_can_be_translated(
-    small_calibration: Calibration, tmp_path: Path
-) -> None:
-    """Also the advice that the technician needs when a figure fails."""
-    quality = small_calibration.quality
-    for table in quality.values():
-        for figure in table.figures:
-            for text in (figure.label, figure.advice):
-                assert isinstance(text, Text) or not text, (figure.key, text)
-    # A figure that fails shows its advice.
-    lens = replace(
-        quality["lens"],
-        figures=tuple(replace(f, verdict=Verdict.FAIL) for f in quality["lens"].figures),
-    )
-    path = tmp_path / "a.gplcal"
-    write_calibration(replace(small_calibration, quality={**quality, "lens": lens}), path)
-    english = read_calibration(path).quality["lens"]
-    assert english == lens
-    use_language("de")
-    german = read_calibration(path).quality["lens"]
-    for one, other in zip(english.figures, german.figures, strict=True):
-        assert (one.key, one.value) == (other.key, other.value)
-        assert one.label != other.label and (one.advice != other.advice or not one.advice)
-
-
-def test_plain_texts_of_older_files_are_read(small_calibration: Calibration) -> None:
-    rows = json.loads(json.dumps(small_calibration.quality["lens"].as_rows()))
-    assert read_quality(rows) == small_calibration.quality["lens"]
-    use_language("de")
-    assert read_quality(rows).figures[0].label == tr(rows[0]["label"])
