@@ -85,7 +85,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         "model": np.array(heightmap.model),
         "source": np.array(heightmap.source),
         "notes": np.array(heightmap.notes, dtype=np.str_),
-        "doubts": np.array([as_line(doubt) for doubt in heightmap.doubts], dtype=np.str_),
+        "faults": np.array([as_line(fault) for fault in heightmap.faults], dtype=np.str_),
         "lateral_per_mm": np.float64(heightmap.lateral_per_mm),
     }
     if heightmap.normals is not None:
@@ -135,9 +135,13 @@ def read_npz(path: Path) -> HeightMap:
                 model=str(stored["model"]),
                 source=str(stored["source"]),
                 notes=tuple(map(str, stored["notes"])) if "notes" in known else (),
-                doubts=tuple(map(from_line, map(str, stored["doubts"])))
-                if "doubts" in known
-                else (),
+                # Files of one earlier state of the program have them under another name.
+                faults=tuple(
+                    from_line(str(text))
+                    for name in ("faults", "doubts")
+                    if name in known
+                    for text in stored[name]
+                ),
                 lateral_per_mm=float(stored["lateral_per_mm"])
                 if "lateral_per_mm" in known
                 else 0.0,

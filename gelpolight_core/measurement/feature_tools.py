@@ -82,7 +82,7 @@ class Pit:
         diameter = 2.0 * math.sqrt(area / math.pi)
         figures = (figure, _width(heightmap, diameter, "diameter"))
         found = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
-        return _doubted(found, figure, diameter)
+        return _judged(found, figure, diameter)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ class Scratch:
         ends = start + np.array([[left], [right]]) / length * (end - start)
         lines = (np.stack([start, end]), ends)
         found = tool_result(self, figures, lines, profile.flags[there], profile=profile)
-        return _doubted(found, figure, right - left)
+        return _judged(found, figure, right - left)
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +258,7 @@ def _width(heightmap: HeightMap, width: float, name: str) -> Measured:
     return Measured(width, sd, "mm", name)
 
 
-def _doubted(found: ToolResult, height: Measured, width: float) -> ToolResult:
+def _judged(found: ToolResult, height: Measured, width: float) -> ToolResult:
     """Return a result that is doubtful if nothing stands out, or if the membrane bridges it."""
     if height.sd is not None and abs(height.value) < CLEAR * height.sd:
         found = _doubtful(found, tr("nothing stands out from the surface around it"))

@@ -105,7 +105,7 @@ class HeightMap:
         depth 0. None for the paper's model, which does not detect contacts.
     trace : Trace or None
         Which steps were done, and why the others were left out.
-    doubts : tuple of str
+    faults : tuple of str
         Why no measurement of this map is reliable: the fault of a calibration that failed, and the
         faults of the image. Empty if there are none.
     health : Health or None
@@ -147,7 +147,7 @@ class HeightMap:
     lateral_scale_sd: float | None = None
     visible_depth_mm: float | None = None
     trace: Trace | None = None
-    doubts: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
     health: Health | None = None
     lateral_per_mm: float = 0.0
 

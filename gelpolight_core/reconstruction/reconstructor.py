@@ -273,8 +273,8 @@ class Reconstructor:
             found = self._paper_depth(frame, name, normals, notes, health.light)
         assert found.trace is not None
         trace = replace(found.trace, steps=(_light_step(health.light), *found.trace.steps))
-        doubts = (*found.doubts, *(finding.cause for finding in health.faults))
-        return replace(found, health=health, doubts=doubts, trace=trace)
+        faults = (*found.faults, *(finding.cause for finding in health.faults))
+        return replace(found, health=health, faults=faults, trace=trace)
 
     def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
         """Return the faults of a frame, each with cause and remedy.
@@ -403,7 +403,7 @@ class Reconstructor:
             model=self.model,
             source=name,
             notes=notes,
-            doubts=tuple(filter(None, (self.calibration.fault,))),
+            faults=tuple(filter(None, (self.calibration.fault,))),
         )
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:

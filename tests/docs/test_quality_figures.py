@@ -234,7 +234,7 @@ def _same(stated: str | float, value: float | None) -> bool:
 
 
 @pytest.mark.parametrize("name", NOTES)
-def test_notes_and_doubts_are_stated_with_the_limits_of_the_source(name: str) -> None:
+def test_notes_and_faults_are_stated_with_the_limits_of_the_source(name: str) -> None:
     """The sentences beside a depth map or a measurement, too, have limits that are explained."""
     module: Any = importlib.import_module(NOTES[name].removesuffix(".py").replace("/", "."))
     percent = f"{100.0 * getattr(module, name):g} %"
