@@ -111,9 +111,9 @@ def is_allowed(licence: str) -> bool:
 def licence_of(package: Distribution) -> str:
     """Return a package's licence as its metadata or our table say it."""
     data = package.metadata
-    told = TABLE["packages"].get(_plain(data["Name"])) or data.get("License-Expression")
-    if told:
-        return str(told)
+    reported = TABLE["packages"].get(_plain(data["Name"])) or data.get("License-Expression")
+    if reported:
+        return str(reported)
     kinds = [c.split(" :: ")[-1] for c in data.get_all("Classifier", []) if c.startswith("License")]
     if any("General Public" in kind and "Lesser" not in kind for kind in kinds):
         return "; ".join(kinds)

@@ -20,7 +20,7 @@ HERE = Path(__file__).resolve().parent
 def lines_until_killed(
     arguments: Sequence[str], *, paths: Sequence[Path], seed: int, longest_s: float
 ) -> list[str]:
-    """Run Python with `paths` to import from, kill it, and return the lines that it has told.
+    """Run Python with `paths` to import from, kill it, and return the lines that it printed.
 
     The moment is up to `longest_s` after its first line.
     """
@@ -71,16 +71,16 @@ class Forks:
         self, arguments: Sequence[str], folder: Path, *, seed: int, longest_s: float
     ) -> list[str]:
         """Run a copy, kill it, and return its lines; `folder` holds the pipe that they come by."""
-        told, asked = self._process.stdout, self._process.stdin
-        assert told is not None and asked is not None
+        reported, asked = self._process.stdout, self._process.stdin
+        assert reported is not None and asked is not None
         pipe = folder / "lines"
         os.mkfifo(pipe)
         asked.write(json.dumps({"out": str(pipe), "arguments": list(arguments)}) + "\n")
         asked.flush()
-        copy = int(told.readline())
+        copy = int(reported.readline())
         with pipe.open() as stream:
             lines = _lines(stream, lambda: os.kill(copy, signal.SIGKILL), seed, longest_s)
-        assert int(told.readline()) == signal.SIGKILL, "it ended by itself"
+        assert int(reported.readline()) == signal.SIGKILL, "it ended by itself"
         return lines
 
 
@@ -108,5 +108,5 @@ def _lines(stream: TextIO, kill: Callable[[], None], seed: int, longest_s: float
     end.start()
     rest = stream.read()
     end.join()
-    # A line that was cut off was not told.
+    # A line that was cut off was not reported.
     return (first + rest).split("\n")[:-1]

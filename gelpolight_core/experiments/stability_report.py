@@ -36,7 +36,7 @@ COLUMNS = (
     "rounds",
     "seconds",
     "memory_mb",
-    "said",
+    "message",
 )
 LENGTH_COLUMNS = (
     "length",
@@ -77,7 +77,7 @@ def result_rows(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
                 "rounds": None if seen is None else seen.rounds,
                 "seconds": round(result.seconds, 3),
                 "memory_mb": result.memory_mb,
-                "said": result.summary,
+                "message": result.summary,
             }
         )
     return rows

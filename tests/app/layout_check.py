@@ -28,7 +28,7 @@ CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QAbstractSpinBox, QLabel)
 EXTENSION = "qt_toolbar_ext_button"
 SLACK_PX = 2
 LEAST_PLOT_PX = 80
-"""Curves in a narrower plot cannot be told apart."""
+"""Curves in a narrower plot cannot be distinguished."""
 
 
 def faults(window: QWidget) -> list[str]:

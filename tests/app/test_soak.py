@@ -27,9 +27,9 @@ def hour(growth_mb: float = 0.0, rate_to: float = 15.0) -> list[Row]:
 
 
 def test_an_hour_in_which_nothing_changes_is_well() -> None:
-    said, wrong = conclude(hour())
+    output, wrong = conclude(hour())
     assert wrong == []
-    assert any(line.startswith("needed_mb") for line in said)
+    assert any(line.startswith("needed_mb") for line in output)
 
 
 def test_what_the_allocator_keeps_is_no_leak() -> None:
@@ -46,14 +46,14 @@ def test_what_a_person_has_open_is_no_leak() -> None:
     assert conclude(rows)[1] == []
 
 
-def test_memory_that_grows_and_a_rate_that_falls_are_told() -> None:
+def test_memory_that_grows_and_a_rate_that_falls_are_reported() -> None:
     (wrong,) = conclude(hour(growth_mb=100.0))[1]
     assert "memory grows by 100 MB per hour" in wrong
     (wrong,) = conclude(hour(rate_to=11.0))[1]
     assert "made_hz" in wrong
 
 
-def test_what_only_refers_to_itself_is_let_go_and_told() -> None:
+def test_what_only_refers_to_itself_is_let_go_and_reported() -> None:
     class Ring:
         def __init__(self) -> None:
             self.image, self.itself = bytearray(40_000_000), self

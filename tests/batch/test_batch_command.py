@@ -38,7 +38,7 @@ def command(calibration_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: P
     return run
 
 
-def said(capsys: pytest.CaptureFixture[str]) -> str:
+def output(capsys: pytest.CaptureFixture[str]) -> str:
     """Return the one line of a refusal."""
     (line,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("gelpolight:")]
     return line
@@ -59,10 +59,10 @@ def test_a_bad_frame_is_named_and_counted_in_one_line(
     image = day / "left" / "a.png"
     cv2.imwrite(str(image), cv2.imread(str(image))[:50])
     assert command(day) == MENDABLE
-    told = capsys.readouterr()
-    assert "5 depth maps" in told.out
-    assert "left/a.png: the image is 320x50x3, the calibration is for" in told.err
-    assert "batch.csv: 1 of 6 frames could not be used" in told.err
+    reported = capsys.readouterr()
+    assert "5 depth maps" in reported.out
+    assert "left/a.png: the image is 320x50x3, the calibration is for" in reported.err
+    assert "batch.csv: 1 of 6 frames could not be used" in reported.err
 
 
 def test_ctrl_c_ends_with_the_frames_at_hand(
@@ -77,9 +77,9 @@ def test_ctrl_c_ends_with_the_frames_at_hand(
 
     monkeypatch.setattr(batch._Progress, "_report", pressed)
     assert command(day) == INTERRUPTED
-    told = capsys.readouterr().err
-    assert "2 of 6 frames are done" in told
-    assert "gelpolight: Stopped" in told
+    reported = capsys.readouterr().err
+    assert "2 of 6 frames are done" in reported
+    assert "gelpolight: Stopped" in reported
     monkeypatch.undo()
 
 
@@ -111,7 +111,7 @@ def test_what_cannot_be_done_is_refused_in_one_line(
     command, day: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
 ) -> None:
     assert command(day, *arguments) == MENDABLE
-    assert words in said(capsys)
+    assert words in output(capsys)
 
 
 def test_inputs_that_cannot_be_are_refused_in_one_line(
@@ -134,7 +134,7 @@ def test_inputs_that_cannot_be_are_refused_in_one_line(
         ([day, tmp_path / "other" / "day"], "Two inputs would have results named day/run/"),
     ):
         assert command(*inputs) == MENDABLE
-        assert words in said(capsys)
+        assert words in output(capsys)
 
 
 def test_an_image_named_like_an_excluded_frame_is_accepted(
@@ -158,4 +158,4 @@ def test_without_dask_the_command_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert command(day, "--scheduler", "tcp://127.0.0.1:1") == MENDABLE
-    assert "Dask is not installed" in said(capsys)
+    assert "Dask is not installed" in output(capsys)

@@ -192,9 +192,9 @@ def test_a_full_disk_ends_the_run_and_says_how_far_it_came(
         replace_file(source, target)
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(InputError, match=r"The disk is full; 3 of 6 frames are done") as told:
+    with pytest.raises(InputError, match=r"The disk is full; 3 of 6 frames are done") as reported:
         go(day, out=out)
-    assert "Run the same command again" in str(told.value)
+    assert "Run the same command again" in str(reported.value)
     monkeypatch.undo()
     goes_on = go(day, out=out)
     assert (goes_on.before, goes_on.done) == (3, 3)
@@ -316,7 +316,7 @@ def test_dask_gives_the_same_bits_and_survives_a_killed_worker(
 
     out, alone = tmp_path / "out", tmp_path / "alone"
     go(day, out=alone)
-    told: list[BatchProgress] = []
+    reported: list[BatchProgress] = []
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as cluster:
@@ -325,9 +325,9 @@ def test_dask_gives_the_same_bits_and_survives_a_killed_worker(
         class KillsOne(ClusterRunner):
             def __call__(self, jobs, count, stopped):
                 for outcomes in super().__call__(jobs, count, stopped):
-                    if outcomes and not told:
+                    if outcomes and not reported:
                         os.kill(pids[0], signal.SIGKILL)
-                        told.append(BatchProgress(0, 0))
+                        reported.append(BatchProgress(0, 0))
                     yield outcomes
 
         runner = KillsOne(settings, out, cluster.scheduler_address)

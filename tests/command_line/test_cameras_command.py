@@ -30,12 +30,12 @@ def test_formats_and_settings_are_listed_and_the_best_format_is_marked(
     busy = FakeCamera(device=Device("1:2@x", "Other", "0001:0002", "/dev/video2"), in_use=True)
     fake = FakeCamera()
     assert report(FakeDriver(fake, busy), tmp_path / "cameras.json") == 0
-    said = capsys.readouterr().out
-    assert f"{C310.name}  [046d:081b@SN1]  /dev/video0" in said
-    assert "* YUYV 128 x 96 at 7.5 images/s\n" in said
-    assert "  MJPG 64 x 48 at 30 images/s, compressed" in said
-    assert "Not locked" in said
-    assert "Other: the camera cannot be opened" in said
+    output = capsys.readouterr().out
+    assert f"{C310.name}  [046d:081b@SN1]  /dev/video0" in output
+    assert "* YUYV 128 x 96 at 7.5 images/s\n" in output
+    assert "  MJPG 64 x 48 at 30 images/s, compressed" in output
+    assert "Not locked" in output
+    assert "Other: the camera cannot be opened" in output
     first, second = json.loads((tmp_path / "cameras.json").read_text())["cameras"]
     assert len(first["formats"]) == len(FORMATS)
     assert first["controls"]["exposure_ms"]["unit"] == "ms"

@@ -36,7 +36,7 @@ def test_reconstruct_refuses_a_meaningless_image_and_writes_the_others(
     assert "--despite-faults" in errors
 
 
-def test_reconstruct_goes_on_where_it_is_told_to(
+def test_reconstruct_goes_on_where_it_is_asked_to(
     calibration: Path, off: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"

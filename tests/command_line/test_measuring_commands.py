@@ -148,7 +148,7 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "output"),
     [
         (["--tool", "distance", "--at", "1", "2"], "points: 1"),
         (["--tool", "distance", "--at", "1", "2", "3"], "Number of values: 3"),
@@ -165,6 +165,6 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
     ],
 )
 def test_a_tool_that_is_not_described_is_refused_in_one_line(
-    press: Path, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    press: Path, arguments: list[str], output: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert said in refusal(capsys, "measure", "none.gplcal", str(press), *arguments)
+    assert output in refusal(capsys, "measure", "none.gplcal", str(press), *arguments)

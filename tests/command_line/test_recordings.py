@@ -41,9 +41,9 @@ def test_a_frame_of_a_recording_gives_the_same_result_as_its_image(
     out = tmp_path / "out"
     both = ["reconstruct", str(calibration), str(press), str(recording), "-o", str(out)]
     assert main([*both, "--frames", "1:3"]) == 0
-    told = capsys.readouterr()
-    assert "3 depth maps" in told.out
-    assert "1 frames of the source are missing in the recording" in told.err
+    reported = capsys.readouterr()
+    assert "3 depth maps" in reported.out
+    assert "1 frames of the source are missing in the recording" in reported.err
     names = ["day.1_000001.npz", "day.1_000002.npz"]
     assert sorted(p.name for p in out.iterdir()) == sorted([f"{press.stem}.npz", *names])
     with np.load(out / f"{press.stem}.npz") as one:
@@ -58,8 +58,10 @@ def test_a_recording_of_another_sensor_is_refused_by_name(
 ) -> None:
     path = tmp_path / "a.gplrec"
     write_recording(path, header=RecordingHeader(serial="B-7"))
-    said = refusal(capsys, "reconstruct", str(calibration), str(path), "-o", str(tmp_path / "out"))
-    assert "The recording is of sensor B-7, but the calibration is of sensor virtual-1" in said
+    output = refusal(
+        capsys, "reconstruct", str(calibration), str(path), "-o", str(tmp_path / "out")
+    )
+    assert "The recording is of sensor B-7, but the calibration is of sensor virtual-1" in output
     assert not (tmp_path / "out").exists()
 
 
@@ -68,8 +70,8 @@ def test_a_recording_of_another_size_is_refused(
 ) -> None:
     write_recording(tmp_path / "a.gplrec")
     where = str(tmp_path / "a.gplrec")
-    said = refusal(capsys, "reconstruct", str(calibration), where, "-o", str(tmp_path / "out"))
-    assert "The frames have 32x24 pixels, but the calibration is for" in said
+    output = refusal(capsys, "reconstruct", str(calibration), where, "-o", str(tmp_path / "out"))
+    assert "The frames have 32x24 pixels, but the calibration is for" in output
 
 
 def test_a_range_of_frames_needs_a_recording(

@@ -325,8 +325,8 @@ def test_an_internal_error_is_one_line_and_a_log(
 
     monkeypatch.setattr(calibrate, "read_any_session", fail)
     assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == OUR_FAULT
-    said = capsys.readouterr().err
-    assert "the tests did it" in said
-    assert "Traceback" not in said
+    shown = capsys.readouterr().err
+    assert "the tests did it" in shown
+    assert "Traceback" not in shown
     log = next(tmp_path.rglob("gelpolight-faults.log"))
     assert "Traceback" in log.read_text()

@@ -39,8 +39,8 @@ def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
     assert {overall[direction]["count"] for direction in ("planar", "depth")} == {1}
     assert main(["report", str(calibration), "-o", str(page), "--presses", presses]) == 0
     planar, depth = (overall[name]["mean_absolute_percent"] for name in ("planar", "depth"))
-    said = f"mean absolute error {planar:.1f} % in size and {depth:.1f} % in height"
-    assert said in page.read_text()
+    output = f"mean absolute error {planar:.1f} % in size and {depth:.1f} % in height"
+    assert output in page.read_text()
 
 
 @pytest.mark.parametrize("named", ["presses/truth.csv", "none"])

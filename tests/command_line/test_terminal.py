@@ -51,9 +51,9 @@ def test_text_of_a_recording_is_printed_safely(
     with RecordingWriter(path, header) as writer:
         writer.append(np.zeros((8, 8, 3), np.uint8), 0, 0.0)
     assert main(["inspect", str(path)]) == 0
-    said = capsys.readouterr().out
-    assert said.count(r"\x1b[2Jcalm\x1b]0;owned\x07\x9b31m\u202egnp\nverdict: pass") == 5
-    assert len(said.splitlines()) == 12
+    output = capsys.readouterr().out
+    assert output.count(r"\x1b[2Jcalm\x1b]0;owned\x07\x9b31m\u202egnp\nverdict: pass") == 5
+    assert len(output.splitlines()) == 12
 
 
 def test_text_of_records_is_printed_safely(
@@ -64,10 +64,10 @@ def test_text_of_records_is_printed_safely(
         quantities = (Quantity("diameter_mm", 5.0, 0.01, 5.0, 5.0),)
         records.add(MeasurementRecord(evil, "c", "ball", quantities, verdict="pass", note=evil))
     assert main(["records", "--workspace", str(tmp_path)]) == 0
-    said = capsys.readouterr().out
-    assert said.count(r"\x1b[2Jcalm") == 2
-    assert len(said.splitlines()) == 2
-    assert all(line.isprintable() for line in said.splitlines())
+    output = capsys.readouterr().out
+    assert output.count(r"\x1b[2Jcalm") == 2
+    assert len(output.splitlines()) == 2
+    assert all(line.isprintable() for line in output.splitlines())
 
 
 def test_text_of_a_calibration_is_printed_safely() -> None:

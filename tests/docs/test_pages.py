@@ -1,4 +1,4 @@
-"""The documentation does not age: what it names is there, and what it quotes is still said."""
+"""What the documentation names exists, and the texts that it quotes are those of the program."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def nav_entries() -> list[str]:
 
 
 @cache
-def said() -> tuple[str, ...]:
+def output() -> tuple[str, ...]:
     """Return every text that the program can say, with ``…`` where it puts something in."""
     texts = set()
     for package in ("app", "gelpolight_core"):
@@ -67,13 +67,13 @@ def said() -> tuple[str, ...]:
 @cache
 def labels() -> frozenset[str]:
     """Return every text as a button shows it, without the underlining and the dots at its end."""
-    return frozenset(re.sub(r"&(?!&)", "", text).rstrip("….: ") for text in said())
+    return frozenset(re.sub(r"&(?!&)", "", text).rstrip("….: ") for text in output())
 
 
-def is_said(message: str) -> bool:
+def is_reported(message: str) -> bool:
     """Whether the program says this; ``…`` stands for anything."""
     pattern = re.compile(".*?".join(map(re.escape, message.split("…"))), re.DOTALL)
-    return any(pattern.fullmatch(text) for text in said())
+    return any(pattern.fullmatch(text) for text in output())
 
 
 @named
@@ -115,7 +115,7 @@ def messages_of(page: Path) -> list[str]:
 
 @guided
 def test_every_quoted_message_is_one_that_the_program_says(page: Path) -> None:
-    assert [message for message in messages_of(page) if not is_said(message)] == []
+    assert [message for message in messages_of(page) if not is_reported(message)] == []
 
 
 def test_troubleshooting_quotes_messages() -> None:

@@ -81,15 +81,15 @@ def test_a_run_that_is_stopped_goes_on_with_the_same_bytes(
         press_protocol(run, equipment, run_ledger(run, reconstructor), workers=1, progress=stop)
     again = open_run(run.folder)
     assert len(again.done) == 1
-    told: list[str] = []
+    reported: list[str] = []
     press_protocol(
         again,
         equipment,
         run_ledger(again, reconstructor),
         workers=1,
-        progress=lambda name, _: told.append(name),
+        progress=lambda name, _: reported.append(name),
     )
-    assert told == ["press 2 of 2"]
+    assert reported == ["press 2 of 2"]
     for press in again.wanted:
         assert again.image(press).read_bytes() == (done / "presses" / press.file).read_bytes()
 

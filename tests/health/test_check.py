@@ -175,7 +175,7 @@ def test_an_image_of_another_sensor_of_the_same_design_is_recognised(
         assert check.check(image, whole=whole).keys == ("other_sensor",)
 
 
-def test_dirt_is_told_from_a_press(
+def test_dirt_is_distinguished_from_a_press(
     known: KnownSensor, frames: dict[str, Map], check: HealthCheck
 ) -> None:
     frame = frames["ball"]

@@ -48,7 +48,7 @@ def follow(left: list[float]) -> list[tuple[str, ...]]:
     ]
 
 
-def test_a_gel_that_has_not_recovered_is_told_until_it_has() -> None:
+def test_a_gel_that_has_not_recovered_is_reported_until_it_has() -> None:
     slow = [1.0] * 10 + [0.08 * 0.5 ** (n / 15) for n in range(90)]
     shown = follow(slow)
     assert ("not_recovered",) in shown[25:40]

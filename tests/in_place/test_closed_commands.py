@@ -30,8 +30,8 @@ def test_a_closed_session_becomes_a_calibration_by_itself(
 ) -> None:
     path, report = tmp_path / "closed.gplcal", tmp_path / "closed.json"
     assert main(["calibrate", str(closed_folder), "-o", str(path), "--json", str(report)]) == 0
-    said = capsys.readouterr().out
-    assert "in-place" in said and "optics" in said and "temperature" in said
+    output = capsys.readouterr().out
+    assert "in-place" in output and "optics" in output and "temperature" in output
     content = json.loads(report.read_text())
     assert content["model"] == "in-place"
     assert len(content["balls"]) >= 8
@@ -78,16 +78,16 @@ def test_one_message_lists_all_that_an_open_calibration_lacks(
     for stage in ("checkerboard", "top_pose", "mirror", "whiteboard"):
         shutil.rmtree(folder / stage)
     assert main(["calibrate", str(folder), "-o", str(tmp_path / "c.gplcal")]) == MENDABLE
-    said = capsys.readouterr().err
-    assert "no images of: checkerboard, top_pose, mirror, whiteboard" in said
-    assert "must be open for: checkerboard, top_pose, mirror, whiteboard" in said
-    assert "[in_place] mm_per_px" in said
+    output = capsys.readouterr().err
+    assert "no images of: checkerboard, top_pose, mirror, whiteboard" in output
+    assert "must be open for: checkerboard, top_pose, mirror, whiteboard" in output
+    assert "[in_place] mm_per_px" in output
     (folder / "session.toml").write_text(
         'format = "gelpolight-session"\nversion = 1\n[sensor]\nserial = "x"\n'
     )
     assert main(["calibrate", str(folder), "-o", str(tmp_path / "c.gplcal")]) == MENDABLE
-    said = capsys.readouterr().err
-    assert "[checkerboard], [balls]" in said and "in place" in said
+    output = capsys.readouterr().err
+    assert "[checkerboard], [balls]" in output and "in place" in output
 
 
 def test_objects_with_walls_are_doubtful_because_balls_have_none(

@@ -107,7 +107,7 @@ def test_a_table_of_circles_needs_ball_and_background(
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "output"),
     [
         ("../../etc,6.0", "outside the folder"),
         ("6.000mm/7,6.0", "does not exist"),
@@ -116,12 +116,12 @@ def test_a_table_of_circles_needs_ball_and_background(
     ],
 )
 def test_a_wrong_line_is_named(
-    catalog: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, said: str
+    catalog: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, output: str
 ) -> None:
     table = catalog / "catalog.csv"
     table.write_text(table.read_text() + line + "\n")
     message = refusal(catalog, tmp_path / "s", capsys, "--preset", "gelsight-mini")
-    assert said in message and "line 4" in message
+    assert output in message and "line 4" in message
 
 
 def test_what_is_no_calibration_folder_is_refused(

@@ -1,4 +1,4 @@
-"""Presets of closed sensors are a start: what they state is checked, and told where it is not."""
+"""What a preset of a closed sensor states is checked, or a message says that it is not."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def test_a_sensor_whose_lights_show_no_slope_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "output"),
     [
         ("mm_per_px = 0.0634", "mm_per_px"),
         ("cropped = [0.143, 0.143, 0.143, 0.143]", "cropped"),
         ("light_colours = 3", "light_colours"),
     ],
 )
-def test_a_preset_of_ones_own_is_checked(tmp_path: Path, line: str, said: str) -> None:
+def test_a_preset_of_ones_own_is_checked(tmp_path: Path, line: str, output: str) -> None:
     own = tmp_path / "own.toml"
     text = (FOLDER / "gelsight-mini.toml").read_text()
     own.write_text(text)
@@ -51,6 +51,6 @@ def test_a_preset_of_ones_own_is_checked(tmp_path: Path, line: str, said: str) -
     own.write_text(text.replace(line, f'{line.split(" = ")[0]} = ["x"]'))
     with pytest.raises(InputError) as refused:
         preset_named(str(own))
-    assert said in refused.value.found
+    assert output in refused.value.found
     with pytest.raises(InputError, match="no preset"):
         preset_named("gelsite")

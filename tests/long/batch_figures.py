@@ -60,24 +60,24 @@ def measure(options: argparse.Namespace, out: Path) -> None:
         tuple(options.formats.split(",")),
     )
     plan = plan_batch([options.recording], out, calibration, Selection(end=options.frames))
-    told: list[tuple[float, FrameRow]] = []
+    reported: list[tuple[float, FrameRow]] = []
 
     def progress(progress: BatchProgress) -> None:
         if progress.row is not None:
-            told.append((time.perf_counter(), progress.row))
+            reported.append((time.perf_counter(), progress.row))
 
     began, used_s = time.perf_counter(), processor_s()
     with workers(options.way, options.workers, settings, out) as runner:
         run_batch(plan, settings, out, runner, progress=progress, stopped=lambda: False)
     used_s = processor_s() - used_s
     # Outcomes come in groups: what the first group took is the start.
-    first_s, last_s = told[0][0], told[-1][0]
-    later = sum(at > first_s + 0.02 for at, _ in told)
+    first_s, last_s = reported[0][0], reported[-1][0]
+    later = sum(at > first_s + 0.02 for at, _ in reported)
     print(
-        f"{options.way} {options.workers} {options.effort}: {len(told)} frames, start "
+        f"{options.way} {options.workers} {options.effort}: {len(reported)} frames, start "
         f"{first_s - began:.1f} s, {later / (last_s - first_s):.2f} frames/s, "
-        f"{statistics.fmean(row.seconds for _, row in told):.3f} processor s a frame, "
-        f"{used_s / len(told):.3f} with everything around",
+        f"{statistics.fmean(row.seconds for _, row in reported):.3f} processor s a frame, "
+        f"{used_s / len(reported):.3f} with everything around",
         flush=True,
     )
 

@@ -57,8 +57,12 @@ def try_one(kind: Kind, data: bytes, folder: Path) -> str:
     try:
         kind.use(path)
     except InputError as error:
-        said = str(error).replace(str(folder), "")
-        return "refused" if len(said) < SENTENCE and said.isprintable() else f"says {said[:200]!r}"
+        output = str(error).replace(str(folder), "")
+        return (
+            "refused"
+            if len(output) < SENTENCE and output.isprintable()
+            else f"says {output[:200]!r}"
+        )
     except BaseException:
         return traceback.format_exc(limit=-6)
     return "good"

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from live_figures import DRAG_MS, dragger
-from probes import Lateness, Spent, ThreadTimes, resident_mb, told
+from probes import Lateness, Spent, ThreadTimes, reported, resident_mb
 from PySide6.QtCore import QEvent, QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
@@ -142,14 +142,14 @@ class Measurement:
             drawn = view.drawings - self._drawings
             print(f"drawings of the surface for each shown frame: {drawn / shown:.2f}")
         print(f"made for hidden views: {self.watch.needless}")
-        print(told("reconstruction", self.watch.depth_ms, "ms"))
-        print(told("all processing of a frame", self.watch.total_ms, "ms"))
-        print(told("lateness of the user interface", self._lateness.late_ms, "ms"))
-        print(told("age of a frame when it is painted", self.watch.ages_ms, "ms", high=95))
+        print(reported("reconstruction", self.watch.depth_ms, "ms"))
+        print(reported("all processing of a frame", self.watch.total_ms, "ms"))
+        print(reported("lateness of the user interface", self._lateness.late_ms, "ms"))
+        print(reported("age of a frame when it is painted", self.watch.ages_ms, "ms", high=95))
         print(f"memory: {self._memory_mb:.0f} MB, at the end {resident_mb():.0f} MB")
-        print(self._spent.told())
+        print(self._spent.reported())
         print("processor time for each shown frame, by thread:")
-        print(self._threads.told(shown))
+        print(self._threads.reported(shown))
 
     def stop(self) -> None:
         """End everything."""

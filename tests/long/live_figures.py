@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from probes import Lateness, PaintWatch, Spent, WatchedStream, resident_mb, told
+from probes import Lateness, PaintWatch, Spent, WatchedStream, reported, resident_mb
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QGraphicsView, QHBoxLayout, QWidget
 from wizard_figures import show_wizard
@@ -140,10 +140,10 @@ class Measurement:
             print(f"processed: {done.rate_hz:.1f} frames/s, median {done.median_ms:.1f} ms")
             if isinstance(last := self._outbox.take(), Failure):
                 print(f"the last frame failed: {last.sentence}")
-        print(told("lateness of the user interface", self._lateness.late_ms, "ms"))
-        print(told("age of a frame when its painting begins", self._paints.ages_ms, "ms"))
+        print(reported("lateness of the user interface", self._lateness.late_ms, "ms"))
+        print(reported("age of a frame when its painting begins", self._paints.ages_ms, "ms"))
         print("memory by the minute, MB:", *(f"{mb:.0f}" for mb in self._memory_mb))
-        print(self._spent.told())
+        print(self._spent.reported())
 
     def stop(self) -> None:
         """End all threads."""

@@ -88,7 +88,7 @@ def resident_mb() -> float:
     return pages * 4096 / 1e6
 
 
-def told(name: str, values: list[float], unit: str, *, high: int = 99) -> str:
+def reported(name: str, values: list[float], unit: str, *, high: int = 99) -> str:
     """Return a line with the median, a high percentile and the largest of some values."""
     if not values:
         return f"{name}: nothing was measured"
@@ -107,7 +107,7 @@ class Spent:
         """Time that has passed."""
         return time.monotonic() - self._wall_s
 
-    def told(self) -> str:
+    def reported(self) -> str:
         """Return a line."""
         cores = (time.process_time() - self._cpu_s) / self.wall_s
         load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
@@ -133,7 +133,7 @@ class ThreadTimes:
             times[int(task.name), name] = ticks / os.sysconf("SC_CLK_TCK")
         return times
 
-    def told(self, frames: int, least_ms: float = 0.5) -> str:
+    def reported(self, frames: int, least_ms: float = 0.5) -> str:
         """Return lines with the time per frame of the busiest threads."""
         spent: dict[str, float] = {}
         for (number, name), seconds in self._now().items():

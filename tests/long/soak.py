@@ -154,7 +154,7 @@ class Soak:
     def _measured(self) -> None:
         row = self._looked.row(self._began_s, self.log, self.scratch, emptied=self._emptied)
         self.rows.append(row)
-        print(row.told(), flush=True)
+        print(row.reported(), flush=True)
         self._forget_recordings()
         if row.minutes >= self.options.minutes:
             self.lateness.timer.stop()
@@ -175,7 +175,7 @@ def conclude(soak: Soak, status: int, hung: Path) -> bool:
     """Print what came out; return whether all is well."""
     from soak_figures import conclude as conclude_figures
 
-    said, wrong = conclude_figures(soak.rows)
+    output, wrong = conclude_figures(soak.rows)
     wrong += soak.troubles
     wrong += [f"in the log: {text}" for text in soak.log.errors]
     if status != 0:
@@ -183,13 +183,13 @@ def conclude(soak: Soak, status: int, hung: Path) -> bool:
     if hung.stat().st_size:
         wrong.append(f"it hung for {HUNG_S:.0f} s:\n{hung.read_text()}")
     left = [t.name for t in threading.enumerate() if t is not threading.main_thread()]
-    print(f"{soak.person.actions} actions in {len(soak.rows)} rounds; {soak.spent.told()}")
+    print(f"{soak.person.actions} actions in {len(soak.rows)} rounds; {soak.spent.reported()}")
     print(f"threads at the end: {', '.join(left) or 'none but the first'}")
     for text, count in soak.log.warnings.most_common():
         print(f"warning, {count} times: {text}")
-    for text, count in soak.log.told.most_common():
-        print(f"told, {count} times: {text}")
-    print("\n".join(said))
+    for text, count in soak.log.reported.most_common():
+        print(f"refused {count} times: {text}")
+    print("\n".join(output))
     print("\n".join(f"WRONG: {sentence}" for sentence in wrong) or "Nothing is wrong.")
     return not wrong
 

@@ -33,7 +33,7 @@ WARM_UP_SHARE = 0.2
 MOST_GROWTH_MB_PER_H = 30.0
 LEAST_ALIKE = 6
 LEAST_RATE = 0.9
-# What a person is told that something cannot be done is no error of the program.
+# A message to the user that something is impossible is no error of the program.
 TOLD, FAULT = " app.services.toasts: ", "fault of this program"
 COUNTED = (
     "rss_mb", "needed_mb", "held_mb", "spare_mb", "threads", "files", "widgets", "objects",
@@ -68,7 +68,7 @@ class Row:
     warnings: int
     disk_mb: float
 
-    def told(self) -> str:
+    def reported(self) -> str:
         """Return the row as a line of the table."""
         return " ".join(
             f"{value:>{len(field.name)}.1f}"
@@ -118,7 +118,7 @@ class LogWatch:
     def __init__(self, log: Log) -> None:
         self._log, self._seen = log, 0
         self.errors: list[str] = []
-        self.told: Counter[str] = Counter()
+        self.reported: Counter[str] = Counter()
         self.warnings: Counter[str] = Counter()
 
     def look(self) -> None:
@@ -126,7 +126,7 @@ class LogWatch:
         for record in self._log.recent.since(self._seen):
             self._seen = record.number
             if TOLD in record.text and FAULT not in record.text:
-                self.told[record.text.partition(TOLD)[2].strip()[:200]] += 1
+                self.reported[record.text.partition(TOLD)[2].strip()[:200]] += 1
             elif record.level >= logging.ERROR:
                 self.errors.append(record.text)
             elif record.level >= logging.WARNING:
@@ -238,23 +238,23 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
         return [], ["there were too few rests to say anything"]
     warm_up = min(WARM_UP_S / 60.0, WARM_UP_SHARE * rows[-1].minutes)
     warm = [row for row in rows if row.minutes >= warm_up]
-    said, wrong = [], []
+    output, wrong = [], []
     for name in COUNTED:
-        said.append(f"{name}: {grown(warm, name)[0]}")
+        output.append(f"{name}: {grown(warm, name)[0]}")
     # What a person has open takes memory for as long as it is open.
     alike, which = [row for row in warm if row.emptied], "with nothing open"
     if len(alike) < LEAST_ALIKE:
         alike, which = warm, "too few with nothing open, so all"
     for name in ("held_mb", "needed_mb"):
-        told, slope, low = grown(alike, name)
-        said.append(f"{name} at {len(alike)} rests ({which}): {told}")
+        reported, slope, low = grown(alike, name)
+        output.append(f"{name} at {len(alike)} rests ({which}): {reported}")
         if name == "needed_mb" and low > MOST_GROWTH_MB_PER_H:
             wrong.append(f"memory grows by {slope:.0f} MB per hour, at least by {low:.0f}")
     rings_mb = [row.rings_mb for row in rows if row.emptied] or [0.0]
-    said.append(f"rings_mb: median {np.median(rings_mb):.0f}, at most {max(rings_mb):.0f}")
+    output.append(f"rings_mb: median {np.median(rings_mb):.0f}, at most {max(rings_mb):.0f}")
     for name in ("made_hz", "processed_hz", "shown_hz", "cpu_ms", "late_ms", "late_at_work_ms"):
         first, last = thirds([getattr(row, name) for row in warm])
-        said.append(f"{name}: median {first:.1f} in the first third, {last:.1f} in the last")
+        output.append(f"{name}: median {first:.1f} in the first third, {last:.1f} in the last")
         if name in ("made_hz", "shown_hz") and last < LEAST_RATE * first:
             wrong.append(f"the rate drifts: {name} from {first:.1f} to {last:.1f}")
-    return said, wrong
+    return output, wrong

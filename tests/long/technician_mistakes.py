@@ -29,7 +29,7 @@ class MistakenTrial(Trial):
     Attributes
     ----------
     passed : list of str
-        Mistakes that nothing was said about.
+        Mistakes without any message.
     """
 
     def __init__(self, hand: CountingHand) -> None:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from probes import Lateness, Spent, resident_mb, told
+from probes import Lateness, Spent, reported, resident_mb
 from PySide6.QtCore import QCoreApplication, QEvent, QEventLoop, QObject, QTimer
 from PySide6.QtWidgets import QApplication, QGraphicsView
 
@@ -73,8 +73,8 @@ def watch_steps(page: CalibratePage, session: Path, steps: Sequence[str], second
     assert wizard is not None
     lateness, began = Lateness(), Spent()
     wait(lambda: not wizard.model.jobs.busy, COMPUTED_S)
-    print(f"computed in {began.wall_s:.0f} s; {began.told()}")
-    print(told("lateness of the user interface meanwhile", lateness.late_ms, "ms"))
+    print(f"computed in {began.wall_s:.0f} s; {began.reported()}")
+    print(reported("lateness of the user interface meanwhile", lateness.late_ms, "ms"))
     for key in steps:
         watch_step(wizard, key, lateness, seconds)
     lateness.timer.stop()
@@ -89,14 +89,14 @@ def watch_step(wizard: Wizard, key: str, lateness: Lateness, seconds: float) -> 
     assert bench is not None
     wizard.go_to(key)
     bench.show(wizard.open.step.folder, 0)
-    said: list[str] = []
+    output: list[str] = []
 
     def note(item: object) -> None:
-        said.append(type(item).__name__)
+        output.append(type(item).__name__)
 
     wizard.model.live.processed.connect(note)
     wait(lambda: False, SETTLE_S)
-    said.clear()
+    output.clear()
     lateness.late_ms.clear()
     paints, spent, memory_mb = Paints(wizard.area.view), Spent(), [resident_mb()]
     end = time.monotonic() + seconds
@@ -105,12 +105,12 @@ def watch_step(wizard: Wizard, key: str, lateness: Lateness, seconds: float) -> 
         memory_mb.append(resident_mb())
     print(f"{key}, {spent.wall_s:.0f} s: {wizard.panel.live.text()}")
     print(f"  shown: {paints.count / spent.wall_s:.1f} frames/s")
-    print(f"  detection: {len(said) / spent.wall_s:.1f} a second, median "
+    print(f"  detection: {len(output) / spent.wall_s:.1f} a second, median "
           f"{wizard.model.live.processing_ms:.0f} ms")  # fmt: skip
-    print("  " + told("lateness of the user interface", lateness.late_ms, "ms"))
+    print("  " + reported("lateness of the user interface", lateness.late_ms, "ms"))
     span = max(memory_mb) - min(memory_mb)
     print(f"  memory: {memory_mb[0]:.0f} MB, at the end {memory_mb[-1]:.0f}, span {span:.0f} MB")
-    print("  " + spent.told())
+    print("  " + spent.reported())
     wizard.model.live.processed.disconnect(note)
 
 

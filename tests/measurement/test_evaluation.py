@@ -110,7 +110,7 @@ def test_errors_are_averaged_by_direction_shape_and_dimension() -> None:
     assert groups["depth", "all", None].highest_percent == pytest.approx(20.0)
 
 
-def test_repeats_and_regions_are_told_apart() -> None:
+def test_repeats_and_regions_are_distinguished() -> None:
     evaluation = paper_protocol()
     regions = {
         group.regions: group.statistic.count
@@ -209,9 +209,9 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
             raise InputError("the image is all black", where=path.name, advice="Open the shutter")
         return measure_heightmap(heights({"a.png": 2.0, "b.png": 3.0}[path.name]), shape=shape)
 
-    told: list[tuple[str, float]] = []
+    reported: list[tuple[str, float]] = []
     evaluation = evaluate_presses(
-        tmp_path, measure, progress=lambda name, share: told.append((name, share))
+        tmp_path, measure, progress=lambda name, share: reported.append((name, share))
     )
     assert evaluation.overall("planar").mean_absolute_percent < 0.5
     assert [result.failure for result in evaluation.failed] == [
@@ -226,8 +226,8 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
     stated = 0.004 * steeper * first.height_mm
     assert first.calibration_sd["height_mm"] == pytest.approx(stated, rel=1e-2)
     assert "coin.png" in evaluation_table(evaluation)
-    assert told[0] == ("a.png", 0.0)
-    assert told[-1][1] == 1.0
+    assert reported[0] == ("a.png", 0.0)
+    assert reported[-1][1] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -348,8 +348,8 @@ def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
     }
     page = (tmp_path / "evaluation.html").read_text()
     assert "Fail</span>" not in page
-    for said in ("T-1", "Repeatability, depth", "60 of 60 presses", "cuboid_5_1_r24_29.png"):
-        assert said in page
+    for output in ("T-1", "Repeatability, depth", "60 of 60 presses", "cuboid_5_1_r24_29.png"):
+        assert output in page
     assert (tmp_path / "evaluation.pdf").read_bytes().startswith(b"%PDF")
     with (tmp_path / "gauge.csv").open() as file:
         gauge = list(csv.DictReader(file))

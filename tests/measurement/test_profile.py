@@ -111,10 +111,10 @@ def test_figures_scatter_by_what_they_state() -> None:
         ]
 
     sigma = 0.01
-    said = figures(made(surface, **stated(200, sigma)))
+    output = figures(made(surface, **stated(200, sigma)))
     x, y = np.meshgrid(X, Y)
     repeats = [figures(made(surface(x, y) + drawn(sigma, seed))) for seed in range(60)]
-    for k, figure in enumerate(said):
+    for k, figure in enumerate(output):
         scatter = np.std([repeat[k].value for repeat in repeats], ddof=1)
         # 60 repeats know their scatter to 9 %, 200 examples theirs to 5 %.
         assert figure.sd == pytest.approx(scatter, rel=0.3), figure.name

@@ -78,7 +78,7 @@ def test_what_noise_hides_is_unclear() -> None:
     assert found is None or len(found.candidates) == 2
 
 
-def test_of_several_the_tallest_or_the_one_pointed_at_is_told() -> None:
+def test_of_several_the_tallest_or_the_one_pointed_at_is_reported() -> None:
     both = map_of(
         press(Ball(3.0, 0.9), x_mm=-4.5, pitch_mm=0.04),
         press(Cylinder(3.0, 0.5), x_mm=4.5, pitch_mm=0.04),

@@ -51,7 +51,7 @@ def test_the_truth_itself_has_no_error() -> None:
 
 
 @given(st.floats(0.8, 1.2))
-def test_a_height_that_is_wrong_by_a_share_is_said_as_that_share(share: float) -> None:
+def test_a_height_that_is_wrong_by_a_share_is_reported_as_that_share(share: float) -> None:
     nodes = axis(PITCH_MM)
     score = scored(share * frustum(nodes, nodes), nodes, nodes)
     assert score.height_percent == pytest.approx(100 * (share - 1), abs=1e-3)

@@ -75,7 +75,7 @@ def test_every_tool_is_stored_as_plain_json_and_read_back() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "output"),
     [
         ({}, "unknown tool"),
         ({"tool": "ruler"}, "unknown tool 'ruler'"),
@@ -89,8 +89,8 @@ def test_every_tool_is_stored_as_plain_json_and_read_back() -> None:
         ({"tool": "rectangle", "rectangle": {"centre_mm": [0, 0], "sides_mm": [1, 0]}}, "1 x 0"),
     ],
 )
-def test_a_stored_tool_that_is_not_right_is_refused(content: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_a_stored_tool_that_is_not_right_is_refused(content: dict[str, Any], output: str) -> None:
+    with pytest.raises(InputError, match=output):
         tool_from_dict(content)
 
 
@@ -109,7 +109,7 @@ def test_stored_results_are_measured_again_to_the_last_bit() -> None:
         tools_from_json([])
 
 
-def test_a_distance_is_told_in_the_plane_in_space_and_in_depth() -> None:
+def test_a_distance_is_reported_in_the_plane_in_space_and_in_depth() -> None:
     result = Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: 4.0 / 3.0 * x))
     assert result["distance"].value == 3.0
     assert result["distance_3d"].value == pytest.approx(5.0, rel=1e-6)
@@ -131,7 +131,7 @@ def test_points_placed_by_hand_are_known_to_one_node_and_no_better() -> None:
     assert Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: x))["distance"].sd is None
 
 
-def test_an_angle_is_told_in_the_plane_and_in_space() -> None:
+def test_an_angle_is_reported_in_the_plane_and_in_space() -> None:
     result = Angle((2.0, 0.0), (0.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
     assert result["angle"].value == pytest.approx(90.0)
     # (1, 0, 1) and (0, 1, 1) meet at 60 degrees.

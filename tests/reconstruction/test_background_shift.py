@@ -62,7 +62,7 @@ def test_a_sensor_that_has_not_changed_has_not_drifted(small_calibration: Calibr
     assert shift.quality.verdict is Verdict.PASS
 
 
-def test_leds_that_changed_are_told_by_channel(
+def test_leds_that_changed_are_reported_by_channel(
     small_calibration: Calibration, warm: list[Frame]
 ) -> None:
     shift = background_shift(warm[0], small_calibration)
@@ -72,7 +72,7 @@ def test_leds_that_changed_are_told_by_channel(
     assert any("zero" in line for line in shift.quality.advice)
 
 
-def test_a_membrane_that_moved_in_the_image_is_told(
+def test_a_membrane_that_moved_in_the_image_is_reported(
     virtual_calibration: Calibration, virtual_session: Path
 ) -> None:
     bare = read_image(next((virtual_session / "background").iterdir())).rgb

@@ -108,8 +108,8 @@ def test_the_solver_finds_the_depth_of_the_scalar_oracles_at_every_scale(
     off = (shown - expected.depth_mm)[inside]
     assert np.sqrt(np.mean(off**2)) < bound_mm
     if factor == 1:
-        told = ~np.uint8(Flag.EXTRAPOLATED | Flag.INVALID)
-        assert ((found.flags & told) == (expected.flags & told)).mean() > 0.995
+        reported = ~np.uint8(Flag.EXTRAPOLATED | Flag.INVALID)
+        assert ((found.flags & reported) == (expected.flags & reported)).mean() > 0.995
         assert found.normals is not None
         across = np.linalg.norm(np.cross(found.normals, expected.normals), axis=-1)[inside]
         assert np.percentile(np.degrees(np.arcsin(np.clip(across, 0.0, 1.0))), 99) < 1.0

@@ -1,4 +1,4 @@
-"""Contacts that cross the boundary of the field: right, or said to be without an anchor."""
+"""Contacts that cross the boundary of the field: right, or flagged as without an anchor."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def test_light_stronger_than_saturation_is_saturated_and_no_number_is_missing() 
 
 
 @pytest.mark.parametrize("reconstruct", STANDARD, ids=lambda r: r.model)
-def test_another_exposure_or_colour_order_than_the_calibrations_is_said(
+def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(
     reconstruct: Reconstructor,
 ) -> None:
     frame = standard_press().frame
@@ -109,7 +109,7 @@ def test_another_exposure_or_colour_order_than_the_calibrations_is_said(
         assert found.health.line in found.notes
 
 
-def test_light_that_has_drifted_by_two_per_cent_is_said_with_its_amount() -> None:
+def test_light_that_has_drifted_by_two_per_cent_is_reported_with_its_amount() -> None:
     frame = standard_press().frame
     red = frame * np.array([1.02, 1.0, 1.0], np.float32)
     for reconstruct in STANDARD:

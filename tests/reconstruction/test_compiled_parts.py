@@ -111,8 +111,8 @@ def test_the_compiled_solve_finds_the_normals_of_the_scalar_one(
         off = np.abs(getattr(found, name) - getattr(plain, name))[2:-2, 2:-2]
         assert np.percentile(off, 95) < steps[1]
         assert np.isfinite(getattr(found, name)).all()
-    told = ~np.uint8(Flag.INVALID)
-    assert ((found.flags & told) == plain.flags).mean() > 0.99
+    reported = ~np.uint8(Flag.INVALID)
+    assert ((found.flags & reported) == plain.flags).mean() > 0.99
     assert (found.weight == plain.weight).mean() > 0.99
     assert (np.linalg.norm(found.normals, axis=-1) < 1.0 + 1e-5).all()
 

@@ -192,7 +192,7 @@ def steep_press(decay_mm: float) -> tuple[KnownSensor, KnownPress]:
 
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("decay_mm", [0.35, 0.18, 0.1])
-def test_walls_are_right_or_said_to_be_too_steep(decay_mm: float, effort: str) -> None:
+def test_walls_are_right_or_reported_to_be_too_steep(decay_mm: float, effort: str) -> None:
     """Walls of 71, 80 and 84 degrees."""
     steep, press = steep_press(decay_mm)
     found = Reconstructor(steep.calibration, effort=effort).depth(press.frame, normals=False)
@@ -212,7 +212,7 @@ def wide_press(focal_px: float) -> tuple[KnownSensor, KnownPress]:
 
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("focal_px", [150.0, 80.0, 40.0])
-def test_wide_lenses_are_right_or_said_to_see_too_little(focal_px: float, effort: str) -> None:
+def test_wide_lenses_are_right_or_reported_to_see_too_little(focal_px: float, effort: str) -> None:
     """Rays up to 47, 63 and 76 degrees: wide pixels."""
     known, press = wide_press(focal_px)
     found = Reconstructor(known.calibration, effort=effort).depth(press.frame, normals=False)

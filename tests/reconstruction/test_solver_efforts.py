@@ -171,12 +171,12 @@ def test_half_scale_is_near_to_the_best(
     assert same.all()
 
 
-@pytest.mark.parametrize(("decay_mm", "said"), [(0.7, False), (0.1, True)])
+@pytest.mark.parametrize(("decay_mm", "output"), [(0.7, False), (0.1, True)])
 @pytest.mark.parametrize("effort", EFFORTS)
-def test_walls_that_light_does_not_decide_are_said_at_every_effort(
+def test_walls_that_light_does_not_decide_are_reported_at_every_effort(
     effort: str,
     decay_mm: float,
-    said: bool,
+    output: bool,
     shown: Callable[[State], Frame],
     virtual_calibration: Calibration,
 ) -> None:
@@ -184,7 +184,7 @@ def test_walls_that_light_does_not_decide_are_said_at_every_effort(
     surface = pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, decay_mm=decay_mm)
     image = shown(PressedMembrane(surface))
     notes = Reconstructor(virtual_calibration, effort=effort).depth(image).notes
-    assert any("steep walls" in note for note in notes) is said
+    assert any("steep walls" in note for note in notes) is output
 
 
 def test_the_papers_model_leaves_nothing_of_itself_out(

@@ -210,7 +210,7 @@ def test_no_slopes_are_no_depth() -> None:
     assert not found.depth_mm.any()
 
 
-def test_rounds_that_do_not_suffice_are_told() -> None:
+def test_rounds_that_do_not_suffice_are_reported() -> None:
     """A tolerance below single precision cannot be reached."""
     random = np.random.default_rng(2)
     slope_x, slope_y = random.normal(size=(2, ROWS, COLUMNS))

@@ -189,12 +189,12 @@ def test_a_killed_program_loses_no_confirmed_frame(tmp_path: Path) -> None:
         if int(line) >= 40:
             break
     program.send_signal(signal.SIGKILL)
-    said = [int(line) for line in program.stdout.read().split()]
+    output = [int(line) for line in program.stdout.read().split()]
     program.stdout.close()
     program.wait()
     with Recording.open(path) as recording:
         assert recording.truncated
-        assert len(recording) > max([40, *said])
+        assert len(recording) > max([40, *output])
         for index in range(len(recording)):
             frame = recording.frame(index)
             assert frame.number == index

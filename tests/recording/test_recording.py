@@ -81,8 +81,8 @@ def test_other_programs_open_its_frames(tmp_path: Path, kind: type) -> None:
         assert len(file.pages) == len(images)
         for number, (page, rgb) in enumerate(zip(file.pages, images, strict=True)):
             assert np.array_equal(page.asarray(), rgb)
-            told = json.loads(page.tags["ImageDescription"].value)
-            assert told == {"number": number, "time_s": 100.0 + number / 50.0}
+            reported = json.loads(page.tags["ImageDescription"].value)
+            assert reported == {"number": number, "time_s": 100.0 + number / 50.0}
     done, theirs = cv2.imreadmulti(str(tmp_path / "a.gplrec"), flags=cv2.IMREAD_UNCHANGED)
     assert done
     assert all(np.array_equal(bgr[..., ::-1], rgb) for bgr, rgb in zip(theirs, images, strict=True))

@@ -60,23 +60,23 @@ def test_a_killed_program_loses_or_splits_no_measurement(tmp_path: Path) -> None
     """Two at the same time, both killed while writing."""
     path = tmp_path / NAME
     programs = [adding(path), adding(path)]
-    said: set[int] = set()
+    output: set[int] = set()
     for program in programs:
         assert program.stdout is not None
         for _ in range(8):
-            said.add(int(program.stdout.readline()))
+            output.add(int(program.stdout.readline()))
     for program in programs:
         program.send_signal(signal.SIGKILL)
     for program in programs:
         assert program.stdout is not None
-        said.update(int(line) for line in program.stdout.read().split())
+        output.update(int(line) for line in program.stdout.read().split())
         program.stdout.close()
         program.wait()
-    assert len(said) >= 16
+    assert len(output) >= 16
     with Records.open(path) as records:
         assert not records.notice
         found = records.measurements()
-        assert said <= {record.id for record in found}
+        assert output <= {record.id for record in found}
         assert all(len(record.quantities) == 20 for record in found)
         records.add(RECORD)
 

@@ -210,7 +210,7 @@ def test_inputs_are_not_changed() -> None:
     np.testing.assert_array_equal(background, before[1])
 
 
-def test_drape_that_reaches_the_border_is_told() -> None:
+def test_drape_that_reaches_the_border_is_reported() -> None:
     near = find_indentation(*scene((42.0, 120.0, 35.0)))
     assert near.touches_border
     assert off_by(near, 42.0, 120.0) < 1.5

@@ -1,7 +1,7 @@
 """Write every kind of file on a disk that is full, then can only be read: ``disk_trial.py FOLDER``.
 
 The folder is a small disk of its own, in a process that may mount it anew. Prints as JSON what was
-said of each kind: a sentence, nothing where it was written after all, or what should not be.
+reported for each kind: a sentence, nothing where it was written after all, or what should not be.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ def tried(act: Callable[[], object]) -> str:
 def file_kind(kind: Written, folder: Path) -> str:
     """Try one of the kinds that are written whole; the older file has to stay as it was."""
     before = tree(folder)
-    said = tried(lambda: kind.write(folder, 1))
-    if said.startswith("refused") and tree(folder) != before:
-        return f"FAULT: the older file is not whole after {said}"
-    return said
+    output = tried(lambda: kind.write(folder, 1))
+    if output.startswith("refused") and tree(folder) != before:
+        return f"FAULT: the older file is not whole after {output}"
+    return output
 
 
 def record(folder: Path) -> str:
@@ -70,11 +70,11 @@ def record(folder: Path) -> str:
             for _ in range(50):
                 records.add(RECORD)
 
-    said = tried(add)
+    output = tried(add)
     with Records.open(folder / NAME) as records:
         if len(records.measurements()) < 3:
-            return f"FAULT: measurements are lost after {said}"
-    return said
+            return f"FAULT: measurements are lost after {output}"
+    return output
 
 
 def recording(folder: Path) -> str:
@@ -87,11 +87,11 @@ def recording(folder: Path) -> str:
 
 def go_on_recording(folder: Path) -> str:
     """As :func:`recording`, and read what there is."""
-    said = tried(lambda: recording(folder))
+    output = tried(lambda: recording(folder))
     with Recording.open(folder / "old.gplrec") as old:
         if len(old) != 2:
-            return f"FAULT: frames are lost after {said}"
-    return said
+            return f"FAULT: frames are lost after {output}"
+    return output
 
 
 def settings(folder: Path) -> str:
@@ -103,10 +103,10 @@ def settings(folder: Path) -> str:
         kept.keep_camera("camera", {"text": "x" * 9000})
         kept.save()
 
-    said = tried(keep)
+    output = tried(keep)
     if Settings(folder / "desktop.ini").recent("sessions") != (Path("/kept"),):
-        return f"FAULT: settings are lost after {said}"
-    return said
+        return f"FAULT: settings are lost after {output}"
+    return output
 
 
 def log(folder: Path) -> str:
@@ -145,15 +145,15 @@ def begin(root: Path) -> None:
 
 
 def all_tried(root: Path) -> dict[str, str]:
-    """Try to write every kind; return what was said."""
-    said = {kind.name: file_kind(kind, root / kind.name) for kind in (*KINDS, *DRAWN)}
-    said["records"] = record(root / "records")
-    said["new records"] = tried(lambda: Workspace(root / "run" / "workspace").records)
-    said["recording"] = go_on_recording(root / "recording")
-    said["settings"] = settings(root / "settings")
-    said["log"] = log(root)
-    said["lock"] = lock(root)
-    return said
+    """Try to write every kind; return the messages."""
+    output = {kind.name: file_kind(kind, root / kind.name) for kind in (*KINDS, *DRAWN)}
+    output["records"] = record(root / "records")
+    output["new records"] = tried(lambda: Workspace(root / "run" / "workspace").records)
+    output["recording"] = go_on_recording(root / "recording")
+    output["settings"] = settings(root / "settings")
+    output["log"] = log(root)
+    output["lock"] = lock(root)
+    return output
 
 
 def left_open(root: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""The program is killed at any moment: what it said was kept is there, and the rest is whole."""
+"""The program is killed at any moment: what it reported as saved is there, every file whole."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ for number, press in enumerate(run.wanted):
 """
 
 
-def told_until_killed(root: Path, seed: int) -> list[list[str]]:
-    """Let a program write, kill it at a moment that the seed says; return what it has told."""
+def reported_until_killed(root: Path, seed: int) -> list[list[str]]:
+    """Let a program write, kill it at a moment given by the seed, and return what it reported."""
     lines = lines_until_killed(
         ["-c", AT_WORK, str(root)],
         paths=(HERE, *HERE.parents[:2]),
@@ -82,10 +82,10 @@ def told_until_killed(root: Path, seed: int) -> list[list[str]]:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_what_was_told_is_there_and_all_files_are_whole(seed: int, tmp_path: Path) -> None:
-    told = told_until_killed(tmp_path, seed)
+def test_what_was_reported_is_there_and_all_files_are_whole(seed: int, tmp_path: Path) -> None:
+    reported = reported_until_killed(tmp_path, seed)
     by_kind: dict[str, list[str]] = {}
-    for kind, name in told:
+    for kind, name in reported:
         by_kind.setdefault(kind, []).append(name)
     run = open_run(tmp_path / "run")
     assert set(by_kind["press"]) <= {press.file for press in run.done}

@@ -20,8 +20,8 @@ SILENT = ("settings", "log")
 
 
 @pytest.fixture(scope="module")
-def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
-    """Return what was said of each kind of file on both disks."""
+def output(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
+    """Return the message for each kind of file on both disks."""
     if shutil.which("unshare") is None:
         pytest.skip("no disk of their own for tests on this system")
     place = tmp_path_factory.mktemp("disk")
@@ -46,10 +46,10 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
     [("full", "The disk is full|No space left"), ("read-only", "read-only|Read-only")],
 )
 def test_every_kind_of_file_is_refused_in_a_sentence_and_nothing_is_lost(
-    said: dict[str, dict[str, str]], disk: str, words: str
+    output: dict[str, dict[str, str]], disk: str, words: str
 ) -> None:
     wrong = {}
-    for name, sentence in said[disk].items():
+    for name, sentence in output[disk].items():
         if not sentence:
             continue
         if sentence.startswith("FAULT"):

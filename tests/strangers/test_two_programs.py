@@ -86,7 +86,7 @@ def worked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[st
     return root, done
 
 
-def test_every_image_that_was_said_to_be_kept_is_there(
+def test_every_image_that_was_reported_to_be_kept_is_there(
     worked: tuple[Path, list[dict[str, list[str]]]],
 ) -> None:
     root, done = worked
@@ -114,14 +114,14 @@ def test_both_calibrations_are_in_the_library_once_and_one_is_in_use(
     assert workspace.in_use in [entry.path for entry in entries]
 
 
-def test_who_decides_second_is_told_in_a_sentence(
+def test_who_decides_second_is_reported_in_a_sentence(
     worked: tuple[Path, list[dict[str, list[str]]]],
 ) -> None:
     """A decision is never written over one that was not seen."""
     root, done = worked
-    said = {sentence for program in done for sentence in program["refused"]}
+    output = {sentence for program in done for sentence in program["refused"]}
     known = ("Another program has changed", "Another program is using the records")
-    assert [sentence for sentence in said if not any(part in sentence for part in known)] == []
+    assert [sentence for sentence in output if not any(part in sentence for part in known)] == []
     assert read_session(root / "session").decisions.excluded
 
 

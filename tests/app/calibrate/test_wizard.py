@@ -393,7 +393,7 @@ def test_no_text_is_cut_off_or_moves_what_is_below(
         assert panel.rect().contains(foot.geometry())
         heights = set()
         for words in (1, 8, 24):
-            panel.show_live("Something is said. " * (words // 4 + 1), ready=True)
+            panel.show_live("Some advice on the image. " * (words // 4 + 1), ready=True)
             panel.show_notice("Captured. " * (words // 8 + 1), "pass")
             QApplication.processEvents()
             heights.add(panel.sentence.mapTo(panel, panel.sentence.rect().topLeft()).y())

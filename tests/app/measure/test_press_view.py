@@ -91,8 +91,8 @@ def test_a_frozen_frame_is_not_measured_with_another_sensors_calibration(
     other = replace(small_calibration, sensor=replace(small_calibration.sensor, serial="B-2"))
     _use(context, other, tmp_path / "other.gplcal")
     advice = press_view.banner.findChild(object, "inspect.advice")
-    said = f"sensor {serial}"
-    qtbot.waitUntil(lambda: said in advice.text(), timeout=PATIENCE_MS)
+    output = f"sensor {serial}"
+    qtbot.waitUntil(lambda: output in advice.text(), timeout=PATIENCE_MS)
     assert press_view.work.heightmap is None
     assert not press_view.map.view.has_image
     press_view.release()

@@ -345,10 +345,10 @@ def test_the_report_contains_the_validation(source: Path, tmp_path: Path) -> Non
     )  # fmt: skip
     write_validation(trial, place)
     write_entry_report(read_entry(place), tmp_path / "after.html")
-    said = [(tmp_path / f"{name}.html").read_text() for name in ("before", "after")]
-    assert "1.010 mm measured" not in said[0]
-    assert "Validated: cylinder" in said[1]
-    assert "1.010 mm measured" in said[1]
+    output = [(tmp_path / f"{name}.html").read_text() for name in ("before", "after")]
+    assert "1.010 mm measured" not in output[0]
+    assert "Validated: cylinder" in output[1]
+    assert "1.010 mm measured" in output[1]
 
 
 def test_the_gel_of_a_calibration_is_shown_and_named(

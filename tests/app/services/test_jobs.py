@@ -75,10 +75,10 @@ def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:
     def refuse(_progress: Tell) -> None:
         raise InputError("the image is grey", where="a.png", advice="Take it in colour")
 
-    with qtbot.waitSignal(jobs.refused) as told:
+    with qtbot.waitSignal(jobs.refused) as reported:
         jobs.submit(Job("look", refuse))
         jobs.submit(Job("count", lambda _progress: 1, done.append))
-    assert "the image is grey" in told.args[0]
+    assert "the image is grey" in reported.args[0]
     qtbot.waitUntil(lambda: done == [1])
     assert jobs.close()
 
@@ -112,8 +112,8 @@ def test_a_hanging_job_does_not_block_closing(
 
 
 def test_a_failed_required_job_is_reported_after_its_page_closed() -> None:
-    jobs, told = Jobs("jobs"), list[str]()
-    jobs.refused.connect(told.append)
+    jobs, reported = Jobs("jobs"), list[str]()
+    jobs.refused.connect(reported.append)
     go = threading.Event()
 
     def refuse(_progress: Tell) -> None:
@@ -124,20 +124,20 @@ def test_a_failed_required_job_is_reported_after_its_page_closed() -> None:
     jobs.submit(Job("compute", refuse))
     go.set()
     assert jobs.close()
-    (sentence,) = told
+    (sentence,) = reported
     assert "the disk is full" in sentence
 
 
 def test_a_hanging_required_job_is_reported_and_still_completed(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    jobs, told, written, go = Jobs("jobs"), list[str](), list[str](), threading.Event()
-    jobs.refused.connect(told.append)
+    jobs, reported, written, go = Jobs("jobs"), list[str](), list[str](), threading.Event()
+    jobs.refused.connect(reported.append)
     jobs.submit(Job("wait", lambda _progress: go.wait(30.0), must=True))
     jobs.submit(Job("save", lambda _progress: written.append("saved"), must=True))
     jobs.submit(Job("keep", lambda _progress: written.remove("nothing"), must=True))
     assert not jobs.close(timeout_s=0.05)
-    assert [sentence.partition(":")[0] for sentence in told] == ["wait", "save", "keep"]
+    assert [sentence.partition(":")[0] for sentence in reported] == ["wait", "save", "keep"]
     assert "save had not finished when the page closed" in caplog.text
     go.set()
     assert join_left_behind(10.0)
@@ -170,7 +170,7 @@ def test_the_caller_is_notified_however_a_job_ends(end: str, qtbot: QtBot) -> No
 
 @pytest.mark.parametrize("runs", [True, False])
 def test_the_caller_is_notified_that_a_job_was_stopped(runs: bool, qtbot: QtBot) -> None:
-    jobs, told, refused = Jobs("jobs"), list[str](), list[str]()
+    jobs, reported, refused = Jobs("jobs"), list[str](), list[str]()
     begun, go = threading.Event(), threading.Event()
     jobs.refused.connect(refused.append)
 
@@ -181,12 +181,12 @@ def test_the_caller_is_notified_that_a_job_was_stopped(runs: bool, qtbot: QtBot)
 
     if not runs:
         jobs.submit(Job("first", lambda _progress: go.wait(10.0)))
-    jobs.submit(Job("export", work, stopped=told.append))
+    jobs.submit(Job("export", work, stopped=reported.append))
     if runs:
         assert begun.wait(10.0)
     jobs.cancel()
     go.set()
     qtbot.waitUntil(lambda: not jobs.busy)
-    assert told == ["export: stopped"]
+    assert reported == ["export: stopped"]
     assert not refused
     assert jobs.close()

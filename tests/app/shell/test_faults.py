@@ -118,8 +118,8 @@ def test_details_of_libraries_are_dropped_and_their_warnings_kept(context: AppCo
     for name in ("fontTools.subset", "app.inspect", "gelpolight_core.report"):
         logging.getLogger(name).info("a step of %s", name)
         logging.getLogger(name).warning("trouble in %s", name)
-    said = log_of(context)
-    assert "a step of fontTools" not in said
-    assert "trouble in fontTools" in said
-    assert "a step of app.inspect" in said
-    assert "a step of gelpolight_core" in said
+    output = log_of(context)
+    assert "a step of fontTools" not in output
+    assert "trouble in fontTools" in output
+    assert "a step of app.inspect" in output
+    assert "a step of gelpolight_core" in output

@@ -39,6 +39,6 @@ def test_what_is_left_behind_is_named(
         pytester.makepyfile(**{f"test_{kind}": f"{above}\n{tests}"})
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-p", "no:xvfb")
     result.assert_outcomes(passed=2 * len(LEAKS), errors=len(LEAKS))
-    for kind, (_, _, said) in LEAKS.items():
+    for kind, (_, _, output) in LEAKS.items():
         result.stdout.fnmatch_lines([f"*ERROR at teardown of test_{kind} *"])
-        result.stdout.fnmatch_lines([f"*left behind: *{said}*"])
+        result.stdout.fnmatch_lines([f"*left behind: *{output}*"])

@@ -435,8 +435,8 @@ def test_no_two_visible_actions_share_a_shortcut(context: AppContext, qtbot: QtB
             for index in range(tabs.count()):
                 tabs.setCurrentIndex(index)
                 _refuse_shared_keys(window)
-    told = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(window)}
-    assert ("measure", "D", "Distance") in told
+    reported = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(window)}
+    assert ("measure", "D", "Distance") in reported
 
 
 def _refuse_shared_keys(window: MainWindow) -> None:
@@ -584,11 +584,11 @@ def test_the_status_line_shows_what_is_known(window: MainWindow) -> None:
         calibration_note="not validated",
     )
     bar = window.statusBar()
-    said = {label.objectName(): label.text() for label in bar.findChildren(QLabel)}
-    assert said["main.status.rate"] == "30.0 fps"
-    assert said["main.status.processing"] == "10.7 ms"
-    assert said["main.status.dropped"] == "none skipped"
-    assert "not validated" in said["main.status.calibration"]
+    output = {label.objectName(): label.text() for label in bar.findChildren(QLabel)}
+    assert output["main.status.rate"] == "30.0 fps"
+    assert output["main.status.processing"] == "10.7 ms"
+    assert output["main.status.dropped"] == "none skipped"
+    assert "not validated" in output["main.status.calibration"]
     with pytest.raises(TypeError):
         window.context.status.update(speed=1)
 
@@ -618,8 +618,8 @@ def test_a_checkerboard_to_print_is_in_the_help_menu(
         window.findChild(QAction, f"help.board_{square}mm").trigger()
         assert Path(opened[-1]).name == f"checkerboard-9x6-{square}mm.pdf"
         assert Path(opened[-1]).is_file()
-    told = [toast.text for toast in window.context.toasts.shown()]
-    assert [path for path in opened if any(path in text for text in told)] == (
+    reported = [toast.text for toast in window.context.toasts.shown()]
+    assert [path for path in opened if any(path in text for text in reported)] == (
         [] if shows else opened
     )
 

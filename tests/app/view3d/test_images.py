@@ -27,7 +27,7 @@ def saving(panel: SurfacePanel, settings: Settings) -> ViewSaving:
     return ViewSaving(panel, panel, settings=settings)
 
 
-def _told(saving: ViewSaving) -> list[tuple[str, str]]:
+def _reported(saving: ViewSaving) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     saving.reported.connect(lambda text, kind: found.append((text, kind)))
     return found
@@ -59,7 +59,7 @@ def test_a_transparent_image_has_no_background(
     panel: SurfacePanel, saving: ViewSaving, tmp_path: Path
 ) -> None:
     path = tmp_path / "surface.png"
-    reported = _told(saving)
+    reported = _reported(saving)
     saving.save_image(path, ImageChoice("surface", (400, 300), transparent=True))
     alpha = np.asarray(Image.open(path))[..., 3]
     assert alpha.shape == (300, 400)
@@ -68,7 +68,7 @@ def test_a_transparent_image_has_no_background(
 
 
 def test_a_failed_image_is_reported(saving: ViewSaving, tmp_path: Path) -> None:
-    reported = _told(saving)
+    reported = _reported(saving)
     saving.save_image(tmp_path / "none" / "a.png", ImageChoice("surface", (320, 240)))
     assert [kind for _, kind in reported] == ["fail"]
 
@@ -107,7 +107,7 @@ def _frames(path: Path) -> list[np.ndarray]:
 def test_a_cancelled_movie_leaves_no_file(
     panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, qtbot: QtBot
 ) -> None:
-    reported = _told(saving)
+    reported = _reported(saving)
     saving.save_movie(tmp_path / "turn.mp4", MovieChoice("turntable", (240, 180), 30.0, 10.0))
     progress = panel.findChild(ProgressDialog, "view3d.movie.progress")
     assert progress is not None

@@ -117,7 +117,7 @@ def figure(value: float, **limits: object) -> Figure:
 
 
 @pytest.mark.parametrize(
-    ("shown", "said"),
+    ("shown", "output"),
     [
         (figure(math.nan), "unknown"),
         (figure(16.0), "16"),
@@ -126,12 +126,12 @@ def figure(value: float, **limits: object) -> Figure:
         (figure(0.00483, unit="%"), "0.00483 %"),
     ],
 )
-def test_values_are_written_as_people_write_them(shown: Figure, said: str) -> None:
-    assert value_text(shown) == said
+def test_values_are_written_as_people_write_them(shown: Figure, output: str) -> None:
+    assert value_text(shown) == output
 
 
 @pytest.mark.parametrize(
-    ("shown", "said"),
+    ("shown", "output"),
     [
         (figure(1.0), ""),
         (figure(1.0, unit="mm", fail=2.0), "≤ 2 mm"),
@@ -141,5 +141,5 @@ def test_values_are_written_as_people_write_them(shown: Figure, said: str) -> No
         (figure(2.0, warn=2.0), "≤ 2"),
     ],
 )
-def test_limits_show_which_side_passes(shown: Figure, said: str) -> None:
-    assert limit_text(shown) == said
+def test_limits_show_which_side_passes(shown: Figure, output: str) -> None:
+    assert limit_text(shown) == output

@@ -188,7 +188,7 @@ def test_one_calibration_is_measured_as_it_is(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "output"),
     [
         (["--methods", "paper,magic"], "magic"),
         (["--widths", "320,x"], "widths"),
@@ -198,8 +198,8 @@ def test_one_calibration_is_measured_as_it_is(
     ],
 )
 def test_what_cannot_be_measured_is_refused_before_the_work(
-    tmp_path: Path, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, arguments: list[str], output: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["work-precision", *arguments, "-o", str(tmp_path / "out")]) == MENDABLE
-    assert said in capsys.readouterr().err
+    assert output in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
