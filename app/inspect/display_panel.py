@@ -32,17 +32,19 @@ class DisplayPanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "inspect.look", tr("Display"))
+        named(self, "inspect.display", tr("Display"))
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        self._colours = named(ComboBox(), "inspect.look.colours", tr("Colours"))
+        self._colours = named(ComboBox(), "inspect.display.colours", tr("Colours"))
         for key, name in colour_map_labels().items():
             self._colours.addItem(name, key)
-        self._colour_by = named(ComboBox(), "inspect.look.colour_by", tr("Colour the surface by"))
+        self._colour_by = named(
+            ComboBox(), "inspect.display.colour_by", tr("Colour the surface by")
+        )
         for key, name in quantity_names().items():
             self._colour_by.addItem(name, key)
         self._lock = named(
-            QCheckBox(tr("Lock")), "inspect.look.lock", tr("Lock the range"),
+            QCheckBox(tr("Lock")), "inspect.display.lock", tr("Lock the range"),
             tr("Keep the colour range. If unlocked, it follows the deepest press"), "K",
         )  # fmt: skip
         self._low = self._depth("low", tr("Depth at the low end of the colours"), LIMITS_MM[0])
@@ -51,11 +53,13 @@ class DisplayPanel(QWidget):
         self._contour.setSpecialValueText(tr("none"))
         self._contour.setSingleStep(0.05)
         self._relief = named(
-            QCheckBox(tr("Shade the height map")), "inspect.look.relief", tr("Shade the height map")
+            QCheckBox(tr("Shade the height map")),
+            "inspect.display.relief",
+            tr("Shade the height map"),
         )
         self._stretch = self._slider("exaggeration", tr("Depth scale in 3D"), 10, 80)
         self._azimuth = named(
-            Dial(), "inspect.look.azimuth", tr("Light direction"), tr("Direction of the light")
+            Dial(), "inspect.display.azimuth", tr("Light direction"), tr("Direction of the light")
         )
         self._azimuth.setRange(0, 359)
         self._azimuth.setWrapping(True)
@@ -80,7 +84,7 @@ class DisplayPanel(QWidget):
         self._connect()
 
     def _depth(self, name: str, accessible: str, low: float) -> QDoubleSpinBox:
-        box = named(DoubleSpinBox(), f"inspect.look.{name}", accessible)
+        box = named(DoubleSpinBox(), f"inspect.display.{name}", accessible)
         box.setRange(low, LIMITS_MM[1])
         box.setDecimals(2)
         box.setSingleStep(0.1)
@@ -89,7 +93,7 @@ class DisplayPanel(QWidget):
         return box
 
     def _slider(self, name: str, accessible: str, low: int, high: int) -> QSlider:
-        slider = named(Slider(Qt.Orientation.Horizontal), f"inspect.look.{name}", accessible)
+        slider = named(Slider(Qt.Orientation.Horizontal), f"inspect.display.{name}", accessible)
         slider.setRange(low, high)
         return slider
 

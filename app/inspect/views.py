@@ -196,7 +196,7 @@ class Views(QMainWindow):
         self.section.changed.connect(self._on_section)
         for name, (text, keys) in view_names().items():
             make_action(
-                self, f"inspect.look_{name}", tr("3D: {name}").format(name=text),
+                self, f"inspect.view_{name}", tr("3D: {name}").format(name=text),
                 lambda name=name: self.surface.view_from(name), keys=(keys,),
             )  # fmt: skip
         make_action(

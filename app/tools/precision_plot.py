@@ -18,7 +18,7 @@ from gelpolight_core.translation import tr
 # The paper's values for its own sensor and machine.
 PAPER_MS, PAPER_PERCENT = 100.0, {"height_percent": 8.0, "size_percent": 5.0}
 # (light, dark) and a shape for each family of methods.
-LOOKS = {
+STYLES = {
     "paper": ("#0b5cad", "#74b5f7", "o"),
     "effort": ("#1a7f37", "#57d27a", "t"),
     "precision": ("#8a3ffc", "#c9a6ff", "p"),
@@ -95,7 +95,7 @@ class PrecisionPlot(QWidget):
             line = pg.mkPen(ink, width=1, style=Qt.PenStyle.DashLine)
             plot.plot(*zip(*(_coordinates(p, self._error) for p in front), strict=True), pen=line)
         for point in shown:
-            light, bright, symbol = LOOKS.get(point.family, LOOKS["rival"])
+            light, bright, symbol = STYLES.get(point.family, STYLES["rival"])
             size = 15 if point.family in ("effort", "paper") else 9
             self._mark(
                 _coordinates(point, self._error),

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.shell.main_window import MainWindow
 
-LOOK_MS = 20
+POLL_MS = 20
 PATIENCE_S = 900.0
 """Other people may be using the machine; nothing here takes a tenth of it on a quiet one."""
 QUALITY = 82
@@ -50,12 +50,12 @@ class Operator:
         TimeoutError
             If it does not come.
         """
-        loop, look = QEventLoop(), QTimer()
+        loop, poll = QEventLoop(), QTimer()
         end = time.monotonic() + patience_s
-        look.timeout.connect(lambda: loop.quit() if done() or time.monotonic() > end else None)
-        look.start(LOOK_MS)
+        poll.timeout.connect(lambda: loop.quit() if done() or time.monotonic() > end else None)
+        poll.start(POLL_MS)
         loop.exec()
-        look.stop()
+        poll.stop()
         if not done():
             raise TimeoutError(f"waited in vain: {what}")
 

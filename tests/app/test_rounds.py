@@ -46,8 +46,8 @@ class Rounds:
         source.choose_virtual_sensor()
         window.show_page("calibrate")
         self.page = window.page("calibrate")
-        self.look = QTimer()
-        self.look.timeout.connect(self.go_on)
+        self.poll = QTimer()
+        self.poll.timeout.connect(self.go_on)
         self.begin()
 
     def begin(self):
@@ -55,13 +55,13 @@ class Rounds:
         self.seen = []
         self.page.wizard.model.live.processed.connect(self.seen.append)
         self.page.wizard.go_to("lens")
-        self.look.start(10)
+        self.poll.start(10)
 
     def go_on(self):
         wizard = self.page.wizard
         if not self.seen or wizard.area.view.shown_frames < 3:
             return
-        self.look.stop()
+        self.poll.stop()
         if len(left) == rounds - 1:  # the last one is still looking when the window closes
             left.append(left[-1])
             self.window.close()

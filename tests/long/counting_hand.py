@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QListWidget, QScrollArea, QWidget
 from app.shell.main_window import MainWindow
 from app.widgets.qt_tree import below
 
-LOOK_MS = 20
+POLL_MS = 20
 PATIENCE_S = 300.0
 # A person reads, moves the mouse, and then clicks.
 REACTION_S = 1.0
@@ -53,7 +53,7 @@ class CountingHand:
             If it does not come.
         """
         end_s = time.monotonic() + patience_s
-        loop, look, seen = QEventLoop(), QTimer(), []
+        loop, poll, seen = QEventLoop(), QTimer(), []
 
         def check() -> None:
             if done():
@@ -61,10 +61,10 @@ class CountingHand:
             if seen or time.monotonic() > end_s:
                 loop.quit()
 
-        look.timeout.connect(check)
-        look.start(LOOK_MS)
+        poll.timeout.connect(check)
+        poll.start(POLL_MS)
         loop.exec()
-        look.stop()
+        poll.stop()
         if not seen:
             raise TimeoutError(f"waited {patience_s:.0f} s in vain: {what}")
 

@@ -172,7 +172,7 @@ class Rest:
 
     def _arrange(self) -> None:
         page = self.window.page("inspect")
-        for name in ("inspect.layout", "inspect.look_oblique"):
+        for name in ("inspect.layout", "inspect.view_oblique"):
             action = page.findChild(QAction, name)
             if action is not None:
                 action.trigger()

@@ -22,7 +22,7 @@ from app.shell.main_window import MainWindow
 
 SETTLE_S = 5.0
 COMPUTED_S = 1200.0
-LOOK_MS = 20
+POLL_MS = 20
 WINDOW = 1600, 1000
 
 
@@ -138,10 +138,10 @@ def one_round(wizard: Wizard) -> None:
 
 def wait(done: Callable[[], bool], seconds: float) -> None:
     """Let the program run until something is so, or the time is over."""
-    loop, look = QEventLoop(), QTimer()
+    loop, poll = QEventLoop(), QTimer()
     end = time.monotonic() + seconds
-    look.timeout.connect(lambda: loop.quit() if done() or time.monotonic() > end else None)
-    look.start(LOOK_MS)
+    poll.timeout.connect(lambda: loop.quit() if done() or time.monotonic() > end else None)
+    poll.start(POLL_MS)
     loop.exec()
-    look.stop()
+    poll.stop()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -15,7 +15,7 @@ from gelpolight_core.translation import tr
 
 PAPER_MS, PAPER_SIZE_PERCENT, PAPER_HEIGHT_PERCENT = 100.0, 5.0, 8.0
 """The paper's own figures: ten frames a second, errors of its section VI."""
-LOOKS = {
+STYLES = {
     "paper": ("#0072b2", "o"),
     "full_fast": ("#b7e08a", "^"),
     "full_balanced": ("#4caf50", "^"),
@@ -104,7 +104,7 @@ def _curves(axes: Axes, points: Sequence[Point], key: str) -> None:
         if not known:
             continue
         wrong = method.endswith("_wrong")
-        colour, marker = LOOKS.get(method.removesuffix("_wrong"), ("#6b7785", "x"))
+        colour, marker = STYLES.get(method.removesuffix("_wrong"), ("#6b7785", "x"))
         errors = [max(getattr(p, key), LEAST_ERROR) for p in known]
         spread = None
         if key == "rms_um":

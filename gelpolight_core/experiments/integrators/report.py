@@ -13,7 +13,7 @@ from gelpolight_core.report.document import Drawing, Listing, Section
 from gelpolight_core.report.drawing import draw
 from gelpolight_core.translation import tr
 
-LOOKS = {
+STYLES = {
     "sine_4": ("#009e73", "^"),
     "weighted": ("#00603b", "o"),
     "bilateral": ("#8a3ffc", "v"),
@@ -50,7 +50,7 @@ def paint_integrators(figure: Figure, points: Sequence[IntegratorPoint]) -> None
         mine = sorted(
             (p for p in points if p.name == name and p.scene == "bump"), key=lambda p: p.side
         )
-        colour, marker = LOOKS[name]
+        colour, marker = STYLES[name]
         shown = [(p.median_ms, max(p.mean_um, LEAST_UM)) for p in mine]
         axes.plot(
             *zip(*shown, strict=True),
