@@ -40,6 +40,7 @@ SETTINGS_OF_PYTEST_QT = ("qt_api", "qt_log_level_fail")
 # it, so that nothing is compiled twice.
 LONGEST_FIRST = (
     "test_accuracy_on_rendered_sensors.py",
+    "golden/test_golden.py",
     "image/test_camera_response.py",
     "reflectance/test_detect_ball.py",
     "measurement/test_measure.py",
