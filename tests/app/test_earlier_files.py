@@ -20,14 +20,18 @@ from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
+from gelpolight_core.session.decisions import PlacedCircle
 
 DATA = Path(__file__).resolve().parents[1] / "data"
-EARLIER, CLOSED, PRESENT = "2026-11-21", "2026-11-23-closed", "2026-11-23"
+EARLIER, CLOSED, LATER = "2026-11-21", "2026-11-23-closed", "2026-11-23"
+NEWEST = "2026-11-25"
 SENSOR = "workspace/sensors/small-1"
 # six balls at this size leave a height error of 4 to 8 %, which the calibrations state themselves.
 # The true press: a cylinder of 5 mm, 1 mm deep. Pixels of 0.16 mm blur its edge by half of that,
 # and six balls at this size leave height errors of 4 to 8 %, which the calibrations state.
 DIAMETER_MM, HEIGHT_MM = 5.0, 1.0
+# Deepest node of the height maps as they were written.
+DEEPEST_MM = {EARLIER: 0.94, LATER: 0.94, NEWEST: 0.958}
 
 
 def frames(folder: str) -> list[RecordedFrame]:
@@ -49,9 +53,11 @@ def workspace(tmp_path: Path, request: pytest.FixtureRequest) -> Workspace:
     ("folder", "name", "size_error_mm", "height_error_mm"),
     [
         (EARLIER, "first", 0.08, 0.08),
-        (PRESENT, "first", 0.08, 0.08),
+        (LATER, "first", 0.08, 0.08),
+        (NEWEST, "first", 0.08, 0.08),
         (CLOSED, "closed", 0.25, 0.03),
-        (PRESENT, "closed", 0.25, 0.03),
+        (LATER, "closed", 0.25, 0.03),
+        (NEWEST, "closed", 0.25, 0.03),
     ],
 )
 def test_a_calibration_measures_the_recorded_press(
@@ -66,9 +72,10 @@ def test_a_calibration_measures_the_recorded_press(
     assert found.height_mm == pytest.approx(HEIGHT_MM, abs=height_error_mm)
 
 
-def test_an_earlier_calibration_gives_the_depth_of_its_own_program() -> None:
-    calibration = read_calibration(DATA / EARLIER / SENSOR / "first.gplcal")
-    then = read_npz(DATA / EARLIER / "height_map/cylinder_s5_d100.npz")
+@pytest.mark.parametrize("folder", [EARLIER, NEWEST])
+def test_an_earlier_calibration_gives_the_depth_of_its_own_program(folder: str) -> None:
+    calibration = read_calibration(DATA / folder / SENSOR / "first.gplcal")
+    then = read_npz(DATA / folder / "height_map/cylinder_s5_d100.npz")
 
     now = Reconstructor(calibration).depth(frames(EARLIER)[1].rgb)
 
@@ -77,10 +84,10 @@ def test_an_earlier_calibration_gives_the_depth_of_its_own_program() -> None:
     difference_um = 1000.0 * np.abs(now.depth_mm - then.depth_mm)
     # Images are sharpened now: walls are steeper.
     assert np.percentile(difference_um, 99) < 20.0
-    assert then.depth_mm.max() == pytest.approx(0.94, abs=0.01)
+    assert then.depth_mm.max() == pytest.approx(DEEPEST_MM[folder], abs=0.01)
 
 
-@pytest.mark.parametrize("folder", [EARLIER, PRESENT])
+@pytest.mark.parametrize("folder", [EARLIER, LATER, NEWEST])
 def test_an_exported_height_map_keeps_its_metric_grid(folder: str) -> None:
     header, _, values = (
         (DATA / folder / "height_map/cylinder_s5_d100.gsf").read_bytes().partition(b"\0")
@@ -92,10 +99,10 @@ def test_an_exported_height_map_keeps_its_metric_grid(folder: str) -> None:
 
     assert (columns, rows) == (100, 100)
     assert float(stated["XReal "]) == pytest.approx(0.0163, abs=2e-4)
-    assert np.nanmax(depth_m) == pytest.approx(0.94e-3, abs=0.01e-3)
+    assert 1000.0 * np.nanmax(depth_m) == pytest.approx(DEEPEST_MM[folder], abs=0.01)
 
 
-@pytest.mark.parametrize("folder", [EARLIER, PRESENT])
+@pytest.mark.parametrize("folder", [EARLIER, LATER, NEWEST])
 def test_a_recording_keeps_frames_numbers_and_description(folder: str) -> None:
     with Recording.open(DATA / folder / SENSOR / "recordings/press.gplrec") as recording:
         header = recording.header
@@ -112,7 +119,7 @@ def test_a_recording_keeps_frames_numbers_and_description(folder: str) -> None:
     assert np.abs(pressed.rgb.astype(int) - untouched.rgb).max() > 50
 
 
-@pytest.mark.parametrize("workspace", [EARLIER, PRESENT], indirect=True)
+@pytest.mark.parametrize("workspace", [EARLIER, LATER, NEWEST], indirect=True)
 def test_a_workspace_knows_its_calibration_validation_and_records(workspace: Workspace) -> None:
     entry = next(entry for entry in workspace.entries() if entry.in_use)
     kept = workspace.records.measurements()
@@ -130,7 +137,7 @@ def test_a_workspace_knows_its_calibration_validation_and_records(workspace: Wor
     assert workspace.uses(kept[0].calibration_id)[0] == 1
 
 
-@pytest.mark.parametrize("workspace", [EARLIER, PRESENT], indirect=True)
+@pytest.mark.parametrize("workspace", [EARLIER, LATER, NEWEST], indirect=True)
 def test_a_lab_keeps_its_indenters(workspace: Workspace) -> None:
     pin, block = read_indenters(workspace.folder)
 
@@ -148,6 +155,19 @@ def test_an_unfinished_session_continues(workspace: Workspace) -> None:
     assert entry.serial == "small-1"
 
 
+@pytest.mark.parametrize("workspace", [NEWEST], indirect=True)
+def test_a_session_keeps_the_decisions_about_its_images(workspace: Workspace) -> None:
+    sessions = workspace.folder / "sensors/small-1/sessions"
+    opened = open_project(sessions / "unfinished").session.decisions
+    closed = open_project(sessions / "closed").session
+
+    assert opened.excluded == {"balls/ball_00.png", "checkerboard/view_03.png"}
+    assert opened.spots_px == {1: (40.5, 60.25)}
+    assert opened.curves == {2: ((0.2, 0.15), (0.6, 0.55), (1.0, 1.0))}
+    assert closed.decisions.balls == {"ball_01.png": PlacedCircle(96.5, 80.25, 14.0)}
+    assert [path.name for path in closed.found("balls")] == ["ball_00.png", "ball_01.png"]
+
+
 @pytest.mark.parametrize("workspace", [CLOSED], indirect=True)
 def test_a_closed_session_has_its_scale_and_balls(workspace: Workspace) -> None:
     project = open_project(workspace.folder / "sensors/small-1/sessions/closed")
@@ -157,7 +177,7 @@ def test_a_closed_session_has_its_scale_and_balls(workspace: Workspace) -> None:
     assert project.session.ball_radii_mm["ball_01.png"] == 4.0
 
 
-@pytest.mark.parametrize("folder", [EARLIER, PRESENT])
+@pytest.mark.parametrize("folder", [EARLIER, LATER, NEWEST])
 def test_settings_of_the_window_are_kept(folder: str, tmp_path: Path) -> None:
     file = Path(shutil.copy(DATA / folder / "desktop.ini", tmp_path))
     settings = Settings(file)

@@ -63,6 +63,12 @@ def keep_session(session: Path, target: Path, files: list[str]) -> None:
         shutil.copyfile(session / name, target / name)
 
 
+def decide(session: Path, **decided: Any) -> None:
+    """Write decisions about the images of a session."""
+    decisions = named("gelpolight_core.session.decisions:Decisions")
+    named("gelpolight_core.session.decisions:write_decisions")(decisions(**decided), session)
+
+
 def write_recording(session: Path, path: Path, calibration_id: str) -> None:
     """Record the background and the press, with a lost frame between them."""
     header = named("gelpolight_core.recording.recording:RecordingHeader")
@@ -150,6 +156,9 @@ def make_open(out: Path, scratch: Path) -> None:
     unfinished = ["session.toml", "background/background.png", "mirror/mirror.png",
                   "balls/ball_00.png", "checkerboard/view_00.png"]  # fmt: skip
     keep_session(session, path.parent / "sessions/unfinished", unfinished)
+    excluded = frozenset({"balls/ball_00.png", "checkerboard/view_03.png"})
+    decide(path.parent / "sessions/unfinished", excluded=excluded, spots_px={1: (40.5, 60.25)},
+           curves={2: ((0.2, 0.15), (0.6, 0.55), (1.0, 1.0))})  # fmt: skip
     write_recording(session, path.parent / "recordings/press.gplrec", calibration.identity)
     measurement = write_records(workspace, calibration, session)
     write_lab_files(workspace, calibration, measurement, path)
@@ -177,6 +186,9 @@ def make_closed(out: Path, scratch: Path) -> None:
         *(f"balls/ball_{n:02d}.png" for n in range(3)),
     ]
     keep_session(session, sensor / "sessions/closed", kept)
+    circle = named("gelpolight_core.session.decisions:PlacedCircle")(96.5, 80.25, 14.0)
+    decide(sensor / "sessions/closed", excluded=frozenset({"balls/ball_02.png"}),
+           balls={"ball_01.png": circle})  # fmt: skip
     run("calibrate", session, "-o", sensor / "closed.gplcal")
 
 
