@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from gelpolight_core.translation import pattern
 
 
@@ -32,6 +34,10 @@ class InputError(Exception):
         self.where = where
         self.advice = advice
         super().__init__(found, where, advice)
+
+    def __reduce__(self) -> tuple[partial[InputError], tuple[str]]:
+        """Return what a copy in another process is made from."""
+        return partial(type(self), where=self.where, advice=self.advice), (self.found,)
 
     @property
     def text(self) -> str:

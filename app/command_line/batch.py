@@ -6,24 +6,23 @@ import argparse
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from tqdm import tqdm
 
-from app.command_line.reconstructing import add_effort, add_model, load_reconstructor
+from app.command_line.inputs import frame_slice
+from app.command_line.reconstructing import add_effort, add_format, add_model, load_reconstructor
 from app.command_line.terminal import say
-from gelpolight_core.batch.cluster import ClusterRunner
-from gelpolight_core.batch.plan import Selection, plan_batch
-from gelpolight_core.batch.processes import ProcessRunner
-from gelpolight_core.batch.run import BatchProgress, Runner, run_batch
+from gelpolight_core.batch.plan import plan_batch
+from gelpolight_core.batch.results import SUMMARY, FrameRow, last_line
+from gelpolight_core.batch.run import BatchProgress, run_batch
 from gelpolight_core.batch.settings import BatchSettings
-from gelpolight_core.batch.summary import FILE as SUMMARY
-from gelpolight_core.batch.summary import last_line
+from gelpolight_core.batch.workers import Workers, cluster, processes
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.heightmap_files import FORMATS
 from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.translation import tr
 
@@ -50,23 +49,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=tr("folder of the run; an unfinished run is continued"),
     )
     parser.add_argument(
-        "--formats",
-        "--format",
-        default="npz",
-        metavar="LIST",
-        help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
-    )
-    parser.add_argument(
         "--frames",
+        type=frame_slice,
         default="",
-        metavar="A:B",
+        metavar="A:B:N",
         help=tr(
-            "for each recording and folder: frames from A, counted from 0, up to but not "
+            "for each recording and folder: every N-th frame from A, counted from 0, up to but not "
             "including B"
         ),
-    )
-    parser.add_argument(
-        "--every", type=int, default=1, metavar="N", help=tr("only every N-th of these frames")
     )
     parser.add_argument(
         "--measure",
@@ -76,20 +66,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             shapes=", ".join(SHAPES)
         ),
     )
-    runners = parser.add_mutually_exclusive_group()
-    runners.add_argument(
+    parser.add_argument(
         "--workers",
-        type=int,
-        choices=range(1, 257),
-        default=1,
-        metavar="N",
-        help=tr("number of worker processes on this machine, each on its own core (default: 1)"),
+        type=_workers,
+        default="1",
+        metavar="N|ADDRESS",
+        help=tr(
+            "number of worker processes on this machine, each on its own core (default: 1), or "
+            "address of the scheduler of a Dask cluster"
+        ),
     )
-    runners.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help=tr("address of a Dask cluster to use instead"),
-    )
+    add_format(parser)
     add_effort(parser)
     add_model(parser)
     parser.set_defaults(run=run)
@@ -97,15 +84,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Reconstruct every frame that has no result yet, and write the summary."""
-    formats = _formats(options.formats)
-    selection = _selection(options.frames, options.every)
     # Reports problems of the calibration here, before every worker would.
     reconstructor = load_reconstructor(
         options.calibration, model=options.model, effort=options.effort
     )
     calibration = reconstructor.calibration
     out = options.output.absolute()
-    plan = plan_batch(options.inputs, out, calibration, selection)
+    plan = plan_batch(options.inputs, out, calibration, options.frames)
     for note in plan.notes:
         say(note, file=sys.stderr)
     settings = BatchSettings(
@@ -113,56 +98,46 @@ def run(options: argparse.Namespace) -> int:
         calibration.identity,
         reconstructor.model,
         options.effort,
-        formats,
+        options.format,
         options.measure,
     )
-    runner: Runner = (
-        ClusterRunner(settings, out, options.scheduler)
-        if options.scheduler
-        else ProcessRunner(settings, out, options.workers)
-    )
-    with _stopped_by_ctrl_c() as stopped, _Progress() as report:
-        progress = run_batch(plan, settings, out, runner, report=report, stopped=stopped)
+    bar = tqdm(total=len(plan), file=sys.stderr, unit=tr("frame"), smoothing=0)
+    with _stopped_by_ctrl_c() as stopped, bar:
+        progress = run_batch(
+            plan, settings, out, options.workers, report=partial(_show, bar), stopped=stopped
+        )
     return _report(progress, options.output)
 
 
-class _Progress:
-    """A progress bar on stderr, with a line for each frame that could not be used."""
-
-    def __init__(self) -> None:
-        self._bar: tqdm[Any] | None = None
-
-    def __enter__(self) -> Callable[[BatchProgress], None]:
-        """Return the function that receives the progress."""
-        return self._report
-
-    def __exit__(self, *details: object) -> None:
-        """Close the bar."""
-        if self._bar is not None:
-            self._bar.close()
-
-    def _report(self, progress: BatchProgress) -> None:
-        if self._bar is None:
-            self._bar = tqdm(
-                total=progress.total, initial=progress.before, file=sys.stderr, unit=tr("frame")
-            )
-        if progress.row is None:
-            return
-        if progress.row.error and progress.bad <= SHOWN_FAULTS:
-            tqdm.write(_bad_line(progress), file=sys.stderr)
-        self._bar.update()
+def _workers(text: str) -> AbstractContextManager[Workers]:
+    """Return the workers of the argument."""
+    if not text.isdecimal():
+        return cluster(text)
+    if int(text) < 1:
+        raise InputError(
+            tr("At least one worker is needed"),
+            where="--workers",
+            advice=tr("Give the number of cores to use, or the address of a Dask scheduler"),
+        )
+    return processes(int(text))
 
 
-def _bad_line(progress: BatchProgress) -> str:
-    row = progress.row
-    assert row is not None
+def _show(bar: tqdm[Any], progress: BatchProgress) -> None:
+    """Show the progress, and a line for a frame that could not be used."""
+    if progress.row and progress.row.error and progress.bad <= SHOWN_FAULTS:
+        tqdm.write(_bad_line(progress.row, last=progress.bad == SHOWN_FAULTS), file=sys.stderr)
+    bar.initial = progress.before
+    bar.update(progress.total - progress.left - bar.n)
+
+
+def _bad_line(row: FrameRow, *, last: bool) -> str:
     where = row.input
     if row.frame is not None:
         where = tr("{path}, frame {n}").format(path=where, n=row.frame)
     reason = last_line(row.error)
     for known in (row.input, Path(row.input).name):
         reason = reason.removeprefix(f"{known}: ")
-    if progress.bad == SHOWN_FAULTS:
+    if last:
         reason += tr(" (the summary lists further frames)")
     return f"{where}: {reason}"
 
@@ -183,8 +158,8 @@ def _report(progress: BatchProgress, out: Path) -> int:
             n=done, folder=out, before=progress.before
         )
     )
-    if progress.faults:
-        raise RuntimeError(f"{progress.faults} frames, see batch.jsonl in {out}")
+    if progress.internal:
+        raise RuntimeError(f"{progress.internal} frames, see batch.jsonl in {out}")
     if progress.bad:
         raise InputError(
             tr("{n} of {total} frames could not be used").format(
@@ -215,32 +190,3 @@ def _stopped_by_ctrl_c() -> Iterator[Callable[[], bool]]:
         yield lambda: asked
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _formats(text: str) -> tuple[str, ...]:
-    formats = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    unknown = sorted(set(formats) - set(FORMATS))
-    if unknown or not formats:
-        raise InputError(
-            tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
-            where="--formats",
-            advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
-        )
-    return formats
-
-
-def _selection(frames: str, every: int) -> Selection:
-    first, colon, end = frames.partition(":")
-    try:
-        selection = Selection(int(first or 0), int(end) if end else None, every)
-        if frames and not colon:
-            selection = Selection(selection.first, selection.first + 1, every)
-    except ValueError:
-        selection = Selection(-1)
-    if selection.first < 0 or every < 1 or (selection.end or 1) <= 0:
-        raise InputError(
-            tr("{text} selects no frames").format(text=frames if every >= 1 else every),
-            where="--frames" if every >= 1 else "--every",
-            advice=tr("Give whole numbers, as in --frames 0:1000 --every 10"),
-        )
-    return selection

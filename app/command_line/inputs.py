@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -126,23 +127,19 @@ class Inputs:
 
 
 def frame_range(text: str, count: int, *, where: str) -> range:
-    """Return the frames of "a:b": from a, counted from 0, up to but not including b.
+    """Return the frames of a recording that :func:`frame_slice` selects.
 
     Raises
     ------
     InputError
-        If it is not a range or contains no frame.
+        If there are none.
     """
     if not count:
         raise InputError(
             tr("The recording contains no frames"), where=where, advice=tr("Choose another one")
         )
-    first, colon, last = text.partition(":")
-    try:
-        begin, end = int(first or 0), int(last or count) if colon or not text else int(first) + 1
-    except ValueError:
-        begin, end = 0, -1
-    if not 0 <= begin < min(end, count):
+    selected = range(count)[frame_slice(text)]
+    if not selected:
         raise InputError(
             tr("{text} selects none of the {count} frames").format(text=text, count=count),
             where="--frames",
@@ -150,7 +147,27 @@ def frame_range(text: str, count: int, *, where: str) -> range:
                 "Give the first frame, counted from 0, and the last frame plus one, as in 0:{n}"
             ).format(n=count),
         )
-    return range(begin, min(end, count))
+    return selected
+
+
+def frame_slice(text: str) -> slice:
+    """Return the frames of "a:b:n": every n-th from a, counted from 0, up to but not including b.
+
+    Raises
+    ------
+    InputError
+        If it is not such a text.
+    """
+    match = re.fullmatch(r"(\d*)(:?)(\d*)(?::([1-9]\d*))?", text)
+    if match is None:
+        raise InputError(
+            tr("{text} selects no frames").format(text=text),
+            where="--frames",
+            advice=tr("Give whole numbers, as in --frames 0:1000 or --frames 0:1000:10"),
+        )
+    first, colon, end, step = match.groups()
+    last = int(end) if end else int(first) + 1 if first and not colon else None
+    return slice(int(first or 0), last, int(step or 1))
 
 
 def _of_file(path: Path) -> Input:

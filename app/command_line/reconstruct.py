@@ -14,13 +14,14 @@ from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import (
     add_despite_faults,
     add_effort,
+    add_format,
     add_model,
     load_reconstructor,
     trace_lines,
 )
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
+from gelpolight_core.export.heightmap_files import ending, write_heightmap
 from gelpolight_core.export.preview import write_preview
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.translation import tr
@@ -33,12 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "images", type=Path, nargs="+", metavar="IMAGE", help=tr("images and recordings")
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
-    parser.add_argument(
-        "--format",
-        default="npz",
-        metavar="LIST",
-        help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
-    )
+    add_format(parser)
     parser.add_argument(
         "--pictures", action="store_true", help=tr("also save an image of each depth map (PNG)")
     )
@@ -50,8 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--frames",
         default="",
-        metavar="A:B",
-        help=tr("frames of a recording from A, counted from 0, up to but not including B"),
+        metavar="A:B:N",
+        help=tr(
+            "every N-th frame of a recording from A, counted from 0, up to but not including B"
+        ),
     )
     parser.add_argument(
         "--explain",
@@ -66,14 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Reconstruct every image and write its files."""
-    formats = [name.strip() for name in options.format.split(",") if name.strip()]
-    unknown = sorted(set(formats) - set(FORMATS))
-    if unknown or not formats:
-        raise InputError(
-            tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
-            where="--format",
-            advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
-        )
+    formats = options.format
     if options.uncertainty and "npz" not in formats:
         raise InputError(
             tr("Only npz can contain standard deviations"),

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.heightmap_files import FORMATS
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
@@ -42,6 +44,29 @@ def add_despite_faults(parser: argparse.ArgumentParser) -> None:
             "LED off; by default they are refused"
         ),
     )
+
+
+def add_format(parser: argparse.ArgumentParser) -> None:
+    """Add ``--format``, a list of formats."""
+    parser.add_argument(
+        "--format",
+        type=_formats,
+        default="npz",
+        metavar="LIST",
+        help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
+    )
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    formats = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    unknown = sorted(set(formats) - set(FORMATS))
+    if unknown or not formats:
+        raise InputError(
+            tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
+            where="--format",
+            advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
+        )
+    return formats
 
 
 def add_effort(parser: argparse.ArgumentParser) -> None:

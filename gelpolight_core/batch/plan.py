@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,6 @@ from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import SUFFIXES
 from gelpolight_core.translation import tr
-
-DIGITS = 6
-"""Least number of digits of a frame number in the name of its result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,70 +50,22 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
-class Selection:
-    """Selection of frames of every recording, and of images of every folder.
+class Source:
+    """A recording, or the images of a folder.
 
     Attributes
     ----------
-    first, end : int, int or None
-        From `first`, counted from 0, up to but not including `end`; None means to the last.
-    every : int
-        Step: the first of these, and every n-th after it.
+    output : str
+        Folder of its results, relative to the folder of the run.
+    count : int
+        Number of its frames.
+    job : callable
+        Returns the frame of an index.
     """
 
-    first: int = 0
-    end: int | None = None
-    every: int = 1
-
-    def of(self, count: int) -> range:
-        """Return the selected indices for a number of frames."""
-        return range(self.first, count if self.end is None else min(self.end, count), self.every)
-
-
-@dataclass(frozen=True, slots=True)
-class _Images:
-    """Images of one folder."""
-
-    folder: Path
-    names: tuple[str, ...]
     output: str
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    @property
-    def stems(self) -> Iterator[str]:
-        return (_joined(self.output, os.path.splitext(name)[0]) for name in self.names)
-
-    def job(self, index: int) -> Job:
-        path = self.folder / self.names[index]
-        output = _joined(self.output, os.path.splitext(self.names[index])[0])
-        try:
-            found = path.stat()
-        except OSError:  # the worker reports why it cannot be read
-            return Job(path, None, output, "")
-        return Job(path, None, output, f"{found.st_size} {found.st_mtime_ns}")
-
-
-@dataclass(frozen=True, slots=True)
-class _Frames:
-    """Frames of a recording; if it cannot be opened, a single frame that reports this."""
-
-    path: Path
-    output: str
-    started: str = ""
-    numbers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    @property
-    def stems(self) -> Iterator[str]:
-        yield f"{self.output}/"
-
-    def job(self, index: int) -> Job:
-        output = f"{self.output}/{self.path.stem}_{index:0{DIGITS}d}"
-        return Job(self.path, index, output, frame_stamp(self.started, self.numbers[index]))
+    count: int
+    job: Callable[[int], Job]
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,34 +76,28 @@ class BatchPlan:
     ----------
     sources : tuple
         Recordings, and image folders.
-    selection : Selection
-        Which of their frames.
+    selection : slice
+        Which frames of each source.
     notes : tuple of str
         Notes for the user.
     """
 
-    sources: tuple[_Images | _Frames, ...]
-    selection: Selection
+    sources: tuple[Source, ...]
+    selection: slice
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return sum(len(self.selection.of(len(source))) for source in self.sources)
+        return sum(len(range(source.count)[self.selection]) for source in self.sources)
 
     def __iter__(self) -> Iterator[Job]:
         """Yield the frames one by one."""
         for source in self.sources:
-            for index in self.selection.of(len(source)):
-                yield source.job(index)
-
-    @property
-    def folders(self) -> set[str]:
-        """The folders of the results, relative to the folder of the run."""
-        return {source.output for source in self.sources}
+            yield from map(source.job, range(source.count)[self.selection])
 
 
 def plan_batch(
-    inputs: Sequence[Path], out: Path, calibration: Calibration, selection: Selection
+    inputs: Sequence[Path], out: Path, calibration: Calibration, selection: slice
 ) -> BatchPlan:
     """Find the frames of recordings, images and folders, including subfolders.
 
@@ -169,8 +112,8 @@ def plan_batch(
         Folder of the results; its content is not an input.
     calibration : Calibration
         Must match the recordings.
-    selection : Selection
-        Which frames.
+    selection : slice
+        Which frames of each recording and of each folder, counted from 0.
 
     Raises
     ------
@@ -178,29 +121,44 @@ def plan_batch(
         If an input does not exist or lies in `out`, a recording has another sensor or size, two
         results would have the same name, or there are no frames.
     """
-    found = _Found(out.resolve(), calibration)
+    finder = _Finder(out.resolve(), calibration)
     for path in inputs:
-        found.take(path.absolute())
-    plan = BatchPlan(tuple(found.sources), selection, tuple(found.notes))
+        finder.add(path.absolute())
+    images = [
+        _images(folder, names, output="") for folder, names in finder.images_by_folder.items()
+    ]
+    plan = BatchPlan((*images, *finder.sources), selection, tuple(finder.notes))
     if not len(plan):
         raise InputError(
             tr("There are no frames to reconstruct"),
             where=", ".join(map(str, inputs)),
             advice=tr("Choose recordings, images (PNG or TIFF) or folders of them"),
         )
-    _refuse_twins(plan)
+    used: set[str] = set()
+    for job in plan:
+        name = job.output.casefold()  # some file systems ignore upper and lower case
+        if name in used:
+            raise InputError(
+                tr("Two inputs would have results named {name}").format(name=job.output),
+                where=tr("INPUT"),
+                advice=tr(
+                    "Give their common folder instead, or use a separate folder for each run"
+                ),
+            )
+        used.add(name)
     return plan
 
 
-class _Found:
-    """Collects the contents of the inputs."""
+class _Finder:
+    """Finds the contents of the inputs."""
 
     def __init__(self, out: Path, calibration: Calibration) -> None:
         self._out, self._calibration = out, calibration
-        self.sources: list[_Images | _Frames] = []
+        self.images_by_folder: dict[Path, list[str]] = {}
+        self.sources: list[Source] = []
         self.notes: list[str] = []
 
-    def take(self, path: Path) -> None:
+    def add(self, path: Path) -> None:
         """Add an input given by the user."""
         resolved = path.resolve()
         if not resolved.exists():
@@ -216,56 +174,49 @@ class _Found:
                 advice=tr("Choose another folder for the results"),
             )
         if resolved.is_dir():
-            self._take_folder(path, resolved.name)
-        elif _seems_recording(path):
-            self._take_recording(path, "")
-        elif self.sources and _goes_on(self.sources[-1], path):
-            before = self.sources.pop()
-            assert isinstance(before, _Images)
-            self.sources.append(_Images(path.parent, (*before.names, path.name), ""))
+            self._add_folder(path, resolved.name)
+        elif path.suffix.lower() == ENDING or is_recording(path):
+            self._add_recording(path, "")
         else:
-            self.sources.append(_Images(path.parent, (path.name,), ""))
+            self.images_by_folder.setdefault(path.parent, []).append(path.name)
 
-    def _take_folder(self, folder: Path, output: str) -> None:
+    def _add_folder(self, folder: Path, output: str) -> None:
         """Add a folder and its subfolders; hidden ones are left out."""
-        images, recordings, folders, others = [], [], [], 0
-        with os.scandir(folder) as entries:
-            for entry in entries:
-                if entry.name.startswith("."):
-                    continue
-                if entry.is_dir(follow_symlinks=False):
-                    folders.append(entry.name)
-                elif entry.name.lower().endswith(SUFFIXES):
-                    images.append(entry.name)
-                elif entry.name.lower().endswith(ENDING):
-                    recordings.append(entry.name)
-                else:
-                    others += 1
-        if images:
-            self.sources.append(_Images(folder, tuple(sorted(images)), output))
-        for name in sorted(recordings):
-            self._take_recording(folder / name, output)
-        if others:
-            self.notes.append(
-                tr(
-                    "{folder}: {n} files are neither PNG, TIFF nor recordings and were left out"
-                ).format(folder=folder, n=others)
+        for root, folders, files in os.walk(folder, onerror=_raise):
+            folders[:] = sorted(
+                name
+                for name in folders
+                if not name.startswith(".") and Path(root, name).resolve() != self._out
             )
-        for name in sorted(folders):
-            if (folder / name).resolve() != self._out:
-                self._take_folder(folder / name, _joined(output, name))
+            place = str(PurePosixPath(output, Path(root).relative_to(folder).as_posix()))
+            names = sorted(name for name in files if not name.startswith("."))
+            images = [name for name in names if name.lower().endswith(SUFFIXES)]
+            recordings = [name for name in names if name.lower().endswith(ENDING)]
+            if images:
+                self.sources.append(_images(Path(root), images, place))
+            for name in recordings:
+                self._add_recording(Path(root, name), place)
+            if others := len(names) - len(images) - len(recordings):
+                self.notes.append(
+                    tr(
+                        "{folder}: {n} files are neither PNG, TIFF nor recordings and were left out"
+                    ).format(folder=root, n=others)
+                )
 
-    def _take_recording(self, path: Path, output: str) -> None:
-        output = _joined(output, path.stem)
+    def _add_recording(self, path: Path, output: str) -> None:
+        started, numbers = "", np.zeros(1, np.int64)
         try:
             recording = Recording.open(path)
-        except InputError:  # the single frame of this source reports the reason
-            self.sources.append(_Frames(path, output))
-            return
-        with recording:
-            require_match(recording, self._calibration)
-            self.notes += [f"{path}: {note}" for note in recording_notes(recording)]
-            self.sources.append(_Frames(path, output, recording.header.started, recording.numbers))
+        except InputError:
+            pass  # the only frame of this source reports the reason
+        else:
+            with recording:
+                require_match(recording, self._calibration)
+                self.notes += [f"{path}: {note}" for note in recording_notes(recording)]
+                started, numbers = recording.header.started, recording.numbers
+        output = str(PurePosixPath(output, path.stem))
+        job = partial(_recorded_frame, path, output, started, numbers)
+        self.sources.append(Source(output, len(numbers), job))
 
 
 def frame_stamp(started: str, number: int) -> str:
@@ -273,42 +224,26 @@ def frame_stamp(started: str, number: int) -> str:
     return f"{started} {number}"
 
 
-def _seems_recording(path: Path) -> bool:
-    return path.suffix.lower() == ENDING or is_recording(path)
+def _images(folder: Path, names: Sequence[str], output: str) -> Source:
+    return Source(output, len(names), partial(_image, folder, names, output))
 
 
-def _goes_on(source: _Images | _Frames, path: Path) -> bool:
-    """Return whether an image is in the same folder as the previous one."""
-    return isinstance(source, _Images) and not source.output and source.folder == path.parent
+def _image(folder: Path, names: Sequence[str], output: str, index: int) -> Job:
+    path = folder / names[index]
+    try:
+        status = path.stat()
+        stamp = f"{status.st_size} {status.st_mtime_ns}"
+    except OSError:  # the worker reports why it cannot be read
+        stamp = ""
+    return Job(path, None, str(PurePosixPath(output, path.stem)), stamp)
 
 
-def _refuse_twins(plan: BatchPlan) -> None:
-    # Some file systems ignore upper and lower case.
-    names = Counter(stem.casefold() for source in plan.sources for stem in source.stems)
-    twins = [name for name, count in names.items() if count > 1]
-    frames = {
-        f"{source.output}/{source.path.stem}".casefold(): len(source)
-        for source in plan.sources
-        if isinstance(source, _Frames)
-    }
-    for name in names:  # an image may have the same name as a frame of a recording next to it
-        stem, _, number = name.rpartition("_")
-        if stem not in frames or not number.isdecimal():
-            continue
-        index = int(number)
-        if number == f"{index:0{DIGITS}d}" and index in plan.selection.of(frames[stem]):
-            raise InputError(
-                tr("An image has the same name as the result of a frame: {name}").format(name=name),
-                where=tr("INPUT"),
-                advice=tr("Process its folder and the recording in separate runs"),
-            )
-    if twins:
-        raise InputError(
-            tr("Two inputs would have results named {name}").format(name=twins[0]),
-            where=tr("INPUT"),
-            advice=tr("Give their common folder instead, or use a separate folder for each run"),
-        )
+def _recorded_frame(
+    path: Path, output: str, started: str, numbers: NDArray[np.int64], index: int
+) -> Job:
+    stamp = frame_stamp(started, numbers[index])
+    return Job(path, index, f"{output}/{path.stem}_{index:06d}", stamp)
 
 
-def _joined(folder: str, name: str) -> str:
-    return f"{folder}/{name}" if folder else name
+def _raise(error: OSError) -> None:
+    raise error

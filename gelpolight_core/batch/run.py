@@ -8,29 +8,32 @@ it at the end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from gelpolight_core.batch.frame_work import Halt, Outcome
-from gelpolight_core.batch.ledger import FILE as LEDGER
-from gelpolight_core.batch.ledger import BatchLedger, FrameRow
 from gelpolight_core.batch.plan import BatchPlan, Job
+from gelpolight_core.batch.results import FrameRow, finished_frames, keep_rows, write_summary
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
-from gelpolight_core.batch.stopping import Stopped, never, workers_may_go_on
-from gelpolight_core.batch.summary import write_summary
+from gelpolight_core.batch.work import failed, work
+from gelpolight_core.batch.workers import Workers
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import ending
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import marked, tr, translated
 
-Runner = Callable[[Iterator[Job], int, Stopped], Generator[list[Outcome], None, None]]
-"""Processes frames: arguments are the frames, their count and whether to stop; yields outcomes."""
+POLL_S = 0.5
+"""Longest delay until a request to stop is noticed."""
+ENDED = marked(
+    "Several processes ended while working on this frame; there may be too little memory"
+)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class BatchProgress:
     """Progress of a run.
 
@@ -38,7 +41,7 @@ class BatchProgress:
     ----------
     total, before : int
         Frames of the plan, and those completed in earlier runs.
-    done, bad, faults : int
+    done, bad, internal : int
         Frames completed now, frames without a result, and those of them with an internal error.
     row : FrameRow or None
         The last frame; None at the beginning.
@@ -48,7 +51,7 @@ class BatchProgress:
     before: int
     done: int = 0
     bad: int = 0
-    faults: int = 0
+    internal: int = 0
     row: FrameRow | None = None
 
     @property
@@ -56,31 +59,15 @@ class BatchProgress:
         """Number of frames not yet processed."""
         return self.total - self.before - self.done - self.bad
 
-    def after(self, row: FrameRow) -> BatchProgress:
-        """Return the progress after another frame."""
-        bad = bool(row.error)
-        return BatchProgress(
-            self.total,
-            self.before,
-            self.done + (not bad),
-            self.bad + bad,
-            self.faults + row.ours,
-            row,
-        )
-
-
-def _ignored(progress: BatchProgress) -> None:
-    """Ignore progress."""
-
 
 def run_batch(
     plan: BatchPlan,
     settings: BatchSettings,
     out: Path,
-    runner: Runner,
+    workers: AbstractContextManager[Workers],
     *,
-    report: Callable[[BatchProgress], None] = _ignored,
-    stopped: Stopped = never,
+    report: Callable[[BatchProgress], object],
+    stopped: Callable[[], bool],
 ) -> BatchProgress:
     """Process the frames of a plan that have no result yet; write the summary when all are done.
 
@@ -94,12 +81,12 @@ def run_batch(
         Settings for the frames.
     out : Path
         Folder of the run, created if it does not exist.
-    runner : callable
-        Processes the frames: a :class:`~gelpolight_core.batch.processes.ProcessRunner` or a
-        :class:`~gelpolight_core.batch.cluster.ClusterRunner`.
-    report : callable, optional
+    workers : context manager
+        :func:`~gelpolight_core.batch.workers.processes` or
+        :func:`~gelpolight_core.batch.workers.cluster`.
+    report : callable
         Called with the progress, at the beginning and after each frame.
-    stopped : callable, optional
+    stopped : callable
         Returns whether to stop; frames already begun are completed.
 
     Raises
@@ -111,66 +98,84 @@ def run_batch(
     make_folder(out)
     with RunLock(out):
         begin_or_go_on(settings, out)
-        workers_may_go_on(out)
-        for folder in sorted(plan.folders):
+        for folder in {source.output for source in plan.sources}:
             make_folder(out / folder)
-            _remove_parts(out / folder)
-        ledger = BatchLedger(out / LEDGER)
+            for part in (out / folder).glob(".*.part"):  # left by a killed process
+                part.unlink(missing_ok=True)
+        finished = finished_frames(out)
         endings = [ending(name) for name in settings.formats]
 
         def is_done(job: Job) -> bool:
-            return ledger.has(job.output, job.stamp) and all(
+            return (job.output, job.stamp) in finished and all(
                 (out / f"{job.output}.{name}").is_file() for name in endings
             )
 
-        before = sum(map(is_done, plan))
-        progress = BatchProgress(len(plan), before)
+        progress = BatchProgress(len(plan), sum(map(is_done, plan)))
         report(progress)
         if progress.left:
             jobs = (job for job in plan if not is_done(job))
-            progress = _do(jobs, progress, ledger, runner, report, stopped)
+            try:
+                with workers as opened:
+                    for rows in _rows(opened, partial(work, settings, out), jobs, stopped):
+                        keep_rows(rows, out)
+                        for row in rows:
+                            progress.row = row
+                            progress.done += not row.error
+                            progress.bad += bool(row.error)
+                            progress.internal += row.internal
+                            report(progress)
+            except InputError as error:
+                raise InputError(
+                    tr("{found}; {n} of {total} frames are done").format(
+                        found=error.found, n=progress.before + progress.done, total=progress.total
+                    ),
+                    where=error.where,
+                    advice=tr("{advice}. Run the same command again to continue").format(
+                        advice=error.advice
+                    ),
+                ) from error
         if not progress.left:
-            write_summary(ledger, out, measured=settings.shape is not None)
+            write_summary(out, measured=settings.measure is not None)
     return progress
 
 
-def _do(
+def _rows(
+    workers: Workers,
+    task: Callable[[Job], FrameRow],
     jobs: Iterator[Job],
-    progress: BatchProgress,
-    ledger: BatchLedger,
-    runner: Runner,
-    report: Callable[[BatchProgress], None] = _ignored,
-    stopped: Stopped = never,
-) -> BatchProgress:
-    halt: Halt | None = None
-    try:
-        with closing(runner(jobs, progress.left, stopped)) as results:
-            for outcomes in results:
-                rows = [outcome for outcome in outcomes if isinstance(outcome, FrameRow)]
-                ledger.keep(rows)
-                for row in rows:
-                    progress = progress.after(row)
-                    report(progress)
-                halt = halt or next((one for one in outcomes if isinstance(one, Halt)), None)
-        if halt is not None:
-            raise halt.error()
-    except InputError as error:
-        raise _left_at(error, progress) from error
-    return progress
+    stopped: Callable[[], bool],
+) -> Iterator[list[FrameRow]]:
+    """Yield rows as they arrive; after a stop or an error, only those of frames already begun.
 
-
-def _left_at(error: InputError, progress: BatchProgress) -> InputError:
-    """Return an error that also reports the progress of the run."""
-    return InputError(
-        tr("{found}; {n} of {total} frames are done").format(
-            found=error.found, n=progress.before + progress.done, total=progress.total
-        ),
-        where=error.where,
-        advice=tr("{advice}. Run the same command again to continue").format(advice=error.advice),
-    )
-
-
-def _remove_parts(folder: Path) -> None:
-    """Remove incomplete files left by killed processes."""
-    for path in folder.glob(".*.part"):
-        path.unlink(missing_ok=True)
+    When a worker ends, as without memory, its frames are repeated one by one, so that only a frame
+    that ends a worker alone is left out.
+    """
+    running: dict[Future[FrameRow], Job] = {}
+    repeated: list[Job] = []
+    halt: InputError | None = None
+    while True:
+        while halt is None and len(running) < (1 if repeated else workers.most()) and not stopped():
+            job = repeated[0] if repeated else next(jobs, None)
+            if job is None:
+                break
+            running[workers.submit(task, job)] = job
+        if not running:
+            break
+        rows = []
+        for future in wait(running, POLL_S, FIRST_COMPLETED).done:
+            job = running.pop(future)
+            try:
+                rows.append(future.result())
+            except InputError as error:
+                halt = error
+            except workers.ended:
+                if job not in repeated:
+                    repeated.append(job)
+                    continue
+                rows.append(failed(job, translated(ENDED)))
+            if job in repeated:
+                repeated.remove(job)
+        if rows:
+            yield rows
+    if halt is not None:
+        raise halt

@@ -10,9 +10,10 @@ from gelpolight_core.io.atomic import cannot_write, sync_folder
 
 
 def append_durably(path: Path, content: bytes) -> None:
-    """Append to a file, created if it does not exist, and flush it to disk.
+    """Append whole lines to a file, created if it does not exist, and flush them to disk.
 
-    If the disk refuses it, the file keeps its old end as far as possible.
+    If the disk refuses them, the file keeps its old end as far as possible. A line that a crash cut
+    off is ended first.
 
     Raises
     ------
@@ -22,8 +23,11 @@ def append_durably(path: Path, content: bytes) -> None:
     try:
         is_new = not path.exists()
         # Unbuffered: data left in a buffer would be written again when the file is closed.
-        with path.open("ab", buffering=0) as file:
+        with path.open("a+b", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
+            file.seek(max(size - 1, 0))
+            if size and file.read(1) != b"\n":
+                content = b"\n" + content
             try:
                 _write_all(file.fileno(), content)
             except OSError:

@@ -47,8 +47,6 @@ class Ledger:
     def __init__(self, path: Path | None, name: str) -> None:
         self._path, self._name = path, name
         self._known: dict[str, Measurement | str] = {}
-        # A line that a crash cut off is ignored; the next entry begins on a new line.
-        self._torn = False
         if path is None:
             return
         try:
@@ -57,7 +55,6 @@ class Ledger:
             return
         except UnicodeDecodeError as error:
             raise _damaged(path) from error
-        self._torn = bool(lines[-1])
         for line in lines:
             self._take_in(line)
 
@@ -88,8 +85,7 @@ class Ledger:
             return
         plain = stored(outcome) if isinstance(outcome, str) else _as_json(outcome)
         line = json.dumps({"key": key, "outcome": plain}, separators=(",", ":")) + "\n"
-        append_durably(self._path, ("\n" + line if self._torn else line).encode())
-        self._torn = False
+        append_durably(self._path, line.encode())
 
     def _take_in(self, line: str) -> None:
         """Read one line; the press of an incomplete line is measured again."""

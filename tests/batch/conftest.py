@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.batch.frame_work import Halt, Outcome, work
-from gelpolight_core.batch.plan import BatchPlan, Job, Selection, plan_batch
-from gelpolight_core.batch.run import BatchProgress, Runner, run_batch
+from gelpolight_core.batch.plan import BatchPlan, plan_batch
+from gelpolight_core.batch.results import FrameRow
+from gelpolight_core.batch.run import BatchProgress, run_batch
 from gelpolight_core.batch.settings import BatchSettings
-from gelpolight_core.batch.stopping import Stopped
+from gelpolight_core.batch.workers import Workers
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.errors import InputError
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.sensor_calibration import Calibration
+
+ALL = slice(None)
 
 
 @pytest.fixture(scope="session")
@@ -56,25 +62,25 @@ def settings(calibration_file: Path, small_calibration: Calibration) -> BatchSet
 def plan(small_calibration: Calibration) -> Callable[..., BatchPlan]:
     """Return a function that plans a run."""
 
-    def make(*inputs: Path, out: Path, selection: Selection | None = None) -> BatchPlan:
-        return plan_batch(inputs, out, small_calibration, selection or Selection())
+    def make(*inputs: Path, out: Path, selection: slice = ALL) -> BatchPlan:
+        return plan_batch(inputs, out, small_calibration, selection)
 
     return make
 
 
-def in_this_process(settings: BatchSettings, out: Path) -> Runner:
-    """Return a runner without any other process."""
+@contextmanager
+def in_this_process(*_: object) -> Iterator[Workers]:
+    """Yield a worker without any other process."""
 
-    def run(
-        jobs: Iterator[Job], count: int, stopped: Stopped
-    ) -> Generator[list[Outcome], None, None]:
-        while not stopped() and (job := next(jobs, None)) is not None:
-            outcomes = work(settings, out, [job])
-            yield outcomes
-            if any(isinstance(outcome, Halt) for outcome in outcomes):
-                return
+    def submit(function: Callable[..., object], *arguments: object) -> Future[object]:
+        future: Future[object] = Future()
+        try:
+            future.set_result(function(*arguments))
+        except InputError as error:
+            future.set_exception(error)
+        return future
 
-    return run
+    yield Workers(submit, lambda: 1, BrokenProcessPool)
 
 
 Go = Callable[..., BatchProgress]
@@ -84,16 +90,28 @@ Go = Callable[..., BatchProgress]
 def go(settings: BatchSettings, plan: Callable[..., BatchPlan]) -> Go:
     """Return a function that runs a batch, optionally only until a number of frames is done."""
 
-    def run(*inputs: Path, out: Path, until: int | None = None, **changes: object) -> BatchProgress:
-        runner = changes.pop("runner", None) or in_this_process(settings, out)
-        rows: list[BatchProgress] = []
+    def run(
+        *inputs: Path,
+        out: Path,
+        until: int | None = None,
+        workers: AbstractContextManager[Workers] | None = None,
+        selection: slice = ALL,
+        after: Callable[[FrameRow], object] = lambda _: None,
+    ) -> BatchProgress:
+        reported: list[FrameRow | None] = []
+
+        def report(progress: BatchProgress) -> None:
+            reported.append(progress.row)
+            if progress.row is not None:
+                after(progress.row)
+
         return run_batch(
-            plan(*inputs, out=out, **changes),
+            plan(*inputs, out=out, selection=selection),
             settings,
             out,
-            runner,
-            report=rows.append,
-            stopped=lambda: until is not None and len(rows) > until,
+            workers or in_this_process(),
+            report=report,
+            stopped=lambda: until is not None and len(reported) > until,
         )
 
     return run

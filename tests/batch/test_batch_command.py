@@ -12,22 +12,13 @@ import pytest
 
 from app.command_line import batch
 from app.command_line.main import INTERRUPTED, MENDABLE, main
-from gelpolight_core.batch.frame_work import work
+from tests.batch.conftest import in_this_process
 
 
 @pytest.fixture
 def command(calibration_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Return a function that runs the command, without other processes."""
-
-    class InThisProcess:
-        def __init__(self, settings, out, workers):
-            self.settings, self.out = settings, out
-
-        def __call__(self, jobs, count, stopped):
-            while not stopped() and (job := next(jobs, None)) is not None:
-                yield work(self.settings, self.out, [job])
-
-    monkeypatch.setattr(batch, "ProcessRunner", InThisProcess)
+    monkeypatch.setattr(batch, "processes", in_this_process)
 
     def run(*arguments: str | Path) -> int:
         given = ["batch", calibration_file, *arguments, "--model", "paper"]
@@ -68,14 +59,14 @@ def test_a_bad_frame_is_named_and_counted_in_one_line(
 def test_ctrl_c_ends_with_the_frames_at_hand(
     command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    report = batch._Progress._report
+    show = batch._show
 
-    def pressed(self, progress):
-        report(self, progress)
+    def pressed(bar, progress):
+        show(bar, progress)
         if progress.done == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(batch._Progress, "_report", pressed)
+    monkeypatch.setattr(batch, "_show", pressed)
     assert command(day) == INTERRUPTED
     reported = capsys.readouterr().err
     assert "2 of 6 frames are done" in reported
@@ -84,13 +75,13 @@ def test_ctrl_c_ends_with_the_frames_at_hand(
 
 
 def test_frames_can_be_chosen(command, day: Path, tmp_path: Path) -> None:
-    assert command(day / "run.gplrec", "--frames", "1:4", "--every", "2") == 0
+    assert command(day / "run.gplrec", "--frames", "1:4:2") == 0
     made = sorted(path.name for path in (tmp_path / "out" / "run").iterdir())
     assert made == ["run_000001.npz", "run_000003.npz"]
 
 
 def test_what_is_pressed_can_be_measured(command, day: Path, tmp_path: Path) -> None:
-    assert command(day / "left" / "a.png", "--measure", "cuboid", "--formats", "tif") == 0
+    assert command(day / "left" / "a.png", "--measure", "cuboid", "--format", "tif") == 0
     head, row = (tmp_path / "out" / "batch.csv").read_text().splitlines()
     values = dict(zip(head.split(","), row.split(","), strict=True))
     assert values["shape"] == "cuboid"
@@ -102,9 +93,10 @@ def test_what_is_pressed_can_be_measured(command, day: Path, tmp_path: Path) -> 
     ("arguments", "words"),
     [
         (["--frames", "x"], "x selects no frames"),
-        (["--every", "0"], "--every: 0 selects no frames"),
+        (["--frames", "::0"], "--frames: ::0 selects no frames"),
+        (["--workers", "0"], "At least one worker is needed"),
         (["--frames", "99:"], "here are no frames"),
-        (["--formats", "doc"], "Unknown format doc"),
+        (["--format", "doc"], "Unknown format doc"),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(
@@ -127,11 +119,14 @@ def test_inputs_that_cannot_be_are_refused_in_one_line(
     (frames / "run" / "run_000003.png").write_bytes((day / "left" / "a.png").read_bytes())
     (frames / "run" / "run_000004.png").write_bytes((day / "left" / "a.png").read_bytes())
     for inputs, words in (
-        ([frames], "the result of a frame: frames/run/run_000003"),
+        ([frames], "Two inputs would have results named frames/run/run_000003"),
         ([tmp_path / "empty"], "here are no frames"),
         ([tmp_path / "none"], "The file or folder does not exist"),
         ([day, "-o", tmp_path], "The input is inside the folder of the results"),
-        ([day, tmp_path / "other" / "day"], "Two inputs would have results named day/run/"),
+        (
+            [day, tmp_path / "other" / "day"],
+            "Two inputs would have results named day/run/run_000000",
+        ),
     ):
         assert command(*inputs) == MENDABLE
         assert words in output(capsys)
@@ -148,8 +143,8 @@ def test_an_image_named_like_an_excluded_frame_is_accepted(
 
 def test_results_within_the_input_are_no_input(command, day: Path) -> None:
     out = day / "out"
-    assert command(day, "-o", out, "--formats", "png,tif") == 0
-    assert command(day, "-o", out, "--formats", "png,tif") == 0
+    assert command(day, "-o", out, "--format", "png,tif") == 0
+    assert command(day, "-o", out, "--format", "png,tif") == 0
     assert not (out / "day" / "out").exists()
 
 
@@ -157,5 +152,5 @@ def test_without_dask_the_command_says_what_to_install(
     command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert command(day, "--scheduler", "tcp://127.0.0.1:1") == MENDABLE
+    assert command(day, "--workers", "tcp://127.0.0.1:1") == MENDABLE
     assert "Dask is not installed" in output(capsys)

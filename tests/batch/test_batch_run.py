@@ -6,6 +6,7 @@ import csv
 import errno
 import multiprocessing
 import os
+import pickle
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -14,13 +15,15 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.batch import frame_work
-from gelpolight_core.batch.ledger import FILE as LEDGER
-from gelpolight_core.batch.ledger import BatchLedger
-from gelpolight_core.batch.plan import Selection
-from gelpolight_core.batch.processes import ProcessRunner
-from gelpolight_core.batch.run import BatchProgress, run_batch
+from gelpolight_core.batch import run as batch_run
+from gelpolight_core.batch import workers
+from gelpolight_core.batch.plan import Job
+from gelpolight_core.batch.results import FILE as ROWS
+from gelpolight_core.batch.results import FrameRow, finished_frames, keep_rows, write_summary
+from gelpolight_core.batch.run import run_batch
 from gelpolight_core.batch.settings import BatchSettings
+from gelpolight_core.batch.work import work
+from gelpolight_core.batch.workers import cluster, processes
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import write_heightmap
@@ -28,6 +31,7 @@ from gelpolight_core.io.lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.session.images import read_image
+from tests.batch.conftest import in_this_process
 
 
 def results(out: Path) -> dict[str, bytes]:
@@ -42,7 +46,7 @@ def table(out: Path) -> list[dict[str, str]]:
 
 
 def lines(out: Path) -> list[str]:
-    return (out / LEDGER).read_text().splitlines()
+    return (out / ROWS).read_text().splitlines()
 
 
 FRAMES = [f"day/run/run_{k:06d}" for k in range(4)]
@@ -99,12 +103,12 @@ def test_a_run_that_was_left_goes_on_without_doing_a_frame_again(
 
 
 def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> None:
-    """Half a line in the ledger, and half a file, do not count."""
+    """Half a line of the rows, and half a file, do not count."""
     out = tmp_path / "out"
     go(day, out=out, until=3)
     before = results(out)
-    text = (out / LEDGER).read_bytes()
-    (out / LEDGER).write_bytes(text[: len(text) - 40])
+    text = (out / ROWS).read_bytes()
+    (out / ROWS).write_bytes(text[: len(text) - 40])
     part = out / "day" / "run" / ".run_000000.npz.0123abcd.part"
     part.write_bytes(b"half")
     assert (go(day, out=out).before, len(table(out))) == (2, 6)
@@ -113,7 +117,7 @@ def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> Non
     assert go(day, out=out).before == 6
 
 
-def test_the_table_can_be_made_again_from_the_ledger(go, day: Path, tmp_path: Path) -> None:
+def test_the_table_can_be_made_again_from_the_rows(go, day: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     go(day, out=out)
     text = (out / "batch.csv").read_bytes()
@@ -151,7 +155,7 @@ def test_frames_that_cannot_be_used_are_noted_and_the_others_done(
     data[-100] ^= 0xFF
     (day / "run.gplrec").write_bytes(data)
     progress = go(day, out=out)
-    assert (progress.done, progress.bad, progress.faults) == (4, 4, 0)
+    assert (progress.done, progress.bad, progress.internal) == (4, 4, 0)
     errors = {row["output"]: row["error"] for row in table(out) if row["error"]}
     assert "not a complete PNG" in errors["day/left/a"]
     assert "the calibration is for" in errors["day/left/small"]
@@ -175,7 +179,7 @@ def test_an_internal_error_costs_one_frame_and_is_recorded(
     monkeypatch.setattr(Reconstructor, "depth", faulty)
     out = tmp_path / "out"
     progress = go(day, out=out)
-    assert (progress.done, progress.faults) == (5, 1)
+    assert (progress.done, progress.internal) == (5, 1)
     assert table(out)[1]["error"] == "ValueError: a shape that nobody thought of"
     assert "Traceback" in lines(out)[-1]
 
@@ -207,7 +211,7 @@ def test_another_model_in_the_same_folder_is_refused(
     go(day, out=out, until=1)
     for other, words in (
         (replace(settings, effort="fast"), "started with effort best, but now it is fast"),
-        (replace(settings, identity="B-1"), "calibration_id"),
+        (replace(settings, calibration_id="B-1"), "calibration_id"),
         (replace(settings, formats=("npz",)), "formats npz,tif, but now it is npz"),
         (replace(settings, program="9.9"), "program"),
     ):
@@ -216,7 +220,7 @@ def test_another_model_in_the_same_folder_is_refused(
                 plan(day, out=out),
                 other,
                 out,
-                ProcessRunner(other, out, 1),
+                in_this_process(),
                 report=lambda _: None,
                 stopped=lambda: False,
             )
@@ -232,119 +236,85 @@ def test_a_run_that_another_program_works_at_is_left_alone(go, day: Path, tmp_pa
 
 def test_a_part_of_a_day_can_be_done_first(go, day: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert go(day, out=out, selection=Selection(0, None, 3)).done == 3
-    assert go(day, out=out, selection=Selection(1, 3)).done == 3
+    assert go(day, out=out, selection=slice(0, None, 3)).done == 3
+    assert go(day, out=out, selection=slice(1, 3)).done == 3
     assert (go(day, out=out).before, len(results(out))) == (6, 12)
 
 
-def test_two_processes_give_the_same_bits_and_one_may_be_killed(
-    go, settings: BatchSettings, day: Path, tmp_path: Path
+def ends_its_process(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
+    """Work on a frame; one frame ends its process once, and another one always."""
+    marker = out / "ended"
+    if job.name == "b.png" or (job.index == 2 and not marker.exists()):
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return work(settings, out, job)
+
+
+def test_a_killed_process_costs_only_the_frame_that_kills_every_process(
+    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The frame of the killed worker is given to another."""
+    """All other frames have the same bits as in one process."""
     out, alone = tmp_path / "out", tmp_path / "alone"
     go(day, out=alone)
-    killed: list[int] = []
-
-    class KillsOne(ProcessRunner):
-        def __call__(self, jobs, count, stopped):
-            for outcomes in super().__call__(jobs, count, stopped):
-                if outcomes and not killed:
-                    victim = multiprocessing.active_children()[0]
-                    os.kill(victim.pid, signal.SIGKILL)
-                    killed.append(victim.pid)
-                yield outcomes
-
-    progress = go(day, out=out, runner=KillsOne(settings, out, 2))
-    assert killed
-    assert (progress.done, progress.bad) == (6, 0)
-    assert results(out) == results(alone)
+    monkeypatch.setattr(batch_run, "work", ends_its_process)
+    progress = go(day, out=out, workers=processes(2))
+    assert (progress.done, progress.bad) == (5, 1)
+    (error,) = [row["error"] for row in table(out) if row["error"]]
+    assert "Several processes ended" in error
+    expected = results(alone)
+    assert results(out) == {name: expected[name] for name in expected if "left/b." not in name}
     assert len(lines(out)) == 6
     assert not multiprocessing.active_children()
 
 
-def test_the_frame_that_ends_every_process_is_left_out(
-    settings: BatchSettings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """It does not delay the others."""
-    from gelpolight_core.batch import processes
-    from gelpolight_core.batch.plan import Job
-
-    def dies(settings, out):
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(target=os._exit, args=(9,), daemon=True)
-        process.start()
-        theirs.close()
-        return process, ours
-
-    monkeypatch.setattr(processes, "_begin", dies)
-    job = Job(Path("a.png"), None, "a", "")
-    runner = ProcessRunner(settings, tmp_path, 1)
-    found = [row for rows in runner(iter([job]), 1, lambda: False) for row in rows]
-    assert [row.output for row in found] == ["a"]
-    assert "Several processes ended" in found[0].error
-
-
-def test_a_worker_that_does_not_see_the_run_halts_it(
+def test_a_worker_that_does_not_see_the_run_ends_it(
     settings: BatchSettings, tmp_path: Path
 ) -> None:
     """As on a cluster whose machines have other folders."""
-    (halt,) = frame_work.work(settings, tmp_path / "elsewhere", [])
-    assert isinstance(halt, frame_work.Halt)
-    assert "cannot be read" in str(halt.error())
+    with pytest.raises(InputError, match="each worker has access to this folder") as reported:
+        work(settings, tmp_path / "elsewhere", Job(Path("a.png"), None, "a", ""))
+    assert str(pickle.loads(pickle.dumps(reported.value))) == str(reported.value)
 
 
-def test_an_invalid_line_of_the_ledger_is_skipped(tmp_path: Path) -> None:
-    path = tmp_path / LEDGER
-    path.write_text('{"output": 3}\n[1]\nnonsense\n{"output":"a","notes":5}\n')
-    ledger = BatchLedger(path)
-    row = frame_work.FrameRow("a", "1", "a.png", notes=("näher",))
-    ledger.keep([row])
-    ledger.keep([replace(row, output="b", error="torn")])
-    for held in (ledger, BatchLedger(path)):
-        assert held.has("a", "1")
-        assert not held.has("a", "2")
-        assert not held.has("b", "1")
-        assert list(held.rows()) == [row, replace(row, output="b", error="torn")]
+def test_an_invalid_line_of_the_rows_is_skipped(tmp_path: Path) -> None:
+    (tmp_path / ROWS).write_text('{"output": 3}\n[1]\nnonsense\n{"output":"a","notes":5}\n')
+    row = FrameRow("a_2", "1", "a.png", notes=("näher",))
+    keep_rows([row, replace(row, output="a_10"), replace(row, output="b", error="torn")], tmp_path)
+    assert finished_frames(tmp_path) == {("a_2", "1"), ("a_10", "1")}
+    write_summary(tmp_path, measured=False)
+    assert [line["output"] for line in table(tmp_path)] == ["a_2", "a_10", "b"]
+    assert table(tmp_path)[0]["notes"] == "näher"
 
 
 def test_dask_gives_the_same_bits_and_survives_a_killed_worker(
-    go, settings: BatchSettings, day: Path, tmp_path: Path
+    go, day: Path, tmp_path: Path
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    from gelpolight_core.batch.cluster import ClusterRunner
-
     out, alone = tmp_path / "out", tmp_path / "alone"
     go(day, out=alone)
-    reported: list[BatchProgress] = []
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None
-    ) as cluster:
-        pids = [nanny.pid for nanny in cluster.workers.values()]
+    ) as local:
+        pids = [nanny.pid for nanny in local.workers.values()]
 
-        class KillsOne(ClusterRunner):
-            def __call__(self, jobs, count, stopped):
-                for outcomes in super().__call__(jobs, count, stopped):
-                    if outcomes and not reported:
-                        os.kill(pids[0], signal.SIGKILL)
-                        reported.append(BatchProgress(0, 0))
-                    yield outcomes
+        def kill_one(_: object) -> None:
+            if pids:
+                os.kill(pids.pop(), signal.SIGKILL)
+                pids.clear()
 
-        runner = KillsOne(settings, out, cluster.scheduler_address)
-        progress = go(day, out=out, runner=runner)
+        progress = go(day, out=out, workers=cluster(local.scheduler_address), after=kill_one)
+    assert not pids
     assert (progress.done, progress.bad) == (6, 0)
     assert results(out) == results(alone)
 
 
 def test_a_scheduler_that_does_not_answer_is_refused(
-    settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed")
-    from gelpolight_core.batch import cluster
-
-    monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
-    with pytest.raises(InputError, match="Dask scheduler does not respond"):
-        cluster.ClusterRunner(settings, tmp_path, "tcp://127.0.0.1:9")
+    monkeypatch.setattr(workers, "ANSWER_S", 0.3)
+    with pytest.raises(InputError, match="Dask scheduler does not respond; 0 of 6"):
+        go(day, out=tmp_path / "out", workers=cluster("tcp://127.0.0.1:9"))
 
 
 def test_a_long_running_worker_detects_a_replaced_recording(
@@ -363,5 +333,5 @@ def test_a_long_running_worker_detects_a_replaced_recording(
     assert (again.done + first.done, again.bad) == (4, 0)
     (late,) = list(plan(path, out=out))[3:]
     frames_of_before = replace(late, stamp="2026-11-22T08:00:00+00:00 3")
-    (row,) = frame_work.work(settings, out, [frames_of_before])
+    row = work(settings, out, frames_of_before)
     assert "has changed since the run was started" in row.error

@@ -16,31 +16,31 @@ import statistics
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
-from gelpolight_core.batch.cluster import ClusterRunner
-from gelpolight_core.batch.ledger import FrameRow
-from gelpolight_core.batch.plan import Selection, plan_batch
-from gelpolight_core.batch.processes import ProcessRunner
-from gelpolight_core.batch.run import BatchProgress, Runner, run_batch
+from gelpolight_core.batch.plan import plan_batch
+from gelpolight_core.batch.results import FrameRow
+from gelpolight_core.batch.run import BatchProgress, run_batch
 from gelpolight_core.batch.settings import BatchSettings
+from gelpolight_core.batch.workers import Workers, cluster, processes
 from gelpolight_core.calibration.file import read_calibration
 
 
 @contextmanager
-def workers(way: str, count: int, settings: BatchSettings, out: Path) -> Iterator[Runner]:
-    """Yield what hands out the frames, with `count` workers of one thread each."""
-    with ExitStack() as open_until_the_end:
-        if way == "processes":
-            yield ProcessRunner(settings, out, count)
-            return
-        from distributed import LocalCluster
+def opened(kind: str, count: int) -> Iterator[Workers]:
+    """Yield workers of one thread each."""
+    if kind == "processes":
+        with processes(count) as workers:
+            yield workers
+        return
+    from distributed import LocalCluster
 
-        cluster = open_until_the_end.enter_context(
-            LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None)
-        )
-        yield ClusterRunner(settings, out, cluster.scheduler_address)
+    with (
+        LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None) as local,
+        cluster(local.scheduler_address) as workers,
+    ):
+        yield workers
 
 
 def processor_s() -> float:
@@ -59,16 +59,16 @@ def measure(options: argparse.Namespace, out: Path) -> None:
         options.effort,
         tuple(options.formats.split(",")),
     )
-    plan = plan_batch([options.recording], out, calibration, Selection(end=options.frames))
+    plan = plan_batch([options.recording], out, calibration, slice(options.frames))
     reported: list[tuple[float, FrameRow]] = []
 
-    def progress(progress: BatchProgress) -> None:
+    def report(progress: BatchProgress) -> None:
         if progress.row is not None:
             reported.append((time.perf_counter(), progress.row))
 
     began, used_s = time.perf_counter(), processor_s()
-    with workers(options.way, options.workers, settings, out) as runner:
-        run_batch(plan, settings, out, runner, progress=progress, stopped=lambda: False)
+    workers = opened(options.way, options.workers)
+    run_batch(plan, settings, out, workers, report=report, stopped=lambda: False)
     used_s = processor_s() - used_s
     # Outcomes come in groups: what the first group took is the start.
     first_s, last_s = reported[0][0], reported[-1][0]

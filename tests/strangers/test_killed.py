@@ -9,7 +9,7 @@ from killing import lines_until_killed
 
 from app.workspace.indenters import read_indenters
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.ledger import BatchLedger
+from gelpolight_core.batch.results import finished_frames
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol_run import open_run
@@ -27,7 +27,7 @@ from recorded import noisy
 from written import calibration
 from app.workspace.indenters import first_indenters, write_indenters
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.ledger import BatchLedger, FrameRow
+from gelpolight_core.batch.results import FrameRow, keep_rows
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.ledger import Ledger
@@ -42,7 +42,7 @@ for name in ("run", "session"):
     (root / name).mkdir()
 (root / "session" / "session.toml").write_text(session_toml(SensorDesign()))
 run = begin_run(root / "run", Protocol(), serial="A", calibration="c")
-ledger, rows = Ledger(root / "measured.jsonl", "c"), BatchLedger(root / "frames.jsonl")
+ledger = Ledger(root / "measured.jsonl", "c")
 session, workspace = read_session(root / "session"), Workspace(root / "workspace")
 made = calibration()
 
@@ -56,7 +56,7 @@ for number, press in enumerate(run.wanted):
     progress("refusal", number)
     ledger.keep(f"k{number}", "no object is pressed")
     progress("measurement", number)
-    rows.keep([FrameRow(f"a{number}", "s", "a.png")])
+    keep_rows([FrameRow(f"a{number}", "s", "a.png")], root)
     progress("frame", number)
     radii = {f"ball_{k}.png": 2.0 for k in range(number + 1)}
     write_description(replace(session, ball_radii_mm=radii))
@@ -94,8 +94,8 @@ def test_what_was_reported_is_there_and_all_files_are_whole(seed: int, tmp_path:
     assert run.progress.refused >= len(by_kind.get("refusal", []))
     ledger = Ledger(tmp_path / "measured.jsonl", "c")
     assert all(ledger.find(f"k{number}") for number in by_kind.get("measurement", []))
-    rows = BatchLedger(tmp_path / "frames.jsonl")
-    assert all(rows.has(f"a{number}", "s") for number in by_kind.get("frame", []))
+    finished = finished_frames(tmp_path)
+    assert all((f"a{number}", "s") in finished for number in by_kind.get("frame", []))
     session = read_session(tmp_path / "session")
     assert len(session.ball_radii_mm) >= len(by_kind.get("radius", []))
     workspace = Workspace(tmp_path / "workspace")

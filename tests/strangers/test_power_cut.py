@@ -15,7 +15,7 @@ from recorded import noisy, write_recording
 from written import KINDS, RECORD, Written, calibration
 
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.ledger import BatchLedger, FrameRow
+from gelpolight_core.batch.results import FILE, FrameRow, finished_frames, keep_rows
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.ledger import Ledger
@@ -98,19 +98,17 @@ def test_measurements_of_a_run_cut_anywhere_keep_every_whole_line_and_go_on(tmp_
 
 
 def test_frames_of_a_batch_cut_anywhere_keep_every_whole_line_and_go_on(tmp_path: Path) -> None:
-    path = tmp_path / "frames.jsonl"
-    BatchLedger(path).keep([FrameRow(f"a{k}", "s", "a.png") for k in range(3)])
+    path = tmp_path / FILE
+    keep_rows([FrameRow(f"a{k}", "s", "a.png") for k in range(3)], tmp_path)
     content = path.read_bytes()
     for size in range(1, len(content) + 1, 3):
         path.write_bytes(content[:size])
-        again = BatchLedger(path)
         whole = lines_before(content, size)
-        assert [again.has(f"a{k}", "s") for k in range(3)] == [k < whole for k in range(3)]
-        again.keep([FrameRow("new", "s", "a.png")])
-        names = [f"a{k}" for k in range(whole)] + ["new"]
-        assert [row.output for row in again.rows()] == names
+        expected = {(f"a{k}", "s") for k in range(whole)}
+        assert finished_frames(tmp_path) == expected
+        keep_rows([FrameRow("new", "s", "a.png")], tmp_path)
         # A line of which only the end was missing is whole again now.
-        assert {row.output for row in BatchLedger(path).rows()} - {f"a{whole}"} == set(names)
+        assert finished_frames(tmp_path) - {(f"a{whole}", "s")} == expected | {("new", "s")}
 
 
 def test_refusals_cut_anywhere_leave_the_run_as_it_is(tmp_path: Path) -> None:

@@ -14,9 +14,8 @@ from recorded import noisy
 from app.workspace.indenters import first_indenters, write_indenters
 from app.workspace.validation import Comparison, Validation, write_validation
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.ledger import BatchLedger, FrameRow
+from gelpolight_core.batch.results import FILE, FrameRow, keep_rows, write_summary
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
-from gelpolight_core.batch.summary import write_summary
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.board_page import write_board
@@ -145,14 +144,13 @@ def _ledger(folder: Path, which: int) -> None:
 
 
 def _rows(folder: Path, which: int) -> None:
-    BatchLedger(folder / "frames.jsonl").keep([FrameRow(f"a{which}", "s", "a.png")])
+    keep_rows([FrameRow(f"a{which}", "s", "a.png")], folder)
 
 
 def _summary(folder: Path, which: int) -> None:
-    path = folder / "frames.jsonl"
-    if not path.exists():
-        BatchLedger(path).keep([FrameRow(f"a{k}", "s", "a.png") for k in range(3)])
-    write_summary(BatchLedger(path), folder, measured=bool(which))
+    if not (folder / FILE).exists():
+        keep_rows([FrameRow(f"a{k}", "s", "a.png") for k in range(3)], folder)
+    write_summary(folder, measured=bool(which))
 
 
 def _settings(folder: Path, which: int) -> None:

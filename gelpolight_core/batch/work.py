@@ -1,0 +1,172 @@
+"""The work of a worker on one frame, for a local process and for a cluster.
+
+:func:`work` depends only on its arguments and the files they name, and may be called in any process
+any number of times: the same frame gives the same bits, and existing files are replaced by
+identical ones.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from contextlib import suppress
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from gelpolight_core import __version__
+from gelpolight_core.batch.plan import Job, frame_stamp
+from gelpolight_core.batch.results import FrameRow
+from gelpolight_core.batch.settings import BatchSettings, require_same
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.heightmap_files import write_heightmap
+from gelpolight_core.image.linear import linear_image
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.trust import judged
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.reader import Recording
+from gelpolight_core.recording.recording import RecordedFrame
+from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.translation import tr
+
+
+def work(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
+    """Reconstruct a frame and write its files; return its row for the results.
+
+    Parameters
+    ----------
+    settings : BatchSettings
+        Settings of the run; the calibration is read once per process.
+    out : Path
+        Folder of the run, created with the same settings.
+    job : Job
+        The frame.
+
+    Raises
+    ------
+    InputError
+        If no worker can continue, such as on a full disk. Errors of the frame are in its row.
+    """
+    with _one_at_a_time:
+        return _worker(settings, out).work(job)
+
+
+def failed(job: Job, error: str, *, internal: bool = False) -> FrameRow:
+    """Return the row of a frame without a result."""
+    return FrameRow(job.output, job.stamp, str(job.path), job.index, error=error, internal=internal)
+
+
+# Two threads of a process must not run the compiled loops at the same time.
+_one_at_a_time = threading.Lock()
+
+
+@lru_cache(maxsize=1)
+def _worker(settings: BatchSettings, out: Path) -> _Worker:
+    return _Worker(settings, out)
+
+
+class _Worker:
+    """Reconstructs frames of one calibration."""
+
+    def __init__(self, settings: BatchSettings, out: Path) -> None:
+        cv2.setNumThreads(1)  # each process has one core
+        # Also checks that this process can see the folder of the results.
+        require_same(replace(settings, program=__version__), out)
+        self._settings, self._out = settings, out
+        self._recording: Recording | None = None
+        calibration = read_calibration(settings.calibration)
+        if calibration.identity != settings.calibration_id:
+            raise InputError(
+                tr("The calibration was replaced while in use"),
+                where=str(settings.calibration),
+                advice=tr("Restore it, or start a separate run with the new one"),
+            )
+        self._reconstructor = Reconstructor(
+            calibration, model=settings.model, effort=settings.effort, workers=1
+        )
+
+    def work(self, job: Job) -> FrameRow:
+        """Reconstruct a frame, and write its files."""
+        began = time.process_time()
+        heightmap: HeightMap | None = None
+        try:
+            row, heightmap = self._reconstruct(job)
+            folder = (self._out / job.output).parent
+            write_heightmap(heightmap, folder, formats=self._settings.formats)
+        except InputError as error:
+            if heightmap is not None and isinstance(error.__cause__, OSError):
+                raise  # the disk refuses files, also those of other frames
+            row = failed(job, str(error))
+        except Exception:  # an internal error in one frame must not stop all others
+            row = failed(job, traceback.format_exc(), internal=True)
+        return replace(row, seconds=time.process_time() - began)
+
+    def _reconstruct(self, job: Job) -> tuple[FrameRow, HeightMap]:
+        row = FrameRow(job.output, job.stamp, str(job.path), job.index)
+        response = self._reconstructor.calibration.response
+        if job.index is None:
+            image = read_image(job.path, response=response)
+            require_colour(image, where=str(job.path))
+        else:
+            frame = self._recorded(job, job.index)
+            image = linear_image(frame.rgb, job.name, response=response)
+            row = replace(row, number=frame.number, time_s=frame.time_s)
+        shape = self._settings.measure
+        heightmap = self._reconstructor.depth(
+            image.rgb,
+            name=job.name,
+            normals=shape is None,
+            uncertainty=shape is not None,
+            health=self._reconstructor.health(image.rgb, name=job.name),
+        )
+        return _described(row, heightmap, shape), heightmap
+
+    def _recorded(self, job: Job, index: int) -> RecordedFrame:
+        """Return a frame; workers of a cluster live long, so its file may have been replaced."""
+        with suppress(InputError):
+            if self._recording is not None and self._recording.path == job.path:
+                return _frame(self._recording, job, index)
+        if self._recording is not None:
+            self._recording.close()
+            self._recording = None
+        self._recording = Recording.open(job.path)
+        return _frame(self._recording, job, index)
+
+
+def _frame(recording: Recording, job: Job, index: int) -> RecordedFrame:
+    started, numbers = recording.header.started, recording.numbers
+    if index < len(numbers) and frame_stamp(started, numbers[index]) == job.stamp:
+        return recording.frame(index)
+    raise InputError(
+        tr("Frame {n} has changed since the run was started").format(n=index),
+        where=str(job.path),
+        advice=tr("Repeat the command, which reads the recording again"),
+    )
+
+
+def _described(row: FrameRow, heightmap: HeightMap, shape: str | None) -> FrameRow:
+    """Return a row with the summary of a height map."""
+    inside = (heightmap.flags & int(Flag.OUTSIDE)) == 0
+    known = inside & np.isfinite(heightmap.depth_mm)
+    depth_mm = heightmap.depth_mm[known].astype(np.float64)
+    flagged = heightmap.flags[inside] != 0
+    row = replace(
+        row,
+        max_depth_mm=float(depth_mm.max()) if depth_mm.size else None,
+        volume_mm3=float(depth_mm.sum()) * heightmap.pitch_mm**2,
+        flagged_share=float(flagged.mean()) if flagged.size else None,
+        notes=heightmap.notes,
+    )
+    if shape is None:
+        return row
+    try:
+        measurement = judged(measure_heightmap(heightmap, shape=shape), heightmap)
+    except InputError as error:  # nothing is pressed, or something else
+        return replace(row, notes=(*row.notes, error.found))
+    return replace(row, measured=measurement.as_json())

@@ -1,0 +1,151 @@
+"""Workers behind one ``submit``: processes of this machine, or an existing Dask cluster.
+
+The workers of a cluster need the same version of this program, and the same folders under the same
+names; its scheduler distributes the frames.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+ANSWER_S = 10.0
+TASKS_PER_CORE = 3
+"""Tasks in the scheduler for each core, running and waiting, so that no core waits for its next."""
+THREADS = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+"""Environment variables of libraries that would start their own threads."""
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Where frames are sent to.
+
+    Attributes
+    ----------
+    submit : callable
+        Sends a function and its arguments to a worker; returns the future of the result.
+    most : callable
+        Returns how many tasks they may have at a time, running and waiting.
+    ended : type
+        The exception of a task whose worker ended.
+    """
+
+    submit: Callable[..., Future[Any]]
+    most: Callable[[], int]
+    ended: type[Exception]
+
+
+@contextmanager
+def processes(count: int) -> Iterator[Workers]:
+    """Yield processes of this machine with one thread each.
+
+    Parameters
+    ----------
+    count : int
+        Their number.
+    """
+    # Spawned: a forked process would inherit locks of threads that it does not have.
+    context = multiprocessing.get_context("spawn")
+
+    def open_pool() -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(count, context, _begin_process)
+
+    pool = open_pool()
+
+    def submit(*task: Any) -> Future[Any]:
+        nonlocal pool
+        try:
+            return pool.submit(*task)
+        except BrokenProcessPool:  # one process was killed, and the pool has ended the others
+            pool = open_pool()
+            return pool.submit(*task)
+
+    try:
+        yield Workers(submit, lambda: count + 1, BrokenProcessPool)
+    except KeyboardInterrupt:  # a second one: without waiting for the frames at work
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown()
+
+
+def _begin_process() -> None:
+    """Prepare a process: one thread, Ctrl-C is left to the main process, and it ends with that."""
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # this module loads no numerical library
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Workers]:
+    """Yield the workers of a Dask cluster.
+
+    Parameters
+    ----------
+    address : str
+        Address of the scheduler, such as ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, or the scheduler does not respond or fails.
+    """
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError as error:
+        raise InputError(
+            tr("Dask is not installed"),
+            where="--workers",
+            advice=tr("Install the program as gelpolight-studio[dask], or give a number"),
+        ) from error
+    try:
+        client = Client(address, timeout=ANSWER_S, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(
+            tr("The Dask scheduler does not respond"),
+            where=address,
+            advice=tr("Check that it is running and that the address is like tcp://10.0.0.1:8786"),
+        ) from error
+    with client:
+        # Not pure: the same frames may have to be repeated, and the result is the files.
+        submit = client.get_executor(pure=False).submit
+        try:
+            yield Workers(
+                submit, lambda: TASKS_PER_CORE * max(sum(client.ncores().values()), 1), KilledWorker
+            )
+        except InputError:
+            raise
+        except Exception as error:  # workers record all errors of frames: the cluster fails
+            raise InputError(
+                tr("The cluster does not work ({reason})").format(
+                    reason=str(error).partition("\n")[0] or type(error).__name__
+                ),
+                where=address,
+                advice=tr("Check that it is running and has this program on each worker"),
+            ) from error
