@@ -5,7 +5,6 @@
     ... --model paper          another model than the calibration's
     ... --source FOLDER|FILE   images or a recording in place of the virtual sensor
     ... --views surface        the views that are shown; all others are hidden
-    ... --rounds 30            open and close the page this often; time and memory of each
 
 The calibration has to be one of the virtual sensor, or of the sensor that the images are of; its
 image size is the camera's. On the virtual sensor an object is dragged about for half of the
@@ -17,13 +16,13 @@ painted; and what was computed for views that are hidden.
 from __future__ import annotations
 
 import argparse
-import gc
+import math
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from live_figures import DRAG_MS, dragger
 from probes import Lateness, Spent, ThreadTimes, reported, resident_mb
 from PySide6.QtCore import QEvent, QObject, QTimer
 from PySide6.QtWidgets import QApplication
@@ -40,6 +39,30 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 SIZE = 1280, 800
+DRAG_MS = 33
+ROUND_S = 8.0  # half of it the object is dragged, then it lies still
+
+
+def dragger(bench: Bench) -> Callable[[], None]:
+    """Return what moves the object in a circle, and now and then lays another one."""
+    began, camera = time.monotonic(), bench.design.camera
+    laid = -1
+
+    def move() -> None:
+        nonlocal laid
+        round_number, within = divmod(time.monotonic() - began, ROUND_S)
+        if int(round_number) != laid:
+            laid = int(round_number)
+            bench.lay(PRESSED[laid % len(PRESSED)])
+        if within < 0.5 * ROUND_S:
+            angle = 2.0 * math.pi * within / 4.0
+            radius = 0.15 * camera.height_px
+            bench.drag_to(
+                0.5 * camera.width_px + radius * math.cos(angle),
+                0.5 * camera.height_px + radius * math.sin(angle),
+            )
+
+    return move
 
 
 class Watch(QObject):
@@ -100,7 +123,7 @@ class Measurement:
         self._lateness = Lateness()
         self._move = QTimer()
         if context.source.bench is not None and not options.still:
-            self._move.timeout.connect(dragger(context.source.bench, PRESSED))
+            self._move.timeout.connect(dragger(context.source.bench))
             self._move.start(DRAG_MS)
         live = Reconstructor(calibration, model=options.model, effort=options.effort)
         self.page.depth.calibrations.loaded.emit(live, live)
@@ -159,36 +182,6 @@ class Measurement:
         self.page.close()
 
 
-def open_and_close(options: argparse.Namespace, context: AppContext) -> None:
-    """Open the page until its 3D view is drawn, and close it, again and again."""
-    memory_mb = []
-    for number in range(options.rounds):
-        measurement = Measurement(options, context)
-        began = time.monotonic()
-        measurement.start()
-        panel = measurement.page.views.surface
-        loaded_s = 0.0
-        while panel.view is None or panel.view.drawings < 2:
-            QApplication.processEvents()
-            # From the moment that there is something to draw.
-            if not loaded_s and panel._last is not None:
-                loaded_s = time.monotonic()
-        opened_s = time.monotonic() - loaded_s
-        measurement.stop()
-        measurement.page.deleteLater()
-        del measurement, panel
-        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-        QApplication.processEvents()
-        gc.collect()
-        memory_mb.append(resident_mb())
-        print(
-            f"round {number + 1}: first depth after {loaded_s - began:.2f} s, 3D {opened_s:.2f} s"
-            f" later; {memory_mb[-1]:.0f} MB"
-        )
-    later = memory_mb[len(memory_mb) // 3 :]
-    print(f"memory of the last two thirds: {later[0]:.0f} -> {later[-1]:.0f} MB")
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -199,13 +192,10 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--warm-up", type=float, default=12.0, help="seconds not measured")
     parser.add_argument("--views", default="surface,height,camera,look,bench")
-    parser.add_argument("--theme", default="light")
-    parser.add_argument("--rounds", type=int, default=0, help="open and close the page so often")
     parser.add_argument("--still", action="store_true", help="nothing is dragged")
-    parser.add_argument("--picture", type=Path, help="file for an image of the page at the end")
     options = parser.parse_args()
     application: Any = make_application()
-    theme.apply(application, options.theme)
+    theme.apply(application, "light")
     with tempfile.TemporaryDirectory() as folder:
         context = make_context(
             settings_file=Path(folder) / "desktop.ini", log_folder=Path(folder) / "log"
@@ -213,17 +203,12 @@ def main() -> None:
         context.workspace.folder = Path(folder) / "workspace"
         # As a person would have chosen it.
         context.settings.reconstruction = (options.model or "full", options.effort)
-        if options.rounds:
-            open_and_close(options, context)
-            return
         measurement = Measurement(options, context)
         measurement.start()
         QTimer.singleShot(int(1e3 * options.warm_up), measurement.begin)
         QTimer.singleShot(int(1e3 * (options.warm_up + options.seconds)), application.quit)
         application.exec()
         measurement.progress()
-        if options.picture is not None:
-            measurement.page.grab().save(str(options.picture))
         measurement.stop()
 
 

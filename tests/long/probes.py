@@ -9,56 +9,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer
-
-from app.sources.mailbox import Mailbox
-from app.sources.source import Frame
-from app.sources.stream import Stream, StreamFigures
+from PySide6.QtCore import Qt, QTimer
 
 TICK_MS = 5
-
-
-class WatchedBox:
-    """The stream's mailbox; notes which frame the view has taken."""
-
-    def __init__(self, box: Mailbox[Frame]) -> None:
-        self._box = box
-        self.fresh: Frame | None = None
-
-    def take(self) -> Frame | None:
-        """Return the newest frame."""
-        frame = self._box.take()
-        if frame is not None:
-            self.fresh = frame
-        return frame
-
-
-class WatchedStream:
-    """The stream as the view sees it."""
-
-    def __init__(self, stream: Stream) -> None:
-        self._stream = stream
-        self.newest = WatchedBox(stream.newest)
-
-    def figures(self) -> StreamFigures:
-        """Return the stream's figures."""
-        return self._stream.figures()
-
-
-class PaintWatch(QObject):
-    """Notes how old each frame is when the view begins to paint it."""
-
-    def __init__(self, box: WatchedBox) -> None:
-        super().__init__()
-        self._box = box
-        self.ages_ms: list[float] = []
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Look at paint events, and let all pass."""
-        if event.type() == QEvent.Type.Paint and self._box.fresh is not None:
-            self.ages_ms.append(1e3 * (time.monotonic() - self._box.fresh.time_s))
-            self._box.fresh = None
-        return False
 
 
 class Lateness:

@@ -13,7 +13,6 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from allocated import allocated_mb
 from probes import Lateness, resident_mb
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
@@ -35,10 +34,7 @@ LEAST_ALIKE = 6
 LEAST_RATE = 0.9
 # A message to the user that something is impossible is no error of the program.
 TOLD, FAULT = " app.services.toasts: ", "fault of this program"
-COUNTED = (
-    "rss_mb", "needed_mb", "held_mb", "spare_mb", "threads", "files", "widgets", "objects",
-    "timers", "windows",
-)  # fmt: skip
+COUNTED = ("rss_mb", "needed_mb", "threads", "files", "widgets", "objects", "timers", "windows")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +45,6 @@ class Row:
     emptied: bool  # sessions, runs and images that were open are put away
     rss_mb: float
     needed_mb: float  # the same, after the allocator has given back what it can
-    held_mb: float  # what the program has asked for; the system's allocator keeps more
-    rings_mb: float  # what refers to itself only: looked for, and let go, with nothing open
-    spare_mb: float  # what the allocator keeps of what was given back
     threads: int
     files: int
     widgets: int
@@ -158,16 +151,13 @@ class Look:
         self._lateness.late_ms.clear()
         log.look()
         objects = [o for w in QApplication.topLevelWidgets() for o in below(w, QObject)]
-        rings_mb = let_rings_go() if emptied else 0.0
-        held_mb, spare_mb = allocated_mb()
+        if emptied:
+            gc.collect()  # what refers to itself only waits for that, and is no leak
         row = Row(
             (time.monotonic() - began_s) / 60.0,
             emptied,
             resident_mb(),
             needed_mb(),
-            held_mb,
-            rings_mb,
-            spare_mb,
             threading.active_count(),
             len(os.listdir("/proc/self/fd")),
             len(QApplication.allWidgets()),
@@ -186,16 +176,6 @@ class Look:
         )
         self._lateness.late_ms.clear()
         return row
-
-
-def let_rings_go() -> float:
-    """Let go what refers to itself only, and return how much that was.
-
-    Python does so by itself now and then; what waits for it is no leak, but it may be much.
-    """
-    before_mb, _ = allocated_mb()
-    gc.collect()
-    return before_mb - allocated_mb()[0]
 
 
 def needed_mb() -> float:
@@ -245,13 +225,10 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
     alike, which = [row for row in warm if row.emptied], "with nothing open"
     if len(alike) < LEAST_ALIKE:
         alike, which = warm, "too few with nothing open, so all"
-    for name in ("held_mb", "needed_mb"):
-        reported, slope, low = grown(alike, name)
-        output.append(f"{name} at {len(alike)} rests ({which}): {reported}")
-        if name == "needed_mb" and low > MOST_GROWTH_MB_PER_H:
-            wrong.append(f"memory grows by {slope:.0f} MB per hour, at least by {low:.0f}")
-    rings_mb = [row.rings_mb for row in rows if row.emptied] or [0.0]
-    output.append(f"rings_mb: median {np.median(rings_mb):.0f}, at most {max(rings_mb):.0f}")
+    reported, slope, low = grown(alike, "needed_mb")
+    output.append(f"needed_mb at {len(alike)} rests ({which}): {reported}")
+    if low > MOST_GROWTH_MB_PER_H:
+        wrong.append(f"memory grows by {slope:.0f} MB per hour, at least by {low:.0f}")
     for name in ("made_hz", "processed_hz", "shown_hz", "cpu_ms", "late_ms", "late_at_work_ms"):
         first, last = thirds([getattr(row, name) for row in warm])
         output.append(f"{name}: median {first:.1f} in the first third, {last:.1f} in the last")
