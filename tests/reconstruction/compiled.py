@@ -1,10 +1,11 @@
-"""The compiled near-light solve on the fields that the scalar oracle takes."""
+"""The compiled near-light solve on plain arrays."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-from reference.near_light import RaySlopes, ShadedField
 
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.height_map import Flag
@@ -25,6 +26,61 @@ from gelpolight_core.sensor_calibration import FullModel
 Map = NDArray[np.float32]
 BEST = Steps(8, 5e-4**2, True, False)
 QUICK = Steps(4, 3e-3**2, True, False)
+
+
+@dataclass(frozen=True, slots=True)
+class ShadedField:
+    """What one scale of the solve works on, all (rows, columns, ...) on one grid.
+
+    Attributes
+    ----------
+    ratio, sigma, around : (rows, columns, 3) float32
+        Press over background, its standard deviation, and the light from around in it.
+    saturated : (rows, columns, 3) bool
+        Channels that are saturated.
+    usable : (rows, columns) bool
+        Nodes with light and membrane.
+    inside : (rows, columns) bool
+        Nodes within the seen part of the working circle; where they are not usable, the depth is
+        led by what is around.
+    ray_slope : (rows, columns, 2) float32
+        Sideways move of the ray per mm of depth.
+    x_mm, y_mm : (columns,), (rows,) float64
+        Nodes.
+    """
+
+    ratio: Map
+    sigma: Map
+    around: Map
+    saturated: NDArray[np.bool_]
+    usable: NDArray[np.bool_]
+    inside: NDArray[np.bool_]
+    ray_slope: Map
+    x_mm: NDArray[np.float64]
+    y_mm: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class RaySlopes:
+    """Slopes along the image's rays, as the ray-true integration wants them.
+
+    Attributes
+    ----------
+    slope_x, slope_y : (rows, columns) float32
+        Change of the depth from node to node, per mm.
+    normals : (rows, columns, 3) float32
+        Unit normals of the surface, z < 0.
+    weight : (rows, columns) float32
+        How far the slopes are to be trusted, 0..1.
+    flags : (rows, columns) uint8
+        Bits of :class:`Flag`.
+    """
+
+    slope_x: Map
+    slope_y: Map
+    normals: Map
+    weight: Map
+    flags: NDArray[np.uint8]
 
 
 def full_model(membrane: Membrane, leds_mm: NDArray[np.float64]) -> FullModel:
@@ -56,7 +112,7 @@ def solve(
     workers: int = 1,
     coverage: object = ((-1.0, 2.0),) * 3,
 ) -> RaySlopes:
-    """Solve every node's normal at the present depth, as `solve_near_light` does."""
+    """Solve every node's normal at the present depth."""
     full = full_model(membrane, leds_mm)
     ray_slope = np.moveaxis(field.ray_slope, -1, 0)
     kind = kinds(field.usable, field.inside, 1)
@@ -78,7 +134,7 @@ def solve(
 def place_on_grid(
     depth_mm: Map, ray_slope: Map, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
 ) -> tuple[Map, Map, NDArray[np.bool_]]:
-    """Find the ray that sees each true position, as the oracle of that name does."""
+    """Find the ray that sees each true position: column, row, and whether it is hidden."""
     full = full_model(Membrane(), np.array([[0.5, 11.8, -13.7], [-10, -5, -13], [10, -6, -13]]))
     kind = np.full(depth_mm.shape, 2, np.uint8)
     scale = sensor_scale(full, (x_mm, y_mm), np.moveaxis(ray_slope, -1, 0), kind, factor=1)
@@ -94,7 +150,7 @@ def place_on_grid(
 def quiet(
     light: Map, background: Map, sigma: Map, usable: NDArray[np.bool_]
 ) -> tuple[Map, Map, Map | None]:
-    """Denoise (rows, columns, 3) as `quiet_even_parts` does; also what was left as it is."""
+    """Denoise (rows, columns, 3); also what was left as it is."""
     unknown = np.where(usable[..., None], sigma, np.float32(1e6))
     # The solver knows one noise of press minus background for each channel.
     sd = tuple(np.float32(s) for s in np.median((sigma * background)[usable], axis=0))

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.health.expected import raw_background
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -134,17 +133,6 @@ def test_zeroing_is_on_record_and_has_a_name_of_its_own(
     again = read_calibration(tmp_path / "zero.gplcal")
     assert again.identity == new.identity
     assert again.provenance.edits == new.provenance.edits
-
-
-def test_the_papers_calibration_alone_knows_the_same_background(
-    small_calibration: Calibration,
-) -> None:
-    paper = replace(small_calibration, full=None)
-    known = (small_calibration.factors > 0.0).all(axis=2)
-    both = raw_background(paper)[known], raw_background(small_calibration)[known]
-    assert both[0] == pytest.approx(both[1], rel=1e-3, abs=1e-4)
-    flat = background_shift(frames(1.0, 1.0, 1.0, count=1)[0], paper)
-    assert np.abs(flat.brightness_percent).max() < 0.5
 
 
 def test_what_is_no_image_of_this_sensor_is_refused(small_calibration: Calibration) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,18 +10,11 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from reference import full as plain
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
-from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.near_light.maps import sensor_scale
-from gelpolight_core.reconstruction.near_light.ratio import PressSampler
-from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.near_light.solver import NearLightDepth, NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
@@ -79,40 +71,6 @@ def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> NearLightD
     assert calibration.full is not None
     solver = NearLightSolver(calibration, calibration.full, workers=workers)
     return solver.depth(rgb, everywhere=True)
-
-
-@pytest.mark.parametrize(
-    ("effort", "factor", "bound_mm"), [("best", 1, 1e-3), ("balanced", 2, 3e-3), ("fast", 4, 4e-3)]
-)
-@pytest.mark.parametrize("name", [PRESSES[0], "cuboid_s6_d100"])
-def test_the_solver_finds_the_depth_of_the_scalar_oracles_at_every_scale(
-    virtual_session: Path,
-    virtual_calibration: Calibration,
-    name: str,
-    effort: str,
-    factor: int,
-    bound_mm: float,
-) -> None:
-    """The whole grid, in double precision and without any leave-outs, from the same image."""
-    rgb = press(virtual_session, name)
-    calibration = virtual_calibration
-    assert calibration.full is not None
-    expected = plain.reconstruct(rgb, calibration, factor=factor, denoising=factor == 1)
-    solver = NearLightSolver(calibration, calibration.full, workers=2)
-    found = solver.depth(rgb, effort=effort, everywhere=True, terms=Terms(sharpening=False))
-    shown = found.depth_mm
-    if factor > 1:
-        rows, columns = expected.depth_mm.shape
-        shown = cv2.resize(shown, (columns, rows), interpolation=cv2.INTER_AREA)
-    inside = (expected.flags & int(Flag.OUTSIDE)) == 0
-    off = (shown - expected.depth_mm)[inside]
-    assert np.sqrt(np.mean(off**2)) < bound_mm
-    if factor == 1:
-        reported = ~np.uint8(Flag.EXTRAPOLATED | Flag.INVALID)
-        assert ((found.flags & reported) == (expected.flags & reported)).mean() > 0.995
-        assert found.normals is not None
-        across = np.linalg.norm(np.cross(found.normals, expected.normals), axis=-1)[inside]
-        assert np.percentile(np.degrees(np.arcsin(np.clip(across, 0.0, 1.0))), 99) < 1.0
 
 
 @pytest.mark.parametrize("name", PRESSES)
@@ -183,14 +141,6 @@ def test_normals_belong_to_the_depth(
     assert np.median(np.abs(found[..., 1] - slope_y)[gentle]) < 0.02
 
 
-def test_the_rounds_settle(virtual_session: Path, virtual_calibration: Calibration) -> None:
-    result = solve(press(virtual_session), virtual_calibration)
-    assert result.rounds is not None
-    assert result.rounds.stopped == "done"
-    first, second = result.rounds.changes_mm
-    assert first > 3.0 * second > 0.0
-
-
 def test_threads_do_not_change_the_depth(
     virtual_session: Path, virtual_calibration: Calibration
 ) -> None:
@@ -236,43 +186,3 @@ def test_an_image_without_information_is_flat_and_flagged(
     assert np.abs(result.depth_mm).max() < 1e-6
     useless = Flag.DARK | Flag.SATURATED | Flag.OUTSIDE | Flag.INVALID
     assert ((result.flags & int(useless)) != 0).all()
-
-
-def test_outside_the_working_circle_there_is_no_depth(
-    virtual_session: Path, virtual_calibration: Calibration
-) -> None:
-    result = solve(press(virtual_session), virtual_calibration)
-    outside = (result.flags & int(Flag.OUTSIDE)) != 0
-    assert outside.any()
-    assert not result.depth_mm[outside].any()
-
-
-def test_the_coarse_image_is_the_fine_one_averaged(
-    virtual_session: Path, virtual_calibration: Calibration
-) -> None:
-    assert virtual_calibration.full is not None
-    solver = NearLightSolver(virtual_calibration, virtual_calibration.full, workers=1)
-    sampler = PressSampler(solver.maps, solver.workers, Buffers())
-    raw = np.round(press(virtual_session) * 255.0).astype(np.uint8)
-    region = Region((6, 8), (50, 60))
-    found = sampler.compare(raw, region, factor=1, linear=False, terms=Terms(sharpening=False))
-    block = (slice(None), slice(40, 44), slice(60, 64))
-    fine, coarse = found.fine, found.coarse
-    assert fine.ratio.shape == (3, 200, 240)
-    np.testing.assert_allclose(coarse.ratio[:, 10, 15], fine.ratio[block].mean((1, 2)), rtol=1e-5)
-    one, four = solver.maps.scale(1), solver.maps.scale(4)
-    assert four.x_mm == pytest.approx(one.x_mm + 1.5 * one.pitch_mm)
-    assert four.pitch_mm == pytest.approx(4.0 * one.pitch_mm)
-    # What is brought to full scale by straight lines is what it would be there.
-    grid = virtual_calibration.table.grid
-    rays = np.moveaxis(virtual_calibration.table.ray_slope, -1, 0)
-    own = sensor_scale(virtual_calibration.full, (grid.x_mm, grid.y_mm), rays, one.kind, factor=1)
-    inner = np.s_[:, 8:-8, 8:-8]
-    np.testing.assert_allclose(one.flat[inner], own.flat[inner], rtol=3e-4)
-
-
-def test_a_calibration_for_the_papers_model_is_refused(virtual_calibration: Calibration) -> None:
-    plain = replace(virtual_calibration, model="paper", full=None)
-    with pytest.raises(InputError, match="paper"):
-        Reconstructor(plain, model="full")
-    assert Reconstructor(plain).model == "paper"

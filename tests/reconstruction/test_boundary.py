@@ -24,12 +24,6 @@ from gelpolight_core.reconstruction.checks import (
     unanchored_note,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.near_light.boundary import (
-    Boundary,
-    find_boundary,
-    region_strips,
-    rim_distance_mm,
-)
 from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
@@ -146,12 +140,6 @@ def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_ancho
     assert np.median(found.depth_model_sd_mm[inside]) > 0.5 * DEPTH_MM
 
 
-def test_a_contact_inside_the_field_leaves_the_boundary_held() -> None:
-    press = sensor().pressed(Cylinder(5.0, DEPTH_MM), x_mm=0.5, y_mm=0.3, samples=1)
-    found = Reconstructor(sensor().calibration).near_light.depth(press.frame)
-    assert found.boundary == Boundary()
-
-
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("x_mm", [10.5, 11.0, 12.0])
 def test_what_the_boundary_cuts_off_is_not_measured(x_mm: float, effort: str) -> None:
@@ -191,34 +179,3 @@ def test_a_face_without_an_anchor_is_doubtful() -> None:
 PITCH_MM = 0.2
 FIELD = np.hypot(*np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))) * PITCH_MM < 12.0
 WHOLE = Region((0, 0), FIELD.shape)
-STRIPS = region_strips(rim_distance_mm(FIELD, PITCH_MM), WHOLE, PITCH_MM)
-
-
-def test_the_strip_lies_inside_the_field_next_to_its_boundary() -> None:
-    radius = np.hypot(*np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))) * PITCH_MM
-    assert (STRIPS.edge <= FIELD).all()
-    assert radius[STRIPS.edge].min() > 12.0 - 0.5 - PITCH_MM
-    assert not STRIPS.inner.any()
-    half = Region((20, 30), (40, 50))
-    inner = region_strips(rim_distance_mm(FIELD, PITCH_MM), half, PITCH_MM).inner
-    assert inner[0].all() and inner[:, -1].any() and not inner[20, 25]
-
-
-def test_only_the_pressed_part_of_the_boundary_is_free() -> None:
-    x = np.broadcast_to(np.arange(-64, 65) * PITCH_MM, FIELD.shape)
-    # What is integrated without an anchor has any level.
-    open_mm = np.where(x > 8.0, 1.0, 0.0).astype(np.float32) + np.float32(0.7)
-    held_mm = np.where(x > 8.0, 0.5, 0.0).astype(np.float32)
-    found = find_boundary(held_mm, STRIPS, lambda free: open_mm, PITCH_MM)
-    assert found.free is not None
-    assert found.free[STRIPS.edge & (x > 8.0)].all()
-    assert not found.free[x < 5.0].any()
-    assert found.level_sd_mm == 0.0
-
-
-def test_a_boundary_that_is_pressed_all_around_has_no_level() -> None:
-    x, y = np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))
-    open_mm = np.where(np.hypot(x, y) * PITCH_MM > 6.0, 1.0, 0.0).astype(np.float32)
-    found = find_boundary(open_mm - 1.0, STRIPS, lambda free: open_mm, PITCH_MM)
-    assert found.level_sd_mm == 1.0
-    np.testing.assert_allclose(found.levelled(open_mm + 3.0), open_mm, atol=1e-6)

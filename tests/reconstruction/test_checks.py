@@ -14,7 +14,6 @@ from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
 from gelpolight_core.experiments.stability_trial import standard_press, standard_sensor
-from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball
@@ -82,15 +81,6 @@ def test_a_few_wild_pixels_leave_the_rest_of_the_map_as_it_was(value: float, see
     assert np.sqrt(np.mean((found - clean) ** 2)) < 0.005
 
 
-def test_light_stronger_than_saturation_is_saturated_and_no_number_is_missing() -> None:
-    press = standard_press()
-    frame = press.frame.copy()
-    frame[110:116, 150:156] = 1e30
-    for reconstruct in STANDARD:
-        flags = reconstruct.depth(frame).flags
-        assert ((flags & int(Flag.SATURATED)) != 0).sum() > 20
-
-
 @pytest.mark.parametrize("reconstruct", STANDARD, ids=lambda r: r.model)
 def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(
     reconstruct: Reconstructor,
@@ -154,9 +144,3 @@ def test_lights_in_one_plane_are_refused_with_their_condition() -> None:
     flat = replace(calibration, full=replace(calibration.full, led_positions_mm=row))
     with pytest.raises(InputError, match="condition"):
         Reconstructor(flat)
-
-
-def test_a_membrane_without_light_is_refused() -> None:
-    calibration = standard_sensor().calibration
-    with pytest.raises(InputError, match="only 0"):
-        Reconstructor(replace(calibration, factors=np.zeros_like(calibration.factors)))

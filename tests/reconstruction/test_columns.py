@@ -40,24 +40,6 @@ def test_columns_are_solved_as_a_banded_solver_does(
         assert np.abs(found[:, j] - expected).max() <= allowed
 
 
-@settings(max_examples=20, deadline=None)
-@given(st.integers(1, 90), st.integers(1, 150), st.booleans(), st.integers(0, 2**32 - 1))
-def test_any_number_of_threads_integrates_to_the_same_bits(
-    rows: int, columns: int, single: bool, seed: int
-) -> None:
-    dtype = np.float32 if single else np.float64
-    slopes = np.random.default_rng(seed).normal(0.0, 4.0, (2, rows, columns)).astype(dtype)
-    slopes[0, rows // 2, columns // 3] = np.nan
-    solved = [
-        PoissonSolver(rows, columns, pitch_mm=0.1, dtype=dtype, workers=n).integrate(*slopes)
-        for n in (1, 2, 3)
-    ]
-    for other in solved[1:]:
-        assert other.depth_mm.tobytes() == solved[0].depth_mm.tobytes()
-        assert other.clipped_count == solved[0].clipped_count == (np.abs(slopes) > 10.0).sum()
-        assert other.sanitised_count == solved[0].sanitised_count == 1
-
-
 @pytest.mark.parametrize("owner", [RowWorkers, lambda n: PoissonSolver(90, 80, pitch_mm=0.1)])
 def test_threads_end_with_their_owner(owner: object) -> None:
     before = set(threading.enumerate())

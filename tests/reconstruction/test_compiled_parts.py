@@ -1,23 +1,19 @@
-"""The compiled solve and its parts do what their plain oracles do, in single precision."""
+"""Parts of the compiled solve: its start, its flags, and the sampling of images."""
 
 from __future__ import annotations
 
 import warnings
 
 import compiled
-import cv2
 import numpy as np
 import pytest
+from compiled import ShadedField
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from reference.near_light import ShadedField, solve_near_light
-from reference.placement import place_on_grid, resample
-from reference.weighted import integrate_weighted as plain_integration
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.maps import light_levels
 from gelpolight_core.reconstruction.near_light.sampling import block_means, halve, sample_rows
 from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE, RatioImage
@@ -33,7 +29,6 @@ POINTS = np.stack(np.meshgrid(X, Y), axis=-1)
 DRIFT = -(POINTS - np.array([0.4, -0.7])) / np.array([28.0, 33.0])
 LEDS = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.9], [10.1, -6.3, -13.5]])
 _EVEN = np.linspace(0.0, 1.0, CURVE_NODES)
-KINKED = (tuple(np.minimum(_EVEN, 0.5 + 0.2 * (_EVEN - 0.5)).tolist()),) * 3
 BENT = tuple(tuple((_EVEN * (1.0 + g * (1.0 - _EVEN))).tolist()) for g in (0.2, 0.35, 0.5))
 
 # Each kind of membrane is compiled by itself: these two stand for all.
@@ -86,37 +81,6 @@ def dented(membrane: Membrane, seed: int) -> tuple[ShadedField, Map]:
     return field, depth.astype(np.float32)
 
 
-@settings(max_examples=16, deadline=None)
-@given(
-    membranes,
-    st.sampled_from([(), BENT, KINKED]),
-    st.sampled_from([(compiled.BEST, 1e-3), (compiled.QUICK, 5e-3)]),
-    st.integers(0, 999),
-)
-def test_the_compiled_solve_finds_the_normals_of_the_scalar_one(
-    membrane: Membrane, diffuse: tuple, steps: tuple, seed: int
-) -> None:  # type: ignore[type-arg]
-    """In single precision, with as many steps as a block of nodes needs.
-
-    Nodes at the edge of darkness may fall to either side of it.
-    """
-    if diffuse:
-        membrane = Membrane(
-            gloss=membrane.gloss, interreflection=membrane.interreflection, diffuse=diffuse
-        )
-    field, depth = dented(membrane, seed)
-    plain = solve_near_light(field, depth, LEDS, membrane)
-    found = compiled.solve(field, depth, LEDS, membrane, steps=steps[0])
-    for name in ("slope_x", "slope_y"):
-        off = np.abs(getattr(found, name) - getattr(plain, name))[2:-2, 2:-2]
-        assert np.percentile(off, 95) < steps[1]
-        assert np.isfinite(getattr(found, name)).all()
-    reported = ~np.uint8(Flag.INVALID)
-    assert ((found.flags & reported) == plain.flags).mean() > 0.99
-    assert (found.weight == plain.weight).mean() > 0.99
-    assert (np.linalg.norm(found.normals, axis=-1) < 1.0 + 1e-5).all()
-
-
 @settings(max_examples=6, deadline=None)
 @given(membranes, st.integers(0, 999))
 def test_a_start_from_other_normals_ends_at_the_same(membrane: Membrane, seed: int) -> None:
@@ -150,75 +114,6 @@ def test_a_channel_seen_at_a_cosine_that_no_ball_showed_is_flagged() -> None:
     clear = counts & (np.abs(cosines[..., 1] - limit) > 1e-3)
     np.testing.assert_array_equal(far[clear], (cosines[..., 1] > limit)[clear])
     assert far[clear].any()
-
-
-def test_nodes_without_membrane_are_flat_and_flagged() -> None:
-    field, depth = dented(Membrane(), 1)
-    found = compiled.solve(field, depth, LEDS, Membrane())
-    outside = ~field.usable & ~field.inside
-    assert (found.flags[outside] == Flag.OUTSIDE).all()
-    assert (found.flags[~field.usable & field.inside] == Flag.OUTSIDE | Flag.INVALID).all()
-    assert (found.slope_x[~field.usable] == 0.0).all()
-
-
-@settings(max_examples=10, deadline=None)
-@given(st.integers(0, 999), st.booleans(), st.booleans())
-def test_the_compiled_integration_is_the_plain_one(seed: int, let_go: bool, started: bool) -> None:
-    random = np.random.default_rng(seed)
-    bump = cv2.GaussianBlur(random.normal(size=(ROWS, COLUMNS)).astype(np.float32), (0, 0), 6.0)
-    slope_y, slope_x = (np.gradient(2.0 * bump, PITCH, axis=axis) for axis in (0, 1))
-    weight = np.where(random.random(bump.shape) > 0.1, 1.0, 0.01).astype(np.float32)
-    hold = np.ones_like(weight)
-    if let_go:
-        hold[:, -20:] = 1e-3
-    plain = plain_integration(slope_x, slope_y, weight, pitch_mm=PITCH, hold=hold, tolerance=1e-6)
-    fast = integrate_weighted(
-        slope_x,
-        slope_y,
-        weight,
-        pitch_mm=PITCH,
-        start_mm=bump if started else None,
-        hold=hold if let_go else None,
-        tolerance=1e-6,
-    )
-    assert np.abs(fast.depth_mm - plain.depth_mm).max() < 1e-3 * np.abs(plain.depth_mm).max()
-
-
-def test_a_solution_to_start_from_needs_no_round() -> None:
-    random = np.random.default_rng(4)
-    slopes = [random.normal(0.0, 0.1, (ROWS, COLUMNS)).astype(np.float32) for _ in range(2)]
-    weight = random.uniform(0.2, 1.0, (ROWS, COLUMNS)).astype(np.float32)
-    first = integrate_weighted(
-        *slopes,
-        weight,
-        pitch_mm=PITCH,
-        tolerance=1e-4,
-    )
-    again = integrate_weighted(
-        *slopes,
-        weight,
-        pitch_mm=PITCH,
-        start_mm=first.depth_mm,
-        tolerance=1e-3,
-    )
-    assert first.rounds > 1
-    assert again.rounds == 0
-
-
-@settings(max_examples=8, deadline=None)
-@given(st.integers(0, 999), st.floats(0.1, 1.2))
-def test_true_positions_are_those_of_the_plain_oracle(seed: int, deep: float) -> None:
-    """Within a hundredth of a node times the steepest slope, where no wall hides the surface."""
-    random = np.random.default_rng(seed)
-    off = POINTS - random.uniform([-2.0, -1.0], [3.0, 2.0])
-    depth = (deep * np.exp(-(off**2).sum(-1) / 1.5)).astype(np.float32)
-    ray_slope = DRIFT.astype(np.float32)
-    column, row, folded = place_on_grid(depth, ray_slope, X, Y)
-    found_column, found_row, hidden = compiled.place_on_grid(depth, ray_slope, X, Y)
-    assert not folded.any()
-    assert not hidden.any()
-    off_by = np.abs(resample(depth, found_column, found_row) - resample(depth, column, row))
-    assert off_by[3:-3, 3:-3].max() < 2e-3
 
 
 def sampled(

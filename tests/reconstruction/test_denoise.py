@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 from compiled import quiet
-from reference.denoise import quiet_even_parts
 
 from gelpolight_core.reconstruction.near_light.ratio import inverse_of_blur
 from gelpolight_core.reconstruction.near_light.uncertainty import noise_left
@@ -101,20 +100,3 @@ def test_what_lies_outside_of_the_membrane_does_not_darken_its_rim() -> None:
     press = np.where(usable[..., None], background, 0.0).astype(np.float32)
     ratio, _, _ = quiet(press, background, 0.2 * ONE, usable)
     np.testing.assert_allclose(ratio[usable], 1.0, atol=1e-3)
-
-
-@pytest.mark.parametrize("noise", [0.004, 0.02, 0.06])
-def test_the_compiled_denoising_is_the_plain_one(noise: float) -> None:
-    """Also where little light needs wider averages, and where some of the membrane is unknown."""
-    _, noisy = image(noise)
-    background = np.linspace(0.2, 0.9, 160, dtype=np.float32)[:, None, None] * ONE
-    usable = USABLE.copy()
-    usable[:, :20] = usable[60:70, 90:100] = False
-    light = noisy * background
-    sigma = np.float32(0.5 * noise) / background
-    plain, plain_left = quiet_even_parts(light, background, sigma, usable)
-    found, left, _ = quiet(light, background, sigma, usable)
-    # Both estimate the noise, and so where edges begin, from other samples of the image.
-    assert np.median(np.abs(found - plain)[usable]) < 0.02 * noise
-    assert np.percentile(np.abs(found - plain)[usable], 99) < 0.3 * noise
-    np.testing.assert_allclose(np.median(left[usable]), np.median(plain_left[usable]), rtol=0.05)

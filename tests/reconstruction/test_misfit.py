@@ -47,12 +47,3 @@ def test_a_true_surface_explains_its_image_and_a_false_one_does_not(
     false = solve_misfit(reconstruct, press, lying, largest=10_000)
     pressed = heightmap.depth_mm > 0.3 * heightmap.depth_mm.max()
     assert np.nanmean(false.values[pressed]) > 4.0 * np.nanmean(true.values[pressed])
-
-
-def test_the_full_model_needs_the_normals(
-    small_calibration: Calibration, press: np.ndarray
-) -> None:
-    reconstruct = Reconstructor(small_calibration, effort="best")
-    heightmap = replace(reconstruct.depth(press), normals=None)
-    with pytest.raises(ValueError, match="normals"):
-        solve_misfit(reconstruct, press, heightmap)

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from compiled import solve
+from compiled import RaySlopes, ShadedField, solve
 from numpy.typing import NDArray
-from reference.near_light import RaySlopes, ShadedField
 
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.near_light.structures import Slopes
@@ -139,15 +138,6 @@ def test_known_normals_are_found(membrane: Membrane) -> None:
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-5)
 
 
-def test_curves_equal_to_the_power_of_the_cosine_give_its_normals() -> None:
-    field, depth, _ = scene_of(GLOSSY)
-    curve = tuple((_EVEN**GLOSSY.exponent).tolist())
-    by_power = solved(field, depth, GLOSSY)
-    by_curve = solved(field, depth, replace(GLOSSY, diffuse=(curve,) * 3))
-    # Straight lines between 257 nodes.
-    np.testing.assert_allclose(by_curve.normals, by_power.normals, atol=1e-4)
-
-
 def test_light_frozen_at_the_flat_membrane_would_be_wrong() -> None:
     """At depth 0 the same image gives other normals: the depth is used."""
     field, depth, normals = scene_of(MATT)
@@ -236,23 +226,6 @@ def test_a_saturated_channel_is_missing_not_one(channel: int) -> None:
     assert angle_deg(believed.normals, normals)[lost].max() > 1.5
     kept = ~lost
     assert angle_deg(found.normals, normals)[kept].max() < 0.1
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_pixel_that_is_no_number_spoils_nothing(bad: float) -> None:
-    field, depth, normals = scene_of(GLOSSY)
-    ratio = field.ratio.copy()
-    ratio[20, 30, 1] = bad
-    ratio[40, 50] = bad
-    found = solved(replace(field, ratio=ratio), depth, GLOSSY)
-    for values in (found.slope_x, found.slope_y, found.normals, found.weight):
-        assert np.isfinite(values).all()
-    touched = np.zeros(depth.shape, bool)
-    touched[20, 30] = touched[40, 50] = True
-    assert angle_deg(found.normals, normals)[~touched].max() < 0.1
-    assert (found.weight[touched] < 1.0).all()
-    assert ((found.flags[touched] & int(Flag.INVALID)) != 0).all()
-    assert not found.flags[~touched].any()
 
 
 def test_an_all_black_image_is_flat_flagged_and_hardly_counts() -> None:

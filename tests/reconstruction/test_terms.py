@@ -141,24 +141,6 @@ def test_saturated_channels_that_are_believed_flatten_what_faces_the_light(
     assert missed[1] > 1.5 * missed[0]
 
 
-def test_a_pixel_that_is_not_a_number_is_missing_whatever_is_believed(
-    rgb: Map, virtual_calibration: Calibration
-) -> None:
-    spoilt = rgb.copy()
-    spoilt[230:233, 120:123] = np.nan
-    result = solved(spoilt, virtual_calibration, saturation=False, shadows=False)
-    assert np.isfinite(result.depth_mm).all()
-
-
-def test_a_black_place_is_flat_where_dark_channels_are_believed(
-    rgb: Map, virtual_calibration: Calibration
-) -> None:
-    black = rgb.copy()
-    black[230:233, 120:123] = 0.0
-    result = solved(black, virtual_calibration, shadows=False)
-    assert np.isfinite(result.depth_mm).all()
-
-
 def test_without_weights_what_cannot_be_seen_spoils_the_depth(
     rgb: Map, whole: NearLightDepth, virtual_calibration: Calibration, virtual_session: Path
 ) -> None:
@@ -204,8 +186,3 @@ def test_denoising_quiets_the_even_ground(rgb: Map, virtual_calibration: Calibra
         noise.append(float(np.std(ratio[:, ground] - 1.0)))
     # A quarter of the camera's own noise stays, and all of what the membrane does there.
     assert noise[0] < 0.75 * noise[1]
-
-
-def test_the_press_used_here_is_the_designs() -> None:
-    item = SensorDesign().presses[2]
-    assert (item.shape, item.size_mm, item.depth_mm) == ("cylinder", 4.0, 1.5)

@@ -18,12 +18,3 @@ def test_steps_are_counted_and_what_was_left_out_has_saved_its_time() -> None:
     assert (solving.done, solving.left_out) == (10, 20)
     assert solving.mean_ms == 8.0 and solving.saved_ms == 160.0
     assert "30 frames" in tally.lines(30.0)[0] and "20 times" in tally.lines(30.0)[2]
-
-
-def test_frames_of_more_than_a_minute_ago_are_forgotten() -> None:
-    tally = TraceTally()
-    tally.add(PRESSED, 0.0)
-    tally.add(EMPTY, 50.0)
-    solving = tally.counts(70.0)[1]
-    assert (solving.done, solving.left_out, solving.saved_ms) == (0, 1, None)
-    assert tally.lines(200.0) == []

@@ -175,18 +175,6 @@ def test_the_models_own_error_is_where_the_membrane_is_pressed(repeats: Repeats)
     assert np.median(model[parts["wall"]]) > 5.0 * np.median(model[parts["flat"]])
 
 
-def test_nothing_is_stated_that_was_not_asked_for(virtual_calibration: Calibration) -> None:
-    camera = virtual_calibration.camera
-    frame = np.full((camera.height, camera.width, 3), 90, np.uint8)
-    plain = Reconstructor(virtual_calibration).depth(frame)
-    paper = Reconstructor(virtual_calibration, model="paper").depth(frame, uncertainty=True)
-    for heightmap in (plain, paper):
-        assert heightmap.noise_mm is None
-        assert all(getattr(heightmap, name) is None for name in SD_MAPS)
-    assert plain.depth_scale_sd is not None
-    assert paper.depth_scale_sd is None
-
-
 @pytest.mark.parametrize("value", [0.0, 1.0, np.nan])
 def test_an_image_without_information_has_finite_deviations(
     virtual_calibration: Calibration, value: float

@@ -7,16 +7,11 @@ from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import pytest
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QAbstractButton,
-    QAbstractSpinBox,
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QSlider,
-    QSpinBox,
-    QToolButton,
     QWidget,
 )
 from shiboken6 import isValid
@@ -97,19 +92,6 @@ def test_a_ball_cannot_be_pressed_deeper_than_its_radius(panel: BenchPanel, benc
     assert find(panel, QSlider, "depth_slider").maximum() == 50
 
 
-def test_buttons_step_cyclically_through_the_poses(
-    qtbot: Any, panel: BenchPanel, bench: Bench
-) -> None:
-    choose(panel, "checkerboard")
-    pose = find(panel, QSpinBox, "pose")
-    assert (pose.value(), pose.text()) == (1, "1 of 16")
-    qtbot.mouseClick(find(panel, QToolButton, "next_pose"), Qt.MouseButton.LeftButton)
-    assert (bench.scene.pose, pose.value()) == (1, 2)
-    for _ in range(2):
-        qtbot.mouseClick(find(panel, QToolButton, "previous_pose"), Qt.MouseButton.LeftButton)
-    assert (bench.scene.pose, pose.value()) == (15, 16)
-
-
 def test_dragging_on_the_image_moves_the_object_and_its_numbers(
     panel: BenchPanel, bench: Bench
 ) -> None:
@@ -141,19 +123,6 @@ def test_changes_from_another_thread_are_shown(qtbot: Any, panel: BenchPanel, be
     other.join()
     box = find(panel, QDoubleSpinBox, "exposure_ms")
     qtbot.waitUntil(lambda: box.value() == 3.0)
-
-
-def test_every_control_has_a_name_and_a_description(panel: BenchPanel) -> None:
-    for kind in (QComboBox, QAbstractSpinBox, QSlider, QAbstractButton):
-        for widget in panel.findChildren(kind):
-            assert widget.objectName().startswith("bench."), widget
-            assert widget.accessibleName(), widget.objectName()
-
-
-def test_it_fits_a_narrow_dock(panel: BenchPanel) -> None:
-    for item in ITEMS:
-        choose(panel, item)
-        assert panel.minimumSizeHint().width() <= 300
 
 
 def test_a_deleted_panel_is_not_notified(qtbot: Any, bench: Bench) -> None:

@@ -7,13 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtGui import QColor
 from technician import ScriptedCamera, Technician, read_rgb
 
 from app.calibrate import moving_on
-from app.calibrate.steps import OPEN_ROUTE
 from app.context.context import AppContext
-from app.live.image_view import FLASH
 from app.services.settings import Settings
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
@@ -96,11 +93,6 @@ def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
     technician.rest()
 
 
-def test_only_what_shows_results_can_be_passed_over() -> None:
-    passed_over = {made.describe().key for made in OPEN_ROUTE if made.only_shows}
-    assert passed_over == {"refraction", "reflectance"}
-
-
 def test_a_good_image_that_was_there_before_asks_for_a_movement(
     automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
     small_session: Path,
@@ -115,37 +107,4 @@ def test_a_good_image_that_was_there_before_asks_for_a_movement(
     technician.until(lambda: panel.live.property("meaning") == "pass")
     technician.until(lambda: "Move it" in panel.live.text())
     assert len(project.session.captured("balls")) == count
-    technician.rest()
-
-
-def test_a_capture_flashes(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
-    technician.begin(computed_project(), "background")
-    camera.show(read_rgb(small_session / "background" / "background.png"))
-    view = technician.wizard.area.view._image
-    seen: list[QColor] = []
-    flash = view.setForegroundBrush
-    view.setForegroundBrush = lambda brush: (seen.append(brush), flash(brush))
-    technician.capture()
-    technician.until(lambda: len(seen) == 2)
-    assert seen[0] == FLASH
-    technician.rest()
-
-
-def test_it_goes_on_from_a_step_that_was_opened_in_the_list(
-    automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
-    small_session: Path,
-) -> None:  # fmt: skip
-    project = computed_project()
-    project.exclude(Stage.RADIANCE, project.session.found("whiteboard")[0].name)
-    image = read_rgb(small_session / "whiteboard" / "whiteboard.png")
-    camera.show(np.full_like(image, 3))
-    technician.begin(project, "lights")
-    wizard = technician.wizard
-    row = [one.step.key for one in wizard.presenters].index("radiance")
-    wizard.step_list.setCurrentRow(row)
-    technician.until(lambda: wizard.panel.live.text())
-    camera.show(image)
-    technician.until(lambda: wizard.open.step.key == "background")
     technician.rest()

@@ -51,12 +51,6 @@ def test_a_click_on_a_row_chooses_the_capture(qtbot: QtBot) -> None:
     assert chosen.args == ["a.png"]
 
 
-def test_one_capture_alone_has_nothing_to_be_compared_with(qtbot: QtBot) -> None:
-    table = shown(qtbot)
-    table.show_captures(CAPTURES[1:3], heading="Corner error, px", shown="")
-    assert table.isHidden() and not table.texts()
-
-
 def test_the_worst_press_is_excluded_to_be_repeated_and_undo_restores_it(
     technician: Technician, computed_project: Made, qtbot: QtBot
 ) -> None:
@@ -73,14 +67,3 @@ def test_the_worst_press_is_excluded_to_be_repeated_and_undo_restores_it(
     technician.rest()
     assert read_session(technician.session).decisions.excluded == frozenset()
     assert f"{table.texts()[0][0]}.png" == Path(worst).name
-
-
-def test_a_row_shows_its_capture_in_image_and_strip(
-    technician: Technician, computed_project: Made
-) -> None:
-    technician.begin(computed_project(), "lens")
-    wizard = technician.wizard
-    name = f"{wizard.panel.residuals.texts()[0][0]}.png"
-    wizard.panel.residuals.chosen.emit(name)
-    assert wizard.model.shown == name == wizard.area.strip.current_name
-    technician.rest()

@@ -84,14 +84,6 @@ def test_a_second_session_is_made_if_the_user_wants_it(
     assert (unfinished / "checkerboard" / "view_1.png").is_file()
 
 
-def test_nothing_is_made_if_the_question_is_cancelled(
-    page: CalibratePage, unfinished: Path, context: AppContext
-) -> None:
-    (question,) = _begin(page)
-    _answer(question, "cancel")
-    assert page.wizard is None and _sessions(context) == 1
-
-
 def test_an_empty_session_or_another_sensor_is_no_reason_to_ask(
     page: CalibratePage, unfinished: Path, context: AppContext
 ) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
@@ -15,7 +14,6 @@ from technician import Technician
 from app.bench.virtual_session import virtual_session
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
-from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
@@ -111,18 +109,6 @@ def test_the_mirror_may_have_its_own_exposure(
     context.toasts.clear()
 
 
-def test_imported_images_do_not_store_the_live_camera(
-    technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
-    small_session: Path, qtbot: QtBot,
-) -> None:  # fmt: skip
-    technician.begin(fresh, "balls")
-    live(context, qtbot)
-    technician.wizard.open.import_files([small_session / "balls" / "ball_01.png"])
-    technician.rest()
-    assert fresh.session.captured("balls")
-    assert read_session(fresh.session.folder).camera_settings is None
-
-
 def test_the_camera_of_another_sensor_is_rejected(
     technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
     qtbot: QtBot,
@@ -157,15 +143,6 @@ def test_a_calibration_contains_its_camera_settings(computed_project: Made) -> N
     assert {stage: status.state for stage, status in project.statuses().items()} == before
     made = provenance_of(project.session, ())
     assert settings_of_texts(made.camera_settings) == stored
-
-
-def test_changing_the_sensor_data_keeps_the_camera(fresh: CalibrationProject) -> None:
-    stored = settings_of_texts(TEXTS)
-    fresh.set_camera(stored)
-    sensor = replace(fresh.session.sensor, led_height_mm=13.0)
-    fresh.describe(replace(fresh.session, sensor=sensor, camera_settings=None))
-    assert fresh.session.camera_settings == stored
-    assert fresh.statuses()[Stage.LENS].state.value == "empty"
 
 
 def test_the_set_up_step_shows_the_camera_state_and_opens_its_settings(

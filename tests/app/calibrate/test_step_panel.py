@@ -25,18 +25,3 @@ def test_a_step_in_computation_does_not_show_figures_of_another_step(
     panel.show_running()
     assert not panel.quality.texts() and panel.quality.isHidden()
     assert not panel.finished and "bold" not in panel.next.styleSheet()
-
-
-def test_the_button_says_whether_a_new_image_replaces_the_last_one(
-    qtbot: QtBot,
-) -> None:
-    panel = StepPanel()
-    qtbot.addWidget(panel)
-    expected_text = {}
-    for step in steps_of(OPEN_ROUTE):
-        panel.show_step(step, following="")
-        panel.show_count(1)
-        expected_text[step.key] = panel.capture.text().replace("&", "")
-    assert expected_text["top_pose"] == "Capture another"
-    assert expected_text["background"] == expected_text["lights"] == "Capture again"
-    assert expected_text["balls"] == "Capture  (1 of 10)"

@@ -9,15 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from technician import ScriptedCamera, Technician, read_rgb
 
-from app.calibrate.steps import OPEN_ROUTE, steps_of
-from app.live.live_detection import Seen
-from app.sources.processor import Outcome
-from app.theme import theme
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
@@ -102,15 +97,6 @@ def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
     technician.click("calibrate.recompute")
     technician.rest()
     assert technician.state("balls") in ("pass", "warn")
-
-
-def test_without_a_camera_the_page_points_to_the_captures(
-    technician: Technician, computed_project: Made
-) -> None:
-    """A session opened without its camera shows no live image, but its captures."""
-    technician.begin(computed_project(), "balls")
-    view = technician.wizard.area.view
-    assert "Click an image below" in view._image._placeholder.text()
 
 
 def test_an_excluded_image_is_grey_and_undo_restores_it(
@@ -230,24 +216,6 @@ def test_automatic_capture_waits_for_a_still_good_image_and_a_new_view(
     technician.rest()
 
 
-def test_a_manually_captured_view_is_not_captured_automatically(
-    technician: Technician, camera: ScriptedCamera, fresh: CalibrationProject, small_session: Path
-) -> None:
-    view = read_rgb(min((small_session / "checkerboard").glob("*.png")))
-    camera.show(np.full_like(view, 60))
-    technician.begin(fresh, "lens")
-    items: list[Outcome[Seen]] = []
-    technician.wizard.model.live.processed.connect(items.append)
-    technician.until(lambda: items)
-    camera.show(view)
-    technician.until(lambda: items[-1].value.still and items[-1].value.moved)
-    technician.capture()
-    items.clear()
-    technician.until(lambda: items and items[-1].value.still)
-    assert not any(item.value.moved for item in items)
-    technician.rest()
-
-
 def test_the_saved_calibration_equals_that_of_the_command_line(
     technician: Technician, computed_project: Made, small_calibration: Calibration,
     tmp_path: Path,
@@ -333,20 +301,6 @@ def test_points_excluded_with_the_lasso_change_the_calibration(
     technician.rest()
 
 
-def test_next_is_bold_and_focused_when_a_step_is_complete(
-    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
-) -> None:
-    project = computed_project()
-    technician.begin(project, "lights")
-    assert technician.wizard.panel.finished
-    camera.show(read_rgb(small_session / "mirror" / "mirror.png"))
-    technician.wizard.panel.capture.setFocus()
-    technician.capture()
-    technician.rest()
-    technician.until(lambda: QApplication.focusWidget() is technician.wizard.panel.next)
-    assert "Light intensity" in technician.wizard.panel.next.text()
-
-
 def test_escape_and_the_capture_key_return_to_the_live_image(
     technician: Technician, computed_project: Made, camera: ScriptedCamera, qtbot: QtBot
 ) -> None:
@@ -359,45 +313,6 @@ def test_escape_and_the_capture_key_return_to_the_live_image(
         qtbot.keyClick(technician.wizard, key)
         assert technician.wizard.model.shown == ""
         assert not technician.wizard.area.back_to_live.isVisible()
-    technician.rest()
-
-
-def test_no_key_has_two_functions_in_the_editor(
-    technician: Technician, computed_project: Made
-) -> None:
-    technician.begin(computed_project(), "reflectance")
-    technician.until(lambda: technician.wizard.at("reflectance").curves.editor is not None)
-    wide = {
-        key.toString()
-        for action in technician.wizard.actions()
-        if action.isEnabled()
-        for key in action.shortcuts()
-    }
-    editor = technician.wizard.at("reflectance").curves.editor
-    narrow = {k.toString() for a in editor.findChildren(QAction) for k in a.shortcuts()}
-    assert narrow
-    assert not wide & narrow
-    technician.rest()
-
-
-@pytest.mark.parametrize("key", [step.key for step in steps_of(OPEN_ROUTE)])
-def test_no_text_is_cut_off_or_moves_what_is_below(
-    technician: Technician, computed_project: Made, key: str
-) -> None:
-    technician.begin(computed_project(), key)
-    panel = technician.wizard.panel
-    if key != "validation":
-        area = panel._scroll
-        assert area.widget().minimumSizeHint().width() <= area.viewport().width()
-        foot = panel.next if panel.next.isVisible() else panel.progress
-        assert panel.rect().contains(foot.geometry())
-        heights = set()
-        for words in (1, 8, 24):
-            panel.show_live("Some advice on the image. " * (words // 4 + 1), ready=True)
-            panel.show_notice("Captured. " * (words // 8 + 1), "pass")
-            QApplication.processEvents()
-            heights.add(panel.sentence.mapTo(panel, panel.sentence.rect().topLeft()).y())
-        assert len(heights) == 1
     technician.rest()
 
 
@@ -463,20 +378,6 @@ def test_a_press_image_is_validated_with_its_truth_file(
     assert technician.state("validation") == "pass"
 
 
-def test_arrow_keys_on_a_node_are_in_the_history(
-    technician: Technician, computed_project: Made, qtbot: QtBot
-) -> None:
-    technician.begin(computed_project(), "reflectance")
-    step, history = technician.wizard.at("reflectance").curves, technician.wizard.model.undo
-    technician.until(lambda: step.editor is not None)
-    step.editor.choose_node(3)
-    step.editor.plot.setFocus()
-    for key in (Qt.Key.Key_Up, Qt.Key.Key_Up, Qt.Key.Key_Left):
-        qtbot.keyClick(QApplication.focusWidget(), key)
-    assert [history.text(n) for n in range(history.count())] == ["move node by key (red)"] * 3
-    technician.rest()
-
-
 def test_a_waiting_step_names_the_step_it_waits_for(
     technician: Technician, fresh: CalibrationProject
 ) -> None:
@@ -485,25 +386,6 @@ def test_a_waiting_step_names_the_step_it_waits_for(
     assert "earlier steps" in technician.see("calibrate.maps.none").text()
     technician.wizard.go_to("reflectance")
     assert "step 2, Lens" in technician.wizard.panel.sentence.text()
-
-
-def test_texts_and_icons_follow_the_theme(
-    technician: Technician, computed_project: Made, qapp: QApplication
-) -> None:
-    technician.begin(computed_project(), "lights")
-    panel = technician.wizard.panel
-    panel.show_notice("Captured.", "pass")
-    row = technician.wizard.step_list.item(2)
-    light = row.icon().pixmap(18, 18).toImage()
-    try:
-        theme.apply(qapp, "dark")
-        technician.until(lambda: row.icon().pixmap(18, 18).toImage() != light)
-        for label in (panel.notice, panel._word):
-            meant = theme.COLOURS[label.property("meaning")][True]
-            assert label.palette().color(label.foregroundRole()).name() == meant
-    finally:
-        theme.apply(qapp, "light")
-    technician.rest()
 
 
 def test_a_saved_calibration_is_validated_while_stages_are_recomputed(

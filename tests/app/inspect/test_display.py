@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from app.context.context import AppContext
@@ -21,11 +20,6 @@ looks = st.builds(
     exaggeration=st.floats(1.0, 8.0),
     light=st.builds(Light, st.floats(0.0, 359.0), st.floats(15.0, 85.0)),
 )
-
-
-@given(looks)
-def test_display_settings_survive_writing_and_reading(display: Display) -> None:
-    assert display_from_text(display_as_text(display)) == display
 
 
 @pytest.mark.parametrize(

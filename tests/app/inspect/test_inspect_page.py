@@ -69,13 +69,6 @@ def _advice(page: InspectPage) -> tuple[str, QPushButton]:
     return text.text(), button
 
 
-def test_an_empty_page_shows_what_to_do_next(page: InspectPage) -> None:
-    page.enter()
-    text, button = _advice(page)
-    assert "Choose an image source" in text
-    assert button.isVisible()
-
-
 def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click(
     page: InspectPage, context: AppContext
 ) -> None:
@@ -110,21 +103,6 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     assert middle != corner
 
 
-def test_hidden_views_are_not_computed(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    for name in ("surface", "section", "camera", "normals", "quality"):
-        page.views.docks[name].hide()
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    last = page.depth.last
-    assert last is not None and last.height is not None
-    assert last.surface is None and last.normals is None and last.quality is None
-    assert last.cut is None
-    assert page.views.surface.view is None
-
-
 def test_all_views_share_the_cursor_and_its_values_are_shown(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
@@ -148,25 +126,6 @@ def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
     height.range_released.emit()
     assert display.display.range_mm is None
     assert page.depth._maker.wanted.display.range_mm is None
-
-
-def test_the_colour_range_starts_again_with_another_source_only(
-    page: InspectPage, presses: Path, small_session: Path, context: AppContext
-) -> None:
-    from app.sources.listing import image_folders
-
-    page.enter()
-    page.leave()
-    bare, deep = np.zeros((40, 40), np.float32), np.full((40, 40), 3.0, np.float32)
-    colours = page.depth._maker.colour_range
-    colours.update(deep, 0.0)
-    page.enter()
-    page.leave()
-    assert colours.update(bare, 1.0)[1] == 5.0
-    (info,) = image_folders([small_session / "background"])()
-    context.source.choose(info)
-    page.enter()
-    assert page.depth._maker.colour_range.update(bare, 2.0)[1] < 0.1
 
 
 def test_a_frozen_image_stays_until_it_is_continued(
@@ -245,19 +204,6 @@ def test_an_unused_calibration_is_released(
     assert views.section.cut.profile is None
     assert (figures.text(), readout.text()) == ("", "")
     assert page._pixel_map is None
-
-
-def test_leaving_the_page_unfreezes_the_image(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    page.pause(True)
-    page.leave()
-    page.enter()
-    assert not page.live.paused and not page.pause_action.isChecked()
-    _wait_for_depth(page, qtbot)
 
 
 def test_a_frozen_image_ends_with_its_source(

@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
-from app.inspect.modes import ModeChoice, mode_text
+from app.inspect.modes import ModeChoice
 from app.live.frame_results import Shown
 from app.services.jobs import Jobs
 from app.sources.source import Frame
@@ -57,17 +57,6 @@ def test_every_mode_is_offered_with_its_measured_errors(
     assert errors == sorted(errors, key=lambda e: e.height_percent + e.size_percent, reverse=True)
 
 
-def test_the_mode_of_the_preferences_is_used_at_once(
-    choice: ModeChoice, full: Reconstructor, context: AppContext, qtbot: QtBot
-) -> None:
-    choice.offer(full, full)
-    context.settings.reconstruction = ("full", "best")
-    with qtbot.waitSignal(choice.chosen) as chosen:
-        context.requests.preferences_changed.emit()
-    assert chosen.args[0] is full
-    assert choice.box.currentData() == Mode("full", "best")
-
-
 def test_another_effort_is_used_at_once_and_saved(
     choice: ModeChoice, full: Reconstructor, context: AppContext, qtbot: QtBot
 ) -> None:
@@ -82,17 +71,6 @@ def test_another_effort_is_used_at_once_and_saved(
         choice.offer(full, full)
     assert signal.args[0].effort == "fast"
     assert context.settings.reconstruction == ("full", "fast")
-
-
-def test_the_papers_model_is_prepared_in_the_background(
-    choice: ModeChoice, full: Reconstructor, qtbot: QtBot
-) -> None:
-    choice.offer(full, full)
-    used: list[Reconstructor] = []
-    choice.chosen.connect(lambda live, _best: used.append(live))
-    _pick(choice, Mode("paper", "best"))
-    assert used[-1].model == "full"
-    qtbot.waitUntil(lambda: used[-1].model == "paper", timeout=30_000)
 
 
 def test_a_calibration_of_the_papers_model_offers_one_mode(
@@ -117,11 +95,3 @@ def test_a_mode_shows_its_measured_time(
     texts = [choice.box.itemText(k) for k in range(choice.box.count())]
     assert texts[-1].endswith("20 ms")
     assert not texts[0].endswith("ms")
-
-
-def test_settings_without_a_valid_mode_give_the_default(
-    choice: ModeChoice, context: AppContext
-) -> None:
-    context.settings.reconstruction = ("full", "heroic")
-    assert choice.mode == Mode("full", "fast")
-    assert "2 ms" in mode_text(choice.mode, 2.0)

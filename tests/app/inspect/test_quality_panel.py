@@ -41,17 +41,3 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(
     assert not panel.map.has_image and not panel._legend.text() and not panel.map.bar.isVisible()
     panel.show_frame(replace(shown, quality_top=0.002), still=True)
     assert panel.map.has_image and panel._legend.text() and panel.map.bar.isVisible()
-
-
-def test_a_frozen_image_states_whether_an_uncertainty_will_follow(
-    dome: HeightMap, qtbot: QtBot
-) -> None:
-    """Just after Pause the exact frame is not ready, but the full model gives an uncertainty."""
-    panel = QualityPanel()
-    qtbot.addWidget(panel)
-    panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
-    maker = Maker(Reconstruction(dome))  # type: ignore[arg-type]
-    shown = replace(maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), quality=None)
-    for model, words in (("full", "Computing"), ("paper", "gives no uncertainty")):
-        panel.show_frame(replace(shown, heightmap=replace(dome, model=model)), still=True)
-        assert words in panel.map._words.text()

@@ -14,7 +14,7 @@ from app.inspect.section_line import SectionLines
 from app.inspect.section_panel import SectionPanel
 from app.view2d.cuts import Cut, Section, cut
 from app.view2d.map_view import MapView
-from app.view2d.profile_plot import LINE_COLOURS, line_colour
+from app.view2d.profile_plot import line_colour
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 SIDE_MM = np.arange(-8.0, 8.0, 0.1)
@@ -34,15 +34,6 @@ def numbers(lines: SectionLines) -> list[int]:
     return [line.number for line in lines]
 
 
-def test_a_new_line_lies_beside_the_chosen_one_and_is_chosen(lines: SectionLines) -> None:
-    (first,) = lines
-    lines.add()
-    _, second = lines
-    assert lines.chosen == second.number == 2
-    assert second.start_mm[0] == first.start_mm[0]
-    assert second.start_mm[1] > first.start_mm[1] + 1.0
-
-
 def test_a_removed_number_is_given_again_and_one_line_always_remains(lines: SectionLines) -> None:
     lines.add()
     lines.add()
@@ -55,19 +46,6 @@ def test_a_removed_number_is_given_again_and_one_line_always_remains(lines: Sect
         lines.remove()
     assert len(numbers(lines)) == 1
     assert not lines.may_remove
-
-
-def test_there_are_as_many_lines_as_colours(lines: SectionLines) -> None:
-    for _ in range(9):
-        lines.add()
-    assert not lines.may_add
-    assert len({line_colour(number) for number in numbers(lines)}) == len(LINE_COLOURS)
-
-
-def test_a_moved_line_becomes_the_chosen_one(lines: SectionLines) -> None:
-    lines.add()
-    lines._lines[1]._roi.setPos(0.5, 0.0)
-    assert lines.chosen == 1
 
 
 def test_each_curve_has_the_colour_of_its_line_and_the_values_are_of_the_chosen_one(

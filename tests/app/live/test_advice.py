@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.live.advice import Advice, Known, LiveState, advise
+from app.live.advice import Known, LiveState, advise
 from gelpolight_core.health.finding import Finding
 from gelpolight_core.quality import Verdict
 
@@ -44,10 +44,6 @@ def test_a_fault_of_the_image_is_shown_in_one_line_and_zero_is_offered_where_it_
     off = advise(LiveState("camera", size=MINE.size, used=MINE, fault=OFF))
     assert (dim.text, dim.act, dim.role) == (DIM.line, "zero", "warn")
     assert (off.text, off.act, off.role) == (OFF.line, "", "fail")
-
-
-def test_there_is_no_advice_while_all_is_well() -> None:
-    assert advise(LiveState("recording", "A", MINE.size, MINE)) == Advice()
 
 
 def test_a_calibration_of_another_sensor_or_size_is_named() -> None:

@@ -34,18 +34,6 @@ def _library_of_one(
     return path, CalibrationChoice(jobs, box, context=context), jobs, box  # type: ignore[arg-type]
 
 
-def test_a_stopped_reading_has_ended(context: AppContext, qtbot: QtBot) -> None:
-    """Otherwise the page would ask the user to wait for ever."""
-    box, jobs = CalibrationBox(), Waiting()
-    qtbot.addWidget(box)
-    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
-    assert not choice.is_reading
-    choice._read(Path("a.gplcal"))
-    assert choice.is_reading
-    jobs.job.over = True
-    assert not choice.is_reading
-
-
 def test_a_calibration_is_read_again_after_a_stopped_reading(
     context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
@@ -66,23 +54,6 @@ def test_a_calibration_is_read_again_after_a_stopped_reading(
     second.done((path, None, None))
     box.activated.emit(box.currentIndex())
     assert jobs.job is second
-
-
-def test_the_previous_calibration_is_released_when_another_is_selected(
-    context: AppContext, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    """Otherwise it would measure on under the new name if that one is not read completely."""
-    path, choice, jobs, _ = _library_of_one(context, small_calibration, qtbot)
-    reported: list[tuple[object, object, bool]] = []
-    choice.loaded.connect(lambda live, best: reported.append((live, best, choice.is_reading)))
-    choice.refresh()
-    assert reported == []
-    choice.use_what_fits("", None)
-    choice.refresh()
-    assert reported == [(None, None, True)]
-    jobs.job.done((path, "live", "best"))
-    choice.refresh()
-    assert reported[1:] == [("live", "best", False)]
 
 
 def test_a_replaced_file_is_read_again(

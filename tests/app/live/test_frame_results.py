@@ -18,7 +18,6 @@ from app.view2d.quantities import FLAG_COLOURS, Reference
 from app.view3d.surface import LIVE_NODES
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.misfit import Misfit
 
 
 @dataclass
@@ -52,17 +51,6 @@ def test_only_the_view_that_is_shown_is_computed(dome: HeightMap, frame: Frame, 
     made = {f.name for f in fields(shown) if f.name in ("height", "normals", "quality", "surface")}
     assert {name for name in made if getattr(shown, name) is not None} == {view}
     assert shown.cut is None
-
-
-def test_with_only_the_camera_shown_nothing_is_reconstructed(dome: HeightMap, frame: Frame) -> None:
-    shown, reconstruction = _made(dome, frame, camera=True)
-    assert shown.heightmap is None
-    assert reconstruction.asked == []
-
-
-def test_hidden_normals_are_not_computed(dome: HeightMap, frame: Frame) -> None:
-    _, reconstruction = _made(dome, frame, height=True)
-    assert reconstruction.asked == [{"normals": False, "uncertainty": False}]
 
 
 @pytest.mark.parametrize(("still", "expected"), [(False, False), (True, True)])
@@ -165,31 +153,6 @@ def test_a_frozen_height_map_is_shown_and_measured_as_processed(
     assert live.heightmap is tilted and not live.processed
 
 
-def test_a_processing_that_is_refused_changes_nothing_and_is_reported(
-    dome: HeightMap, frame: Frame
-) -> None:
-    steps = Processing(level="points", points_mm=((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)))
-    shown, _ = _made(dome, frame, height=True, still=True, processing=steps)
-    assert shown.heightmap is dome and not shown.processed
-    assert "line" in shown.refused
-
-
-def test_without_a_reference_or_an_uncertainty_the_surface_shows_depth(
-    dome: HeightMap, frame: Frame
-) -> None:
-    for quantity in ("difference", "uncertainty"):
-        shown, _ = _made(dome, frame, surface=True, display=Display(colour_by=quantity))
-        assert (shown.surface.scale.low, shown.surface.scale.high) == shown.range_mm
-
-
-def test_the_side_towards_the_light_is_brighter() -> None:
-    x = np.linspace(-3.0, 3.0, 121)
-    dome = np.maximum(1.0 - 0.2 * (x[:, None] ** 2 + x**2), 0.0).astype(np.float32)
-    grey = np.full((256, 3), 128, np.uint8)
-    lit = shading.shaded(dome, 0.05, grey, (0.0, 1.0), Light(azimuth_deg=270.0))
-    assert lit[60, 40].mean() > lit[60, 60].mean() > lit[60, 80].mean()
-
-
 @pytest.mark.parametrize("shade", [False, True])
 def test_contour_lines_lie_where_the_depth_is_a_multiple_of_the_step(
     shade: bool,
@@ -234,23 +197,3 @@ def test_colours_keep_their_depth_when_the_press_becomes_lighter(
     deep = maker(frame).range_mm
     reconstruction.heightmap = replace(dome, depth_mm=0.2 * dome.depth_mm)
     assert maker(replace(frame, number=1, time_s=0.03)).range_mm == deep == (0.0, 1.0)
-
-
-def test_a_locked_range_is_the_one_that_is_shown(dome: HeightMap, frame: Frame) -> None:
-    shown, _ = _made(dome, frame, height=True, display=Display(range_mm=(0.1, 0.4)))
-    assert shown.range_mm == (0.1, 0.4)
-
-
-def test_the_colours_of_the_misfit_do_not_jump_between_frames(
-    dome: HeightMap, frame: Frame, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    misfits = iter([0.08, 0.083, 0.077, 0.04])
-
-    def solved(*_: object, **__: object) -> Misfit:
-        return Misfit("paper", np.full((16, 16), next(misfits), np.float32))
-
-    monkeypatch.setattr("app.live.frame_results.solve_misfit", solved)
-    maker = Maker(Reconstruction(dome))  # type: ignore[arg-type]
-    maker.wanted = Wanted(quality="misfit")
-    tops = {maker(replace(frame, number=k, time_s=0.03 * k)).quality_top for k in range(4)}
-    assert tops == {0.1}

@@ -57,21 +57,6 @@ def test_frames_of_a_camera_that_is_still_settling_show_no_fault(depth: LiveDept
     assert depth.state.fault is None
 
 
-def test_a_lost_camera_comes_before_a_frame_that_failed(depth: LiveDepth) -> None:
-    frame = Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)
-    shown = list[object]()
-    depth.shown.connect(shown.append)
-    depth.live.processed.emit(Failure(0, frame, "Cannot be used."))
-    assert depth.state.trouble == "Cannot be used."
-    assert len(shown) == 1, "the camera image is still shown"
-    depth.live.lost.emit("Unplugged.")
-    assert depth.state.trouble == "Unplugged."
-    depth.live.lost.emit("")
-    assert depth.state.trouble == "Cannot be used."
-    depth.live.processed.emit(outcome(Health(()), 0.0))
-    assert (depth.state.trouble, depth.state.size) == ("", (6, 4))
-
-
 def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: LiveDepth) -> None:
     camera = SimpleNamespace(width=6, height=4)
     calibration = SimpleNamespace(camera=camera, sensor=SimpleNamespace(serial="A"))

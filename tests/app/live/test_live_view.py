@@ -20,7 +20,6 @@ from app.live.drawing import ROLE_COLOURS
 from app.live.image_checks import pixel_text
 from app.live.live_view import LiveView
 from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay
-from app.shell.shortcuts import shortcuts_of
 from gelpolight_core.errors import InputError
 
 HEIGHT, WIDTH = 60, 80
@@ -171,41 +170,12 @@ def test_every_kind_of_mark_shows_and_can_be_switched_off(view: LiveView) -> Non
     np.testing.assert_array_equal(pixels(image_view), bare)
 
 
-def test_a_masked_pixel_is_tinted_and_its_neighbours_are_not(view: LiveView) -> None:
-    view.show_image(black())
-    image_view = child(view, "live.image")
-    area = np.zeros((HEIGHT, WIDTH), bool)
-    area[20, 30] = True
-    view.set_overlay(Overlay(masks=(Mask(area, "bad"),)))
-    shown = pixels(image_view)
-    assert middle(shown[..., 0] > 60) == pytest.approx(image_view.view_position(30, 20), abs=1.0)
-
-
-def test_a_dragged_circle_reports_its_new_position(view: LiveView, qtbot: QtBot) -> None:
-    view.show_image(black())
-    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
-    with qtbot.waitSignal(view.moved) as reported:
-        drag(view, (40.0, 30.0), (45.0, 26.0))
-    assert reported.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (45.0, 26.0, 12.0))]
-
-
 def test_a_dragged_rim_resizes_the_circle(view: LiveView, qtbot: QtBot) -> None:
     view.show_image(black())
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
     with qtbot.waitSignal(view.moved) as reported:
         drag(view, (52.0, 30.0), (56.0, 30.0))
     assert reported.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (40.0, 30.0, 16.0))]
-
-
-def test_the_image_can_be_panned_over_marks_without_a_handle(view: LiveView, qtbot: QtBot) -> None:
-    view.show_image(black())
-    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good"),)))
-    image_view = child(view, "live.image")
-    before = image_view.view_position(40.0, 30.0)
-    with qtbot.assertNotEmitted(view.moved):
-        drag(view, (40.0, 30.0), (45.0, 30.0))
-    after = image_view.view_position(40.0, 30.0)
-    assert after[0] - before[0] == pytest.approx(5.0 * image_view.scale_px, rel=0.2)
 
 
 def test_a_newer_result_does_not_move_a_dragged_handle(view: LiveView) -> None:
@@ -235,16 +205,6 @@ def test_arrow_keys_move_the_selected_handle(view: LiveView, qtbot: QtBot) -> No
     assert reported.args == ["ball", *(pytest.approx(x) for x in (40.2, 28.0, 10.2))]
 
 
-def test_hiding_the_view_does_not_lose_a_move_by_key(view: LiveView, qtbot: QtBot) -> None:
-    view.show_image(black())
-    view.set_overlay(Overlay(markers=(Marker(5.0, 6.0, "plus", "led0", handle="mirror.0"),)))
-    qtbot.keyClick(view, Qt.Key.Key_PageDown)
-    qtbot.keyClick(view, Qt.Key.Key_Down)
-    with qtbot.waitSignal(view.moved) as reported:
-        view.hide()
-    assert reported.args == ["mirror.0", 5.0, pytest.approx(6.2), 0.0]
-
-
 def test_the_newest_frame_of_a_stream_is_shown(view: LiveView, qtbot: QtBot) -> None:
     stream = FakeStream()
     view.set_stream(stream)
@@ -255,20 +215,6 @@ def test_the_newest_frame_of_a_stream_is_shown(view: LiveView, qtbot: QtBot) -> 
     qtbot.waitUntil(lambda: bool((pixels(image_view)[300, 450] == (0, 90, 0)).all()))
     assert child(view, "live.rate").text() == "30 frames/s, 2 dropped"
     assert child(view, "live.focus").isVisible()
-
-
-def test_nothing_is_drawn_without_a_new_frame(view: LiveView, qtbot: QtBot) -> None:
-    stream = FakeStream()
-    view.set_stream(stream)
-    stream.put(black())
-    qtbot.waitUntil(lambda: stream.newest.frame is None)
-    qtbot.wait(50)
-    painted = []
-    item = child(view, "live.image").overlay
-    paint = item.paint
-    item.paint = lambda *a: (painted.append(1), paint(*a))
-    qtbot.wait(150)
-    assert not painted
 
 
 def test_a_frozen_image_stays_while_the_stream_continues(view: LiveView, qtbot: QtBot) -> None:
@@ -294,26 +240,6 @@ def test_the_reason_for_a_lost_camera_is_shown(view: LiveView, qtbot: QtBot) -> 
     qtbot.waitUntil(lambda: child(view, "live.rate").text() == stream.lost, timeout=3000)
 
 
-def test_without_a_stream_the_view_says_so(view: LiveView) -> None:
-    view.show_image(black())
-    view.set_stream(None)
-    image_view = child(view, "live.image")
-    words = [label.text() for label in image_view.findChildren(QWidget) if hasattr(label, "text")]
-    assert "No camera. Select a source." in words
-    assert image_view.image_size == (0, 0)
-
-
-def test_stripes_come_and_go_on_a_still(view: LiveView) -> None:
-    view.show_image(np.full((HEIGHT, WIDTH, 3), 255, np.uint8))
-    image_view = child(view, "live.image")
-    magenta = (255, 0, 255)
-    assert not (pixels(image_view) == magenta).all(axis=2).any()
-    view.zebra(True)
-    assert (pixels(image_view) == magenta).all(axis=2).mean() > 0.2
-    view.zebra(False)
-    assert not (pixels(image_view) == magenta).all(axis=2).any()
-
-
 def test_sixteen_bit_frames_are_shown_with_their_own_values(view: LiveView) -> None:
     rgb = np.full((HEIGHT, WIDTH, 3), 30000, np.uint16)
     view.show_image(rgb)
@@ -321,14 +247,6 @@ def test_sixteen_bit_frames_are_shown_with_their_own_values(view: LiveView) -> N
     assert pixel_text(rgb, 3.4, 4.6) == (
         "u 3, v 5:  R 30000 (46 %)   G 30000 (46 %)   B 30000 (46 %)"
     )
-
-
-def test_the_readout_ends_at_the_image_border() -> None:
-    rgb = black()
-    assert pixel_text(rgb, -0.4, HEIGHT - 0.6).startswith(f"u 0, v {HEIGHT - 1}:")
-    for u, v in ((-0.6, 5.0), (5.0, -0.6), (WIDTH - 0.4, 5.0), (5.0, HEIGHT - 0.4)):
-        assert pixel_text(rgb, u, v) == ""
-    assert pixel_text(rgb, float("nan"), float("nan")) == ""
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
@@ -392,16 +310,6 @@ def test_fit_full_size_and_double_click(view: LiveView) -> None:
     )
 
 
-def test_a_click_reports_the_pixel(view: LiveView, qtbot: QtBot) -> None:
-    view.show_image(black())
-    image_view = child(view, "live.image")
-    position = image_view.view_position(33.0, 21.0)
-    with qtbot.waitSignal(view.clicked) as reported:
-        mouse(image_view, QEvent.Type.MouseButtonPress, position, True)
-        mouse(image_view, QEvent.Type.MouseButtonRelease, position, False)
-    assert reported.args == [pytest.approx(33.0, abs=0.1), pytest.approx(21.0, abs=0.1)]
-
-
 def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
     view: LiveView, qtbot: QtBot
 ) -> None:
@@ -426,25 +334,6 @@ def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
     assert child(view, "live.histogram").objectName()
 
 
-def test_tools_follow_the_theme(view: LiveView) -> None:
-    button = child(view, "live.fit")
-    before = button.icon().cacheKey()
-    application = QApplication.instance()
-    usual, sheet = QApplication.palette(), application.styleSheet()
-    palette = QApplication.palette()
-    palette.setColor(palette.ColorRole.ButtonText, QColor("#ff0000"))
-    try:
-        QApplication.setPalette(palette)
-        # With a style sheet, Qt sends a palette change to widgets only when the sheet is set again.
-        application.setStyleSheet(sheet + " ")
-        QApplication.processEvents()
-        assert button.icon().cacheKey() != before
-        assert button.icon().pixmap(20, 20).toImage().pixelColor(3, 3).red() > 200
-    finally:
-        QApplication.setPalette(usual)
-        application.setStyleSheet(sheet)
-
-
 def test_requested_drags_are_emitted_and_do_not_pan(view: LiveView, qtbot: QtBot) -> None:
     view.show_image(black())
     view.hand_drags_on(True)
@@ -466,36 +355,3 @@ def test_a_handle_is_dragged_before_the_object_below_it(view: LiveView, qtbot: Q
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
     with qtbot.assertNotEmitted(view.dragged), qtbot.waitSignal(view.moved):
         drag(view, (40.0, 30.0), (45.0, 30.0))
-
-
-def test_no_magnification_is_shown_without_an_image(view: LiveView) -> None:
-    assert child(view, "live.zoom").text() == ""
-    view.show_image(black())
-    assert child(view, "live.zoom").text().endswith("%")
-    view.set_stream(None)
-    assert child(view, "live.zoom").text() == ""
-
-
-@pytest.mark.parametrize("width", [370, 630, 900])
-def test_the_exposure_advice_is_never_cut_off_and_moves_nothing(view: LiveView, width: int) -> None:
-    view.resize(width, 700)
-    QApplication.processEvents()
-    heights = set()
-    for level in (0, 10, 128, 255):
-        bright = np.full((HEIGHT, WIDTH, 3), level, np.uint8)
-        view.show_image(bright)
-        QApplication.processEvents()
-        label = child(view, "live.exposure")
-        assert label.text()
-        needed = label.heightForWidth(label.width()) if label.wordWrap() else 0
-        assert needed <= label.height()
-        assert label.wordWrap() or label.sizeHint().width() <= label.width()
-        heights.add(child(view, "live.checks").height())
-    assert len(heights) == 1
-
-
-def test_the_keys_of_the_image_are_in_the_shortcut_list(qtbot: QtBot) -> None:
-    view = LiveView()
-    qtbot.addWidget(view)
-    reported = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(view)}
-    assert ("live", "Z", "Mark saturated pixels") in reported

@@ -22,13 +22,6 @@ def plot(qapp: QApplication, qtbot: QtBot) -> Iterator[ErrorPlot]:
     theme.apply(qapp, "light")
 
 
-def test_its_legend_can_be_read_in_both_themes(qapp: QApplication, plot: ErrorPlot) -> None:
-    for dark, name in ((False, "light"), (True, "dark"), (False, "light")):
-        theme.apply(qapp, name)
-        for _, label in plot._legend.items:
-            assert theme.COLOURS["text"][dark] in label.item.toHtml()
-
-
 def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights(
     plot: ErrorPlot,
 ) -> None:

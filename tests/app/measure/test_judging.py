@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from app.measure.judging import Stated, judge
 from app.measure.keeping import Kept, record_of
 from app.services.settings import Limits
-from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
@@ -103,10 +102,3 @@ def test_a_record_contains_object_calibration_and_operator() -> None:
     assert record.settings["tool"] == {"tool": "distance", "a_mm": [0.0, 0.0], "b_mm": [3.0, 0.0]}
     assert record.settings["indenter"] == "Gauge"
     assert record.quantities[0].truth == 3.01
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
-@pytest.mark.parametrize("result", [PRESSED, APART])
-def test_a_truth_of_zero_or_less_is_refused(result: ToolResult, value: float) -> None:
-    with pytest.raises(InputError, match="greater than zero"):
-        judge(result, Stated(size_mm=value), Limits())

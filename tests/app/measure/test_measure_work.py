@@ -46,25 +46,6 @@ def test_a_removed_image_is_released_and_the_next_one_is_measured(
     work.close()
 
 
-def test_a_second_request_to_detect_the_object_adds_no_second_tool(
-    small_calibration: Calibration, small_session: Path, qtbot: QtBot
-) -> None:
-    work = Work()
-    work.use(Reconstructor(small_calibration))
-    work.take(MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png"))))
-    work.propose()
-    assert work.detecting
-    work.propose()  # an impatient click
-    qtbot.waitUntil(lambda: bool(work.sheet.items) and not work.busy, timeout=PATIENCE_MS)
-    assert not work.detecting
-    first = work.chosen
-    work.choose(0)
-    work.propose()
-    qtbot.waitUntil(lambda: work.chosen == first, timeout=PATIENCE_MS)
-    assert len(work.sheet.items) == 1
-    work.close()
-
-
 def test_results_of_an_earlier_calibration_are_not_shown(
     small_calibration: Calibration,
     small_session: Path,

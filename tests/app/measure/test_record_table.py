@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
-from app.measure.record_table import RecordModel, error_text
+from app.measure.record_table import RecordModel
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
 
@@ -20,11 +19,3 @@ def test_an_evaluation_has_a_row_with_its_mean_errors(qapp: QApplication) -> Non
     assert {"2.00 %", "4.00 %"} <= set(cells)
     for column in columns:
         model.data(model.index(0, column), Qt.ItemDataRole.DecorationRole)
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [("angle_deg", "+1.000°, +3.33 %"), ("diameter_mm", "+1.000 mm, +3.33 %")],
-)
-def test_an_error_has_the_unit_of_what_was_measured(name: str, text: str) -> None:
-    assert error_text(Quantity(name, 31.0, truth=30.0)) == text

@@ -8,17 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PySide6.QtCore import QRectF
-from PySide6.QtGui import QImage, QPainter, QTransform
-from PySide6.QtWidgets import QApplication
 
 from app.measure.figures_text import value_text
-from app.measure.grips import Point, grips_of, moved, nearest_grip
+from app.measure.grips import Point, grips_of, moved
 from app.measure.placing import first_points, kinds, make_tool
-from app.measure.sheet import Sheet
 from app.measure.steady import SteadyPress
-from app.measure.tool_layer import DrawnTool, _paint_text
-from gelpolight_core.measurement.tools import Distance, tool_as_dict, tool_from_dict
+from gelpolight_core.measurement.tools import tool_as_dict, tool_from_dict
 
 KINDS = st.sampled_from([kind.name for kind in kinds()])
 PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
@@ -52,23 +47,6 @@ def test_every_tool_has_its_own_key_and_asks_for_all_its_points() -> None:
     assert len(set(keys)) == len(keys)
     for kind in kinds():
         assert len(first_points(kind.name, (0.0, 0.0))) == len(kind.asks)
-
-
-def test_a_grip_is_found_only_within_reach() -> None:
-    grips = grips_of(Distance((0.0, 0.0), (3.0, 0.0)))
-    near = nearest_grip(grips, (2.9, 0.1), reach_mm=0.2)
-    assert near is not None
-    assert near.name == "b"
-    assert nearest_grip(grips, (1.5, 0.0), reach_mm=0.2) is None
-
-
-def test_the_sheet_keeps_a_tools_key_when_others_change() -> None:
-    first, second = Distance((0.0, 0.0), (1.0, 0.0)), Distance((0.0, 0.0), (2.0, 0.0))
-    sheet = Sheet().added(first).added(second)
-    keys = [item.key for item in sheet.items]
-    assert sheet.without(keys[0]).tool(keys[1]) == second
-    assert sheet.changed(keys[1], first).tool(keys[1]) == first
-    assert sheet.without(99) == sheet
 
 
 @pytest.mark.parametrize(
@@ -109,22 +87,3 @@ def test_neither_a_bare_membrane_nor_an_unsettled_image_is_frozen() -> None:
     watch = SteadyPress()
     assert not any(watch.update(_dome(0.01), 0.05 * k) for k in range(40))
     assert not any(watch.update(_dome(1.0), 3.0 + 0.05 * k, settled=False) for k in range(40))
-
-
-def test_a_released_press_is_not_frozen_again_before_it_moves() -> None:
-    watch = SteadyPress()
-    watch.hold_off()
-    assert not any(watch.update(_dome(1.0), 0.05 * k) for k in range(1, 40))
-
-
-@pytest.mark.parametrize("at", [(0.0, 0.0), (99.0, 0.0), (500.0, -500.0), (-500.0, 500.0)])
-def test_a_figure_is_written_on_the_map_and_not_on_its_axes(qapp: QApplication, at: Point) -> None:
-    image = QImage(300, 200, QImage.Format.Format_RGB32)
-    painter = QPainter(image)
-    view = QRectF(30.0, 0.0, 200.0, 180.0)
-    tool = DrawnTool(1, ((at, at),), "ok", "5.032 ± 0.026 mm")
-    plates: list[QRectF] = []
-    for _ in range(2):
-        plates.append(_paint_text(painter, tool, QTransform(), view, plates))
-    painter.end()
-    assert view.contains(plates[0]) and not plates[0].intersects(plates[1])

@@ -218,13 +218,6 @@ def test_the_trash_restores_what_was_removed_in_an_earlier_run(
     trash.close()
 
 
-def test_calibrations_of_one_day_differ_in_the_table(source: Path) -> None:
-    cells = cells_of(read_entry(source), datetime.now(UTC), 90.0)
-    made = read_entry(source).created.astimezone()
-    assert f"{made:%H:%M}" in cells[2].text
-    assert cells[-1].text == "made"
-
-
 def test_a_broken_file_is_shown_with_its_reason(
     page: SensorsPage, source: Path, context: AppContext
 ) -> None:
@@ -240,28 +233,6 @@ def test_a_broken_file_is_shown_with_its_reason(
     assert page.remove.isEnabled()
 
 
-def test_a_broken_file_is_refused_in_one_sentence(
-    page: SensorsPage, context: AppContext, tmp_path: Path
-) -> None:
-    (tmp_path / "bad.gplcal").write_text("no calibration")
-    page.open_path(tmp_path / "bad.gplcal")
-    assert "damaged" in context.toasts.shown()[0].text
-    assert "No sensor yet" in words(page)
-
-
-def test_the_selection_is_kept(
-    page: SensorsPage, source: Path, context: AppContext, tmp_path: Path
-) -> None:
-    page.open_path(source)
-    for serial in ("0-before", "z-after"):
-        folder = context.workspace.sensor_folder(serial)
-        folder.mkdir(parents=True)
-        (folder / "x.gplcal").write_text("broken")
-    before = page.chosen()
-    page.enter()
-    assert page.chosen() == before
-
-
 def test_an_old_calibration_is_marked(source: Path) -> None:
     entry = read_entry(source)
     made = entry.created
@@ -272,13 +243,6 @@ def test_an_old_calibration_is_marked(source: Path) -> None:
     assert young[3].icon == ""
     assert old[3].icon == "stale"
     assert "calibrate again" in old[3].tip
-
-
-def test_every_column_of_every_row_has_a_text_or_a_tip(source: Path, tmp_path: Path) -> None:
-    (tmp_path / "x.gplcal").write_text("broken")
-    for path in (source, tmp_path / "x.gplcal"):
-        cells = cells_of(read_entry(path, in_use=True), datetime.now(UTC), 90.0)
-        assert all(cell.text or cell.tip for cell in cells if cell.icon)
 
 
 def session_of(context: AppContext, serial: str) -> Path:

@@ -18,15 +18,6 @@ from gelpolight_core.errors import InputError
 Tell = Callable[[float], None]
 
 
-def test_jobs_run_one_after_the_other(qtbot: QtBot) -> None:
-    jobs, done = Jobs("jobs"), list[Any]()
-    for number in range(3):
-        jobs.submit(Job("count", lambda _progress, n=number: n, done.append))
-    qtbot.waitUntil(lambda: not jobs.busy)
-    assert done == [0, 1, 2]
-    assert jobs.close()
-
-
 class Heavy:
     """Replaces a calibration: memory that must not wait for the garbage collector."""
 
@@ -109,23 +100,6 @@ def test_a_hanging_job_does_not_block_closing(
     assert "hanging did not stop" in caplog.text
     go.set()
     assert join_left_behind(10.0)
-
-
-def test_a_failed_required_job_is_reported_after_its_page_closed() -> None:
-    jobs, reported = Jobs("jobs"), list[str]()
-    jobs.refused.connect(reported.append)
-    go = threading.Event()
-
-    def refuse(_progress: Tell) -> None:
-        go.wait(10.0)
-        raise InputError("the disk is full", where="a.png", advice="Free some space")
-
-    jobs.submit(Job("save", refuse, must=True))
-    jobs.submit(Job("compute", refuse))
-    go.set()
-    assert jobs.close()
-    (sentence,) = reported
-    assert "the disk is full" in sentence
 
 
 def test_a_hanging_required_job_is_reported_and_still_completed(

@@ -54,12 +54,6 @@ def test_an_error_is_passed_on_and_the_thread_continues() -> None:
     assert worker.stop()
 
 
-def test_a_stopped_worker_leaves_no_thread() -> None:
-    worker = NewestWins(lambda request: request, name="test-stops")
-    assert worker.stop()
-    assert "test-stops" not in {thread.name for thread in threading.enumerate()}
-
-
 def test_a_result_is_not_kept_after_it_was_read() -> None:
     class Heavy:
         pass

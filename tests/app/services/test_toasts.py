@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QPushButton, QStackedWidget, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
-from app.services.toasts import MOST, Toasts
+from app.services.toasts import Toasts
 from app.shell.notifications import NotificationsButton
 from app.widgets.native import give_own_window
 
@@ -47,12 +47,6 @@ def test_the_same_message_is_counted_instead_of_filling_the_window(
     assert context.toasts.shown()[0].times == 50
 
 
-def test_only_the_newest_messages_are_shown(context: AppContext, host: QWidget) -> None:
-    for number in range(3 * MOST):
-        context.toasts.show(f"message {number}", "fail")
-    assert texts(context.toasts) == [f"message {n}" for n in range(2 * MOST, 3 * MOST)]
-
-
 def test_a_note_disappears_and_an_error_stays(context: AppContext, host: QWidget) -> None:
     context.toasts.show("saved")
     context.toasts.show("not saved", "fail")
@@ -73,19 +67,6 @@ def test_its_button_acts_once_and_closes_it(
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     assert undone == [1]
     assert not context.toasts.shown()
-
-
-def test_every_message_is_in_the_log(context: AppContext, host: QWidget) -> None:
-    context.toasts.show("the disk is full", "fail")
-    assert any("the disk is full" in r.text for r in context.log.recent.since(0))
-
-
-def test_messages_stay_in_the_window_when_it_shrinks(
-    context: AppContext, host: QWidget, qtbot: QtBot
-) -> None:
-    context.toasts.show("a message")
-    host.resize(300, 200)
-    qtbot.waitUntil(lambda: host.rect().contains(context.toasts.shown()[0].geometry()))
 
 
 def test_messages_stay_above_a_page_that_is_shown_later(context: AppContext, qtbot: QtBot) -> None:

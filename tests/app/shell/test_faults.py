@@ -8,14 +8,12 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from PySide6.QtCore import qWarning
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.services.log import CRASHES, Log
 from app.shell.faults import Faults
-from gelpolight_core.errors import InputError
 
 
 @pytest.fixture
@@ -46,12 +44,6 @@ def test_an_internal_error_is_one_sentence_and_the_log_has_the_traceback(
     assert "Traceback" in log_of(context)
 
 
-def test_an_input_error_is_shown_unchanged(faults: Faults, context: AppContext) -> None:
-    error = InputError("the image is black", where="mirror_01.png", advice="Switch the LEDs on")
-    sys.excepthook(InputError, error, None)
-    assert context.toasts.shown()[0].text == str(error)
-
-
 def test_an_error_in_a_thread_is_shown(faults: Faults, context: AppContext, qtbot: QtBot) -> None:
     def fail() -> None:
         raise ZeroDivisionError("in the capture thread")
@@ -77,21 +69,6 @@ def test_a_thousand_equal_errors_are_one_message(faults: Faults, context: AppCon
     for _ in range(1000):
         sys.excepthook(ValueError, ValueError("the same again"), None)
     assert len(context.toasts.shown()) == 1
-
-
-def test_warnings_of_qt_are_in_the_log(faults: Faults, context: AppContext) -> None:
-    qWarning("a complaint of Qt")
-    assert "a complaint of Qt" in log_of(context)
-    assert not context.toasts.shown()
-
-
-def test_the_hooks_are_restored(context: AppContext) -> None:
-    before = (sys.excepthook, threading.excepthook, sys.unraisablehook)
-    faults = Faults(context.toasts)
-    faults.install()
-    assert sys.excepthook != before[0]
-    faults.uninstall()
-    assert (sys.excepthook, threading.excepthook, sys.unraisablehook) == before
 
 
 def test_a_crash_of_the_last_run_is_noticed_once(tmp_path) -> None:

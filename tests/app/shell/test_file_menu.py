@@ -111,13 +111,6 @@ def test_missing_files_are_shown_with_the_reason_and_cannot_be_chosen(
         assert str(folder) in entries[folder.name].toolTip()
 
 
-def test_the_list_of_recent_files_is_cleared(window: MainWindow, tmp_path: Path) -> None:
-    window.open_session(_session(tmp_path / "monday"))
-    _entries(window.menus.file.recent)["Clear this list"].trigger()
-    (empty,) = _entries(window.menus.file.recent).values()
-    assert not empty.isEnabled()
-
-
 def test_export_offers_what_the_visible_page_can_export(window: MainWindow) -> None:
     assert list(_entries(window.menus.file.exports)) == ["Export it"]
     window.show_page("bare")

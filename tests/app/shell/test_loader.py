@@ -56,35 +56,6 @@ def test_a_partly_loaded_module_does_not_count_as_loaded(
     qtbot.waitUntil(lambda: bool(called))
 
 
-def test_requested_modules_are_loaded_first(
-    slow_modules: list[str], tmp_path: Path, qtbot: QtBot
-) -> None:
-    (tmp_path / "loader_third.py").write_text(
-        "import sys\nassert 'loader_second' not in sys.modules"
-    )
-    loader, called = Loader(), []
-    loader.load(slow_modules)
-    gate = sys.modules["loader_gate"]
-    assert gate.begun.wait(5)
-    loader.when_loaded(["loader_third"], lambda: called.append("loader_third" in sys.modules))
-    gate.go.set()
-    qtbot.waitUntil(lambda: called == [True])
-    loader.stop()
-    del sys.modules["loader_third"]
-
-
-def test_closing_skips_pending_modules_and_callbacks(slow_modules: list[str], qtbot: QtBot) -> None:
-    loader, called = Loader(), []
-    loader.when_loaded(slow_modules, lambda: called.append(1))
-    gate = sys.modules["loader_gate"]
-    assert gate.begun.wait(5)
-    threading.Timer(0.05, gate.go.set).start()
-    loader.stop()
-    qtbot.wait(50)
-    assert "loader_second" not in sys.modules
-    assert not called
-
-
 def test_a_module_that_fails_to_load_is_reported_and_blocks_nothing(
     qtbot: QtBot, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -92,7 +63,3 @@ def test_a_module_that_fails_to_load_is_reported_and_blocks_nothing(
     loader.when_loaded(["no_such_module_anywhere"], lambda: called.append(1))
     qtbot.waitUntil(lambda: called == [1])
     assert "no_such_module_anywhere" in caplog.text
-
-
-def test_a_loader_that_was_never_started_can_be_stopped(qtbot: QtBot) -> None:
-    Loader().stop()

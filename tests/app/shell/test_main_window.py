@@ -35,14 +35,10 @@ from app.context.pages import PageEntry
 from app.desktop import open_files
 from app.services.settings import Limits, Settings
 from app.services.status import (
-    Skipped,
     Status,
-    StatusLine,
-    StatusModel,
-    skipped_text,
     status_texts,
 )
-from app.shell.about import AboutDialog, versions
+from app.shell.about import AboutDialog
 from app.shell.log_window import LogWindow
 from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
@@ -162,26 +158,6 @@ def test_a_slow_page_appears_when_it_is_loaded(
     qtbot.waitUntil(lambda: window.page_name == "calibrate")
     assert window.page("calibrate").events == ["enter", "begin demo"]
     del sys.modules["slow_page"]
-
-
-def test_another_page_chosen_during_loading_stays_visible(
-    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "slower_page.py").write_text("import time\ntime.sleep(0.2)\nPage = None\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    window.entries["calibrate"] = PageEntry("calibrate", "C", "calibrate", "slower_page:Page")
-    window.show_page("calibrate")
-    window.show_page("sensors")
-    qtbot.waitUntil(lambda: window.loader._thread is None)
-    qtbot.wait(20)
-    assert window.page_name == "sensors"
-    assert "calibrate" not in window._made
-    del sys.modules["slower_page"]
-
-
-def test_a_missing_page_is_not_offered() -> None:
-    assert not PageEntry("x", "X", "sensors", "app.no_such_thing.page:X").exists
-    assert not PageEntry("x", "X", "sensors", "app.sensors.no_such_page:X").exists
 
 
 def test_a_page_can_keep_the_window_open(window: MainWindow) -> None:
@@ -307,11 +283,6 @@ def test_a_dropped_session_is_calibrated(window: MainWindow, session: Path) -> N
     assert window.context.settings.recent("sessions") == (session,)
 
 
-def test_a_dropped_description_opens_its_session(window: MainWindow, session: Path) -> None:
-    assert drop_on(window, session / "session.toml")
-    assert window.page("calibrate").opened == [session]
-
-
 def test_dropped_calibrations_go_to_the_library(window: MainWindow, tmp_path: Path) -> None:
     files = [tmp_path / "a.gplcal", tmp_path / "b.GPLCAL"]
     for file in files:
@@ -354,12 +325,6 @@ def test_a_recording_from_the_desktop_is_played_in_inspect(
     assert context.source.info.file == file
 
 
-def test_other_files_are_not_accepted(window: MainWindow, tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").touch()
-    assert not drop_on(window, tmp_path / "notes.txt")
-    assert not drop_on(window, tmp_path)
-
-
 def test_a_folder_without_a_session_is_refused_in_one_sentence(
     window: MainWindow, tmp_path: Path
 ) -> None:
@@ -367,11 +332,6 @@ def test_a_folder_without_a_session_is_refused_in_one_sentence(
     assert "session.toml" in window.context.toasts.shown()[0].text
     assert window.page_name == "sensors"
     assert window.context.settings.recent("sessions") == ()
-
-
-def test_an_error_of_a_page_is_shown(window: MainWindow) -> None:
-    window.open_path_in("calibrate", "/nowhere/bad")
-    assert "it is bad" in window.context.toasts.shown()[0].text
 
 
 def test_the_edit_menu_names_what_it_undoes(window: MainWindow) -> None:
@@ -501,15 +461,6 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     dialog.close()
 
 
-def test_about_names_the_parts(window: MainWindow) -> None:
-    window.show_about()
-    dialog = dialog_of(window, AboutDialog)
-    dialog.copy()
-    assert {"Python", "Qt", "numpy"} <= {name for name, _ in versions()}
-    assert "PySide6" in QApplication.clipboard().text()
-    dialog.close()
-
-
 def test_about_shows_the_licences_of_a_packaged_program(
     window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:
@@ -563,16 +514,6 @@ def test_a_new_sensor_is_started_while_the_page_shows_another(window: MainWindow
     assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
 
 
-def test_skipped_frames_are_shown_as_a_rate_of_the_last_seconds() -> None:
-    skipped = Skipped()
-    rates = [skipped.rate_hz(1000 + 20 * second, float(second)) for second in range(8)]
-    assert rates[0] == 0.0 and rates[-1] == pytest.approx(20.0)
-    assert skipped.rate_hz(1140, 11.0) == 0.0
-    assert skipped.rate_hz(3, 12.0) == 0.0
-    assert skipped_text(20.4) == "20 skipped per second"
-    assert skipped_text(0.0) == "none skipped"
-
-
 def test_the_status_line_shows_what_is_known(window: MainWindow) -> None:
     assert status_texts(Status())["camera"] == "No camera"
     window.context.status.update(
@@ -622,19 +563,3 @@ def test_a_checkerboard_to_print_is_in_the_help_menu(
     assert [path for path in opened if any(path in text for text in reported)] == (
         [] if shows else opened
     )
-
-
-def test_numbers_of_the_status_bar_keep_their_positions(qtbot: QtBot) -> None:
-    """They change several times a second."""
-    model = StatusModel()
-    line = StatusLine(model)
-    qtbot.addWidget(line)
-    line.resize(900, 24)
-    with qtbot.waitExposed(line):
-        line.show()
-    model.update(rate_hz=9.9, processing_ms=1234.5, dropped=0)
-    QApplication.processEvents()
-    place = line._labels["dropped"].x()
-    model.update(rate_hz=9.9, processing_ms=4.5)
-    QApplication.processEvents()
-    assert line._labels["dropped"].x() == place

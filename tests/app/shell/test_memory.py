@@ -51,12 +51,6 @@ def test_memory_freed_by_a_thread_returns_to_the_system() -> None:
     library.free(pieces[-1])
 
 
-def test_nothing_happens_without_the_library_call(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "platform", "win32")
-    monkeypatch.setattr(ctypes, "CDLL", None)
-    give_back()
-
-
 def test_the_window_releases_memory_after_a_page_change_and_regularly(
     context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

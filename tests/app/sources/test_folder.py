@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import cv2
@@ -12,8 +11,7 @@ import pytest
 from app.sources.bench import Bench
 from app.sources.folder import FolderSource
 from app.sources.listing import image_folders, virtual_sensor
-from app.sources.source import Frame, SourceLost
-from app.sources.stream import Stream
+from app.sources.source import Frame
 from gelpolight_core.errors import InputError
 
 WAIT_S = 60.0
@@ -66,17 +64,6 @@ def test_sixteen_bit_images_keep_every_value(tmp_path: Path, suffix: str) -> Non
     assert np.array_equal(frame.rgb, rgb)
 
 
-def test_without_looping_the_source_ends_after_the_last_image(folder: Path) -> None:
-    stream = Stream(FolderSource(folder, loop=False, rate_hz=60.0))
-    stream.start()
-    with pytest.raises(SourceLost, match="last image"):
-        stream.capture(4).result(WAIT_S)
-    assert stream.figures().made == 3
-    stream.reopen()
-    assert len(stream.capture(1).result(WAIT_S)) == 1
-    stream.stop()
-
-
 def test_an_image_of_another_size_is_rejected_by_name(folder: Path) -> None:
     write(folder / "d.png", image(3, size=(160, 120)))
     source = FolderSource(folder, rate_hz=60.0)
@@ -98,22 +85,6 @@ def test_a_folder_without_images_is_rejected(tmp_path: Path, name: str) -> None:
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="no PNG or TIFF"):
         FolderSource(tmp_path / name).open()
-
-
-def test_the_rate_is_kept_and_read_back(folder: Path) -> None:
-    source = FolderSource(folder)
-    assert source.set("rate_hz", 20.2) == 20.0
-    source.open()
-    began = time.monotonic()
-    for _ in range(5):
-        following(source)
-    assert time.monotonic() - began >= 4 / 20.0 - 0.01
-    assert source.frame(0.0) is None
-    with pytest.raises(InputError, match="exposure_ms"):
-        source.set("exposure_ms", 1.0)
-    source.close()
-    with pytest.raises(SourceLost, match="closed"):
-        source.frame(0.0)
 
 
 def test_the_list_contains_the_virtual_sensor_and_existing_folders(folder: Path) -> None:

@@ -58,16 +58,6 @@ def test_the_last_image_is_not_kept(line: Line) -> None:
     assert kept() is None
 
 
-def test_a_result_names_its_frame_and_its_function(line: Line) -> None:
-    first = line.result(5)
-    assert isinstance(first, Outcome)
-    assert (first.value, first.frame.number, first.generation) == (5, 5, 0)
-    assert line.processor.replace(lambda item: -item.number) == 1
-    second = line.result(6)
-    assert isinstance(second, Outcome)
-    assert (second.value, second.generation) == (-6, 1)
-
-
 def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line: Line) -> None:
     begun, go_on = threading.Event(), threading.Event()
 
@@ -109,22 +99,3 @@ def test_an_internal_error_is_logged_once_and_reported_each_time(
         assert isinstance(item, Failure)
         assert "ZeroDivisionError" in item.sentence
     assert caplog.text.count("Traceback") == 1
-
-
-def test_processing_times_are_measured(line: Line) -> None:
-    for number in range(4):
-        line.result(number)
-    figures = line.processor.figures()
-    assert figures.rate_hz > 0.0
-    assert figures.median_ms >= 0.0
-    line.processor.replace(number_of)
-    assert line.processor.figures().rate_hz == 0.0, "they are those of the function in use"
-
-
-def test_it_can_be_stopped_and_started_again(line: Line) -> None:
-    with pytest.raises(RuntimeError):
-        line.processor.start()
-    line.processor.stop()
-    line.processor.stop()
-    line.processor.start()
-    assert isinstance(line.result(0), Outcome)

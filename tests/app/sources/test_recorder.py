@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from recorded import noisy
 
-from app.sources.recorder import LEAST_QUEUE, Recorder, RecorderFigures, header_for
+from app.sources.recorder import LEAST_QUEUE, Recorder, RecorderFigures
 from app.sources.source import Frame, Setting
 from app.sources.stream import Stream
 from gelpolight_core.recording.reader import Recording
@@ -86,17 +86,6 @@ def test_every_frame_is_written_and_the_figures_say_so(stream: HandedOn, tmp_pat
         assert recording.numbers.tolist() == list(range(3, 23))
         assert not recording.truncated
         assert all(np.array_equal(recording.frame(k).rgb, noisy(k + 3)) for k in range(20))
-
-
-def test_frames_lost_by_the_source_are_counted(stream: HandedOn, tmp_path: Path) -> None:
-    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
-    recorder.start()
-    for number in (0, 1, 5, 6):
-        stream.hand_on(number)
-    figures = recorder.stop()
-    assert (figures.frames, figures.missed, figures.overrun) == (4, 3, 0)
-    with Recording.open(recorder.path) as recording:
-        assert recording.lost == 3
 
 
 def test_a_slow_disk_loses_frames_and_reports_how_many(
@@ -177,19 +166,3 @@ def test_a_full_disk_gives_one_sentence_and_keeps_earlier_frames(
         assert len(recording) == figures.frames
         last = len(recording) - 1
         assert np.array_equal(recording.frame(last).rgb, noisy(last))
-
-
-def test_an_unwritable_folder_gives_one_sentence(stream: HandedOn, tmp_path: Path) -> None:
-    recorder = Recorder(stream, tmp_path / "gone" / "a.gplrec", RecordingHeader())
-    recorder.start()
-    failure = ended(recorder).failure
-    assert failure is not None
-    assert "The folder does not exist" in failure
-    recorder.stop()
-
-
-def test_a_recording_describes_its_source() -> None:
-    header = header_for(Silent(), serial="A", calibration_id="c1", note="warm")
-    assert (header.source, header.kind) == ("silent", "virtual")
-    assert header.settings == {"exposure_ms": 4.0}
-    assert (header.serial, header.calibration_id, header.note) == ("A", "c1", "warm")

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
-from app.inspect.record_control import left_text, time_text
 from app.sources.recorder import RecorderFigures
 from app.sources.recording_room import RESERVE_BYTES, room_for
 
@@ -23,11 +20,3 @@ def test_the_time_left_is_that_of_the_limit_or_of_the_disk_whichever_comes_first
     assert room.left_s == pytest.approx(1e9 / 35e6)
     assert room.soon_full and not room.full
     assert room_for(AFTER_A_MINUTE, free_bytes=RESERVE_BYTES, limit_bytes=20e9).full
-
-
-def test_no_time_is_stated_before_the_rate_is_known() -> None:
-    room = room_for(RecorderFigures(), free_bytes=1e12, limit_bytes=20e9)
-    assert math.isinf(room.left_s)
-    assert left_text(room) == "20 GB left"
-    assert time_text(75.0) == "1:15 min"
-    assert time_text(7500.0) == "2 h 05 min"

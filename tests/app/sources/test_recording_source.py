@@ -9,9 +9,8 @@ import pytest
 from recorded import noisy, write_recording
 
 from app.inspect.export import frame_name
-from app.sources.listing import recordings
 from app.sources.recording import RecordingSource
-from app.sources.source import Frame, SourceLost
+from app.sources.source import Frame
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording import layout
@@ -71,16 +70,6 @@ def test_it_plays_at_its_own_speed_and_restarts(path: Path, clock: Clock) -> Non
     seen = watch(source, clock, 0.85)
     assert [k for _, k in seen] == [0, 1, 2, 3, 4, 5, 0, 1, 2]
     assert [t for t, _ in seen] == pytest.approx([0.1 * k for k in range(9)], abs=0.011)
-    source.close()
-
-
-@pytest.mark.parametrize(("speed", "count"), [(0.5, 4), (0.1, 1), (1.0, 7)])
-def test_at_low_speed_every_frame_is_shown_longer(
-    path: Path, clock: Clock, speed: float, count: int
-) -> None:
-    source = RecordingSource(path, speed=speed)
-    source.open()
-    assert len(new_images(watch(source, clock, 0.65))) == count
     source.close()
 
 
@@ -153,26 +142,6 @@ def test_it_seeks_to_any_frame_and_steps(path: Path, clock: Clock) -> None:
     source.close()
 
 
-@pytest.mark.parametrize("frames", [1, 2])
-def test_a_short_recording_is_not_played_too_fast(
-    tmp_path: Path, clock: Clock, frames: int
-) -> None:
-    write_recording(tmp_path / "a.gplrec", frames=frames, rate_hz=10.0)
-    source = RecordingSource(tmp_path / "a.gplrec")
-    source.open()
-    assert len(watch(source, clock, 0.95)) == 10
-    source.close()
-
-
-def test_the_speed_is_kept_within_its_range_and_read_back(path: Path) -> None:
-    source = RecordingSource(path)
-    assert source.set("speed", 9.0) == 4.0
-    assert source.set("speed", 0.0) == 0.1
-    assert source.settings()[0].value == 0.1
-    with pytest.raises(InputError, match="no setting exposure_ms"):
-        source.set("exposure_ms", 1.0)
-
-
 def spoil(path: Path, frame: int) -> None:
     """Change a byte in the middle of a frame's pixels."""
     content = bytearray(path.read_bytes())
@@ -212,36 +181,12 @@ def test_a_completely_damaged_recording_is_rejected(tmp_path: Path) -> None:
     stream.stop()
 
 
-def test_a_recording_without_frames_is_rejected(tmp_path: Path) -> None:
-    write_recording(tmp_path / "a.gplrec", frames=0)
-    with pytest.raises(InputError, match="the recording contains no frames"):
-        RecordingSource(tmp_path / "a.gplrec").open()
-
-
-def test_a_closed_recording_gives_no_frames_and_can_be_opened_again(path: Path) -> None:
-    source = RecordingSource(path)
-    source.open()
-    source.close()
-    with pytest.raises(SourceLost, match="is closed"):
-        source.frame(0.0)
-    source.open()
-    assert shown(source.frame(0.0)) == 0
-    source.close()
-
-
 def test_a_stream_receives_frames_of_a_paused_recording(path: Path) -> None:
     stream = Stream(RecordingSource(path, playing=False))
     stream.start()
     frames = stream.capture(2).result(WAIT_S)
     stream.stop()
     assert [shown(frame) for frame in frames] == [0, 0]
-
-
-def test_the_list_contains_existing_recordings(path: Path) -> None:
-    (info,) = recordings([path, path.with_name("gone.gplrec")])()
-    assert (info.kind, info.name, info.detail) == ("recording", "press", str(path.parent))
-    source = info.open()
-    assert (source.kind, source.name) == (info.kind, info.name)
 
 
 def test_an_exported_frame_is_named_after_its_place_in_the_recording_also_in_a_loop(

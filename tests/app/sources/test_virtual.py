@@ -12,13 +12,11 @@ import pytest
 
 from app.sources.bench import ITEMS, Bench
 from app.sources.bench_faults import ROOM_LIGHT
-from app.sources.noise import NoiseLevel, noisy
 from app.sources.rendering import state_of
 from app.sources.source import Frame, SourceLost
 from app.sources.stream import Stream
 from app.sources.virtual import VirtualSource
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor, Whiteboard
 
 WAIT_S = 60.0
@@ -121,41 +119,12 @@ def test_mean_and_spread_match_the_virtual_sensor_noise(bit_depth: int) -> None:
         assert variance / full**2 == pytest.approx(expected, rel=0.02)
 
 
-def test_noise_does_not_repeat_and_has_no_pattern() -> None:
-    level = np.full((200, 300, 3), 100.0, np.float32)
-    noise = NoiseLevel(0.0, 9.0)
-    one, two = (
-        noisy(level, noise, seed=seed, bit_depth=8).astype(float) - 100.0 for seed in (1, 2)
-    )
-    limit = 5.0 / np.sqrt(
-        one.size
-    )  # five standard deviations of the correlation of independent values
-
-    def correlation(a: np.ndarray, b: np.ndarray) -> float:
-        return abs(float(np.corrcoef(a.ravel(), b.ravel())[0, 1]))
-
-    assert correlation(one, two) < limit
-    assert correlation(one[:, 1:], one[:, :-1]) < limit
-    assert correlation(one[1:], one[:-1]) < limit
-    assert correlation(one[..., 0], one[..., 1]) < 2.0 * limit
-    # Averaged over many frames, no row or column is conspicuous.
-    mean = np.mean([noisy(level, noise, seed=s, bit_depth=8) for s in range(40)], axis=0) - 100.0
-    assert np.abs(mean.mean(axis=(1, 2))).max() < 5.0 * 3.0 / np.sqrt(40 * 900)
-    assert np.abs(mean.mean(axis=(0, 2))).max() < 5.0 * 3.0 / np.sqrt(40 * 600)
-
-
 def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSource) -> None:
     first = settled(source)
     source.close()
     source.open()
     images = [first.rgb, settled(source).rgb, settled(source).rgb]
     assert len({image.tobytes() for image in images}) == 3
-
-
-def test_a_board_is_grey_with_one_noise(source: VirtualSource) -> None:
-    source.bench.lay("checkerboard")
-    rgb = settled(source).rgb
-    assert np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
 
 
 def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
@@ -175,41 +144,12 @@ def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
     assert (bright == 255).mean() > 0.1
 
 
-def test_gain_amplifies_noise_and_exposure_does_not() -> None:
-    camera = SensorDesign().camera
-    usual, amplified = NoiseLevel.of_camera(camera), NoiseLevel.of_camera(camera, gain=4.0)
-    assert amplified.read == pytest.approx(16.0 * usual.read)
-    assert amplified.shot == pytest.approx(4.0 * usual.shot)
-
-
-def test_settings_are_read_back_and_unknown_ones_rejected(source: VirtualSource) -> None:
-    source.set("rate_hz", 1e9)
-    values = {setting.key: setting.value for setting in source.settings()}
-    assert values == {"exposure_ms": 10.0, "gain_db": 0.0, "rate_hz": 60.0}
-    with pytest.raises(InputError, match="focus"):
-        source.set("focus", 1.0)
-
-
 def test_room_light_brightens_dark_areas(source: VirtualSource) -> None:
     source.bench.adjust(noise=0.0)
     dark = settled(source).rgb[:4, :4].mean(axis=(0, 1))
     source.bench.switch("room_light", True)
     lit = settled(source).rgb[:4, :4].mean(axis=(0, 1))
     assert lit - dark == pytest.approx(255.0 * np.array(ROOM_LIGHT), abs=1.0)
-
-
-def test_a_mounted_membrane_is_shown_instead_of_the_mirror(source: VirtualSource) -> None:
-    source.bench.adjust(noise=0.0)
-    bare = settled(source).rgb
-    source.bench.switch("membrane_on", True)
-    source.bench.lay("mirror")
-    assert np.array_equal(settled(source).rgb, bare)
-
-
-def test_too_much_light_saturates(source: VirtualSource) -> None:
-    source.bench.lay("whiteboard")
-    source.bench.switch("too_bright", True)
-    assert (settled(source).rgb == 255).any(axis=2).mean() > 0.1
 
 
 def test_the_light_of_a_dead_led_is_missing_in_every_channel(source: VirtualSource) -> None:
@@ -244,22 +184,6 @@ def test_dust_darkens_specks_and_nothing_else(source: VirtualSource) -> None:
     dusty = settled(source).rgb.astype(float)
     changed = (dusty != clean).any(axis=2)
     assert 0.0005 < changed.mean() < 0.05 and (dusty <= clean).all()
-
-
-def test_unread_frames_are_counted_as_made(source: VirtualSource) -> None:
-    first = settled(source)
-    time.sleep(0.2)
-    later = settled(source)
-    # 60 Hz for 0.2 s; one frame may be missing or extra.
-    assert later.number - first.number >= 10
-    assert later.time_s - first.time_s >= 0.2
-
-
-def test_a_long_exposure_slows_the_camera(source: VirtualSource) -> None:
-    source.set("exposure_ms", 100.0)
-    settled(source)
-    first, *_, last = (settled(source) for _ in range(4))
-    assert last.time_s - first.time_s > 3 * 0.08
 
 
 def test_a_stopped_camera_is_reported_and_can_be_reopened(bench: Bench) -> None:
@@ -310,10 +234,3 @@ def test_an_error_while_rendering_is_reported_by_the_stream(
     with pytest.raises(SourceLost, match="internal error"):
         stream.capture(1).result(WAIT_S)
     stream.stop()
-
-
-def test_a_closed_source_reports_that(bench: Bench) -> None:
-    source = VirtualSource(bench)
-    with pytest.raises(SourceLost, match="closed"):
-        source.frame(0.0)
-    source.close()

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from PySide6.QtGui import QPainter, QPicture
 from pytestqt.qtbot import QtBot
 
-from app.view2d.colour_bar import BINS, depth_counts
 from app.view2d.display import colour_table
 from app.view2d.map_view import MapView
-from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 
 @pytest.fixture
@@ -47,25 +43,6 @@ def test_the_bar_shows_the_colours_of_the_map_from_low_to_high(view: MapView, co
         pixel = shown.pixelColor(round(x), round(y)).getRgb()[:3]
         expected = colour_table(colours)[round(255 * share)]
         np.testing.assert_allclose(pixel, expected, atol=8)
-
-
-def test_the_histogram_counts_each_measured_depth_once(dome: HeightMap) -> None:
-    thinned = (dome.flags[::8, ::8] & Flag.OUTSIDE.value) == 0
-    counts = depth_counts(dome, (0.0, 1.0))
-    assert counts.size == BINS
-    assert counts.sum() == thinned.sum()
-    assert counts[0] == (dome.depth_mm[::8, ::8][thinned] < 1.0 / BINS).sum()
-    # The dome is 0.8 mm deep.
-    assert counts[int(0.82 * BINS) :].sum() == 0
-
-
-def test_depths_beyond_the_range_are_counted_at_its_ends(dome: HeightMap) -> None:
-    depth = dome.depth_mm.copy()
-    depth[80, 88] = np.nan
-    counts = depth_counts(replace(dome, depth_mm=depth), (0.3, 0.5))
-    thinned = depth[::8, ::8][(dome.flags[::8, ::8] & Flag.OUTSIDE.value) == 0]
-    assert counts[-1] >= (thinned > 0.5).sum() > 0
-    assert counts.sum() == np.isfinite(thinned).sum() == thinned.size - 1
 
 
 @pytest.mark.parametrize("high", [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])

@@ -41,12 +41,6 @@ def test_the_first_press_has_the_next_round_range(depth_mm: float, high_mm: floa
     assert ColourRange().update(_press(depth_mm), 0.0) == (0.0, pytest.approx(high_mm))
 
 
-def test_a_deeper_press_is_inside_the_range_at_once() -> None:
-    colours = ColourRange()
-    assert colours.update(_press(0.3), 0.0)[1] == pytest.approx(0.5)
-    assert colours.update(_press(0.9), FRAME_S)[1] == pytest.approx(1.0)
-
-
 def test_the_range_stays_while_nothing_is_pressed() -> None:
     colours = ColourRange()
     colours.update(_press(0.9), 0.0)
@@ -65,24 +59,6 @@ def test_a_lighter_press_has_a_smaller_range_after_a_while_and_not_before() -> N
     assert shown[1] == pytest.approx(0.2)
 
 
-def test_a_press_of_half_the_range_keeps_it() -> None:
-    colours = ColourRange()
-    colours.update(_press(0.9), 0.0)
-    shown, _ = _run(colours, _press(0.5), 30.0, 0.0)
-    assert shown[1] == pytest.approx(1.0)
-
-
-def test_time_without_a_press_does_not_count_towards_a_smaller_range() -> None:
-    colours = ColourRange()
-    colours.update(_press(0.9), 0.0)
-    _, now_s = _run(colours, _press(0.15), 0.6 * SHRINK_AFTER_S, 0.0)
-    _, now_s = _run(colours, _press(0.0), 10.0, now_s)
-    shown, now_s = _run(colours, _press(0.15), 0.2 * SHRINK_AFTER_S, now_s)
-    assert shown[1] == pytest.approx(1.0)
-    shown, _ = _run(colours, _press(0.15), 0.6 * SHRINK_AFTER_S, now_s)
-    assert shown[1] == pytest.approx(0.2)
-
-
 def test_a_recording_that_starts_again_does_not_disturb_the_range() -> None:
     colours = ColourRange()
     colours.update(_press(0.9), 1000.0)
@@ -95,12 +71,6 @@ def test_negative_depths_have_colours_where_they_matter() -> None:
     colours = ColourRange()
     assert colours.update(_press(0.9, -0.05), 0.0) == (0.0, pytest.approx(1.0))
     assert colours.update(_press(0.9, -0.3), FRAME_S) == pytest.approx((-0.5, 1.0))
-
-
-def test_a_map_without_a_single_measured_depth_changes_nothing() -> None:
-    colours = ColourRange()
-    colours.update(_press(0.9), 0.0)
-    assert colours.update(np.full((160, 200), np.nan, np.float32), 1.0)[1] == pytest.approx(1.0)
 
 
 def test_another_sensor_starts_with_a_range_of_its_own() -> None:

@@ -14,7 +14,6 @@ from pytestqt.qtbot import QtBot
 from app.live.frame_results import Maker, Shown, Wanted
 from app.live.height_panel import HeightPanel
 from app.sources.source import Frame
-from app.theme import theme
 from app.view2d.map_view import MapView
 from gelpolight_core.reconstruction.height_map import HeightMap
 
@@ -101,17 +100,6 @@ def test_a_millimetre_has_one_length_whatever_the_window(view: MapView, qtbot: Q
         assert view.box.viewRect().contains(QRectF(-8.0, -5.0, 16.0, 10.0))
 
 
-def test_a_zoomed_map_stays_where_it_is_with_the_next_frame(view: MapView) -> None:
-    view.set_image(_marked(), EXTENT)
-    view.box.scaleBy((0.2, 0.2), center=QPointF(2.0, 1.0))
-    view.box.sigRangeChangedManually.emit([True, True])
-    before = view.box.viewRect()
-    view.set_image(_marked(), EXTENT)
-    assert view.box.viewRect() == before
-    view.fit()
-    assert view.box.viewRect().width() > 16.0
-
-
 def test_the_scale_bar_is_as_long_as_it_says(view: MapView) -> None:
     view.set_image(_marked(), EXTENT)
     for zoom in (1.0, 0.3, 0.1):
@@ -121,26 +109,6 @@ def test_the_scale_bar_is_as_long_as_it_says(view: MapView) -> None:
         assert scale.bar.rect().width() == pytest.approx(scale.size * px_per_mm, rel=0.01)
         text, unit = scale.text.toPlainText().split()
         assert float(text) * {"mm": 1.0, "um": 1e-3}[unit] == pytest.approx(scale.size)
-
-
-def test_a_text_replaces_image_axes_and_colour_bar(view: MapView) -> None:
-    view.set_image(_marked(), EXTENT)
-    view.show_colours("viridis", 0.0, 1.0, "mm")
-    assert view.has_image and view._plot.getAxis("left").isVisible() and view.bar.isVisible()
-    view.say("Nothing here.")
-    assert not view.has_image and view._words.isVisible()
-    assert not view._plot.getAxis("left").isVisible() and not view.bar.isVisible()
-    view.set_image(_marked(), EXTENT)
-    assert view._plot.getAxis("left").isVisible() and not view._words.isVisible()
-
-
-def test_a_small_map_keeps_its_space_for_the_image(view: MapView, qtbot: QtBot) -> None:
-    view.set_image(_marked(), EXTENT)
-    view.resize(300, 120)
-    assert not view._plot.getAxis("bottom").isVisible()
-    qtbot.waitUntil(lambda: view.box.height() > 115)
-    view.resize(500, 400)
-    assert view._plot.getAxis("bottom").isVisible()
 
 
 def test_the_pointer_has_a_position_on_the_image_only(view: MapView, qtbot: QtBot) -> None:
@@ -155,21 +123,6 @@ def test_the_pointer_has_a_position_on_the_image_only(view: MapView, qtbot: QtBo
     axis = view._plot.getAxis("left").sceneBoundingRect()
     view._on_pointer(axis.center())
     assert all(map(math.isnan, pointed[-1]))
-
-
-@pytest.mark.parametrize("dark", [False, True])
-def test_the_numbers_can_be_read_in_both_themes(
-    view: MapView, qapp: QApplication, dark: bool
-) -> None:
-    view.set_image(_marked(), EXTENT)
-    try:
-        theme.apply(qapp, "dark" if dark else "light")
-        ground = view.backgroundBrush().color()
-        axes = view._plot.getAxis("left"), view._plot.getAxis("bottom"), view.bar.axis
-        for axis in axes:
-            assert theme.contrast(axis.textPen().color(), ground) > 7.0
-    finally:
-        theme.apply(qapp, "light")
 
 
 # The colour range
@@ -214,13 +167,6 @@ def test_the_upper_end_is_dragged_to_a_larger_depth(panel: HeightPanel) -> None:
     assert ranges[-1][0] == 0.0 and 1.5 < ranges[-1][1] < 2.5
 
 
-def test_the_lower_end_is_dragged_and_the_upper_one_stays(panel: HeightPanel) -> None:
-    low, _high, length = _ends(panel)
-    _drag(panel.map, low, low - QPointF(0.0, 0.25 * length))
-    shown_low, shown_high = panel.map.bar.levels()
-    assert 0.1 < shown_low < 0.5 and shown_high == 1.0
-
-
 def test_frames_do_not_move_an_end_that_is_being_dragged(panel: HeightPanel, shown: Shown) -> None:
     _low, high, length = _ends(panel)
     _drag(panel.map, high, high - QPointF(0.0, 0.5 * length), drop=False)
@@ -234,34 +180,3 @@ def test_frames_do_not_move_an_end_that_is_being_dragged(panel: HeightPanel, sho
     )  # fmt: skip
     panel.show_frame(shown, "viridis", still=False)
     assert panel.map.bar.levels() == shown.range_mm
-
-
-def test_a_double_click_on_the_bar_asks_for_the_automatic_range(
-    panel: HeightPanel, qtbot: QtBot
-) -> None:
-    low, _high, length = _ends(panel)
-    at = low - QPointF(0.0, 0.5 * length)
-    with qtbot.waitSignal(panel.range_released, timeout=1000):
-        for kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick):
-            _mouse(panel.map, kind, at, Qt.MouseButton.LeftButton)
-            _mouse(panel.map, QEvent.Type.MouseButtonRelease, at, Qt.MouseButton.NoButton)
-
-
-def test_without_a_display_panel_the_ends_are_fixed(qtbot: QtBot, shown: Shown) -> None:
-    panel = HeightPanel()
-    qtbot.addWidget(panel)
-    panel.resize(420, 420)
-    panel.show()
-    qtbot.waitExposed(panel)
-    panel.show_frame(shown, "viridis", still=True)
-    _low, high, length = _ends(panel)
-    _drag(panel.map, high, high + QPointF(0.0, 0.3 * length))
-    assert panel.map.bar.levels() == shown.range_mm
-
-
-def test_the_scale_bar_of_one_millimetre_has_its_unit(qtbot: QtBot) -> None:
-    """A first length equal to the one that it is made with is written, too."""
-    made = MapView("map", "Map")
-    qtbot.addWidget(made)
-    assert made._scale.size == 1.0
-    assert made._scale.text.toPlainText() == "1 mm"

@@ -57,11 +57,6 @@ def test_each_mask_keeps_what_its_name_says(dome: HeightMap) -> None:
         np.testing.assert_array_equal(usable(done.heightmap), usable(flagged) & expected)
 
 
-def test_a_mask_that_leaves_nothing_is_refused(dome: HeightMap) -> None:
-    done = processed(dome, Processing(mask="deeper", deeper_mm=5.0))
-    assert done.refused and done.heightmap is dome
-
-
 def test_a_median_removes_single_points_and_both_steps_are_named(tilted: HeightMap) -> None:
     depth = tilted.depth_mm.copy()
     depth[60, 60] = 3.0

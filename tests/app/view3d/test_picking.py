@@ -37,13 +37,6 @@ def test_nearer_parts_hide_parts_behind_them(made: Made) -> None:
     assert found == pytest.approx((BUMP[0] - 1.5, BUMP[1]), abs=0.05)
 
 
-def test_a_ray_next_to_the_surface_finds_nothing(made: Made) -> None:
-    surface = made()
-    assert hit(surface, np.array([20.0, 0.0, 5.0]), np.array([20.0, 0.0, -5.0])) is None
-    # Inside its bounds, but off the round working area.
-    assert hit(surface, np.array([7.5, 7.5, 5.0]), np.array([7.5, 7.5, -5.0])) is None
-
-
 @settings(max_examples=60)
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_any_ray_from_above_ends_on_the_surface(

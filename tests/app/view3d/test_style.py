@@ -5,13 +5,10 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pyvista.plotting.cube_axes_actor import _axis_label_values
 
-from app.view3d.legend import TICKS
 from app.view3d.style import (
     Style,
     Viewpoint,
@@ -32,27 +29,9 @@ def test_ticks_are_even_few_and_hold_the_range(low: float, width: float, most: i
     assert max(steps) == pytest.approx(min(steps))
 
 
-def test_ticks_reach_little_beyond_the_range() -> None:
-    assert ticks(-11.2, 11.2, TICKS) == (-12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0)
-    assert ticks(0.0, 1.0, 2) == (0.0, 1.0)
-    assert ticks(0.0, 0.5, 3) == (0.0, 0.25, 0.5)
-
-
-@pytest.mark.parametrize("intervals", range(1, TICKS))
-def test_vtk_places_so_many_labels_one_at_each_tick(intervals: int) -> None:
-    # pyvista follows VTK's own choice of ticks: counted in intervals, there is one for each label.
-    placed = _axis_label_values(0.0, float(intervals), intervals + 1)
-    np.testing.assert_allclose(placed, np.arange(intervals + 1))
-
-
 def test_a_style_is_saved_without_the_exaggeration() -> None:
     style = Style(exaggeration=3.0, axes=False, wireframe=True, parallel=True)
     assert style_from_text(style_as_text(style)) == replace(style, exaggeration=1.0)
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"axes": 3, "colour": 1}', "null", "7"])
-def test_a_damaged_style_gives_the_default(text: str) -> None:
-    assert style_from_text(text) == Style()
 
 
 def test_viewpoints_are_kept_by_name() -> None:

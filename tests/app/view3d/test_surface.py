@@ -32,22 +32,6 @@ def test_the_depth_at_a_point_equals_that_of_the_map(made: Made, largest: int | 
     assert found == pytest.approx([BUMP[2], SMALL[2], 0.0, -np.inf], abs=0.02)
 
 
-def test_between_nodes_the_depth_is_linear(made: Made) -> None:
-    surface = made()
-    slope = np.linspace(BUMP[0] + 1.1, BUMP[0] + 1.9, 50)
-    found = surface.depth_at(slope, np.full(50, BUMP[1]))
-    assert found == pytest.approx(2.0 - (slope - BUMP[0]), abs=0.01)
-
-
-def test_a_thinned_surface_has_the_same_positions(made: Made) -> None:
-    whole = made()
-    thin = whole.thinned(100)
-    x, y = np.array([BUMP[0], SMALL[0]]), np.array([BUMP[1], SMALL[1]])
-    assert thin.depth_at(x, y) == pytest.approx(whole.depth_at(x, y), abs=0.05)
-    assert max(thin.depth_mm.shape) <= 100
-    assert thin.texture is whole.texture
-
-
 def test_an_empty_working_area_has_no_surface(heightmap: HeightMap) -> None:
     heightmap.flags[:] = 1
     scale = ColourScale("depth [mm]", np.zeros((256, 3), np.uint8), 0.0, 1.0)

@@ -102,18 +102,6 @@ def test_a_click_sets_a_pin_and_a_drag_rotates(panel: SurfacePanel, qtbot: QtBot
     assert view.scene.viewpoint != before
 
 
-def test_hovering_reports_points_and_nothing_off_the_surface(
-    panel: SurfacePanel, qtbot: QtBot
-) -> None:
-    panel.view_from("top")
-    seen: list[tuple[float, float]] = []
-    panel.pointed.connect(lambda x, y: seen.append((x, y)))
-    qtbot.mouseMove(panel.view, _screen_px(panel, *SMALL).toPoint())
-    qtbot.waitUntil(lambda: bool(seen) and seen[-1] == pytest.approx(SMALL[:2], abs=0.2))
-    qtbot.mouseMove(panel.view, QPoint(3, 3))
-    qtbot.waitUntil(lambda: bool(np.isnan(seen[-1]).all()))
-
-
 def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(
     panel: SurfacePanel, qtbot: QtBot
 ) -> None:
@@ -129,21 +117,6 @@ def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(
     qtbot.mouseMove(view, QPoint(200, 120))
     qtbot.mouseRelease(view, Qt.MouseButton.RightButton, pos=QPoint(200, 120))
     assert len(asked) == 1 and view.scene.viewpoint != before
-
-
-def test_frames_do_not_move_camera_or_axes(panel: SurfacePanel, made: Made, qtbot: QtBot) -> None:
-    view = panel.view
-    assert view is not None
-    viewpoint, axes = view.scene.viewpoint, view.renderer.cube_axes_actor
-    for factor in (0.2, 0.9, 0.5):
-        panel.show_surface(made(factor=factor, largest=128))
-        _drawn(panel, qtbot)
-    assert view.scene.viewpoint == viewpoint
-    assert view.renderer.cube_axes_actor is axes
-    # A frozen frame has more nodes and its own light, but the camera stays.
-    panel.show_surface(made(light=(-0.5, -0.5, 0.7)))
-    _drawn(panel, qtbot)
-    assert view.scene.viewpoint == viewpoint and view.renderer.cube_axes_actor is axes
 
 
 def test_the_view_is_drawn_once_for_each_frame(
@@ -231,26 +204,6 @@ def test_a_line_on_the_surface_is_hidden_behind_the_relief(
     # From the front, the bump hides it.
     panel.view_from("front")
     assert red_seen() == 0
-
-
-def test_the_bar_has_names_where_colours_have_names(
-    panel: SurfacePanel, made: Made, qtbot: QtBot
-) -> None:
-    surface = made(largest=128)
-    scale = replace(
-        surface.scale, names=(("no flags", (90, 96, 104)), ("in shadow", (84, 125, 255)))
-    )
-    panel.show_surface(replace(surface, scale=scale))
-    view = panel.view
-    assert view is not None
-    (bar,) = view.scalar_bars.values()
-    table = bar.GetLookupTable()
-    assert [table.GetAnnotation(k) for k in range(table.GetNumberOfAnnotatedValues())] == [
-        name for name, _ in scale.names
-    ]
-    panel.show_surface(surface)
-    (bar,) = view.scalar_bars.values()
-    assert bar.GetLookupTable().GetNumberOfAnnotatedValues() == 0
 
 
 def test_keys_of_the_page_reach_the_page(panel: SurfacePanel, qtbot: QtBot) -> None:

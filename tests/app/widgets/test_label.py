@@ -8,13 +8,10 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtGui import Qt, QTextDocument
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 import app
-from app.context.context import AppContext
-from app.services.status import StatusLine, StatusModel
-from app.shell.main_window import MainWindow
 from app.theme import theme
 from app.widgets.label import MarkupLabel, PlainLabel, escaped, plain_tip
 from app.widgets.naming import named
@@ -58,35 +55,6 @@ def test_a_tooltip_shows_text_from_outside_literally(text: str, qtbot: QtBot) ->
     tip = widget.toolTip()
     assert (seen(tip) if Qt.mightBeRichText(tip) else tip) == text
     assert plain_tip("5 < 6 mm") == "5 < 6 mm"
-
-
-def test_messages_and_the_status_bar_show_text_literally(context: AppContext, qtbot: QtBot) -> None:
-    window = MainWindow(context=context)
-    qtbot.addWidget(window)
-    window.show()
-    context.toasts.show(EVIL[0])
-    context.status.update(camera=EVIL[1], calibration=EVIL[0])
-    shown = [label for label in window.findChildren(QLabel) if label.text() in EVIL]
-    assert len(shown) == 3
-    assert all(label.textFormat() is Qt.TextFormat.PlainText for label in shown)
-
-
-def test_a_status_bar_has_no_other_labels(qtbot: QtBot) -> None:
-    line = StatusLine(StatusModel())
-    qtbot.addWidget(line)
-    labels = line.findChildren(QLabel)
-    assert labels and all(isinstance(label, PlainLabel) for label in labels)
-
-
-def test_coloured_words_follow_the_theme(
-    qapp: QApplication, qtbot: QtBot, light_again: None
-) -> None:
-    label = MarkupLabel("<span style='color:@pass'>good</span> @passing")
-    qtbot.addWidget(label)
-    for dark, name in enumerate(("light", "dark")):
-        theme.apply(qapp, name)
-        assert theme.COLOURS["pass"][dark] in label.text()
-        assert "@passing" in label.text()
 
 
 def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:

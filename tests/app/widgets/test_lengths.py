@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,16 +15,6 @@ def test_a_length_is_rounded_to_the_nearest_round_ones(length_mm: float) -> None
     assert length_mm * (1.0 - 1e-6) <= above < 2.51 * length_mm
     for rounded in (below, above):
         assert f"{rounded:.3e}"[:5] in ("1.000", "2.000", "5.000")
-
-
-@pytest.mark.parametrize("length_mm", [0.01, 0.02, 0.05, 1.0, 2.0, 5.0])
-def test_a_round_length_stays(length_mm: float) -> None:
-    assert round_length_mm(length_mm) == round_up(length_mm) == pytest.approx(length_mm)
-
-
-@pytest.mark.parametrize("nothing", [0.0, -1.0, float("nan"), float("inf")])
-def test_invalid_lengths_have_no_round_value(nothing: float) -> None:
-    assert round_length_mm(nothing) == round_up(nothing) == 0.0
 
 
 def test_short_lengths_are_written_in_micrometres() -> None:

@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.theme import theme
 from app.widgets.quality_table import QualityTableWidget, limit_text, value_text
 from gelpolight_core.quality import Figure, QualityTable, judge
 
@@ -35,14 +34,6 @@ def widget(qtbot: QtBot) -> QualityTableWidget:
     return made
 
 
-def test_passing_figures_have_no_advice(widget: QualityTableWidget) -> None:
-    widget.set_table(table(0.0182, 16))
-    assert widget.texts() == [
-        ["Pass", "Reprojection error", "0.0182 px", "≤ 0.3 px"],
-        ["Pass", "Views used", "16", "≥ 8"],
-    ]
-
-
 def test_failing_figures_show_advice(widget: QualityTableWidget) -> None:
     widget.set_table(table(0.5, 2))
     assert [row[:2] for row in widget.texts()] == [
@@ -51,12 +42,6 @@ def test_failing_figures_show_advice(widget: QualityTableWidget) -> None:
         ["Fail", "Views used"],
         ["", "Capture more views."],
     ]
-
-
-def test_verdicts_have_an_icon_next_to_the_word(widget: QualityTableWidget) -> None:
-    widget.set_table(table(0.5, 2))
-    assert not widget._grid.item(0, 0).icon().isNull()
-    assert widget._grid.item(0, 0).foreground().color() == theme.colour("warn")
 
 
 def test_new_values_leave_selection_and_items_where_they_are(widget: QualityTableWidget) -> None:
@@ -68,25 +53,6 @@ def test_new_values_leave_selection_and_items_where_they_are(widget: QualityTabl
     assert item.text() == "0.1 px"
     assert widget._grid.height() == height
     assert {index.row() for index in widget._grid.selectedIndexes()} == {1}
-
-
-def test_a_table_shrinks_and_grows(widget: QualityTableWidget) -> None:
-    widget.set_table(table(0.5, 2))
-    tall = widget._grid.height()
-    widget.set_table(table(0.1, 16))
-    assert widget._grid.height() < tall
-    widget.set_table(QualityTable())
-    assert widget.texts() == []
-    widget.set_table(table(0.5, 2))
-    assert widget._grid.height() == tall
-    assert len(widget.texts()) == 4
-
-
-def test_all_rows_are_visible_without_scrolling(widget: QualityTableWidget) -> None:
-    widget.set_table(table(0.5, 2))
-    grid = widget._grid
-    last = grid.visualItemRect(grid.item(grid.rowCount() - 1, 1))
-    assert last.bottom() <= grid.viewport().height()
 
 
 def test_rows_can_be_copied_by_the_keyboard(widget: QualityTableWidget, qtbot: QtBot) -> None:
@@ -102,14 +68,6 @@ def test_rows_can_be_copied_by_the_keyboard(widget: QualityTableWidget, qtbot: Q
     widget._grid.selectRow(1)
     qtbot.keyClick(widget._grid, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
     assert QApplication.clipboard().text() == "Pass\tViews used\t16\t≥ 8"
-
-
-def test_colours_follow_the_theme(widget: QualityTableWidget, qapp: QApplication) -> None:
-    widget.set_table(table(0.2, 16))
-    theme.apply(qapp, "dark")
-    dark = widget._grid.item(0, 0).foreground().color()
-    theme.apply(qapp, "light")
-    assert dark != widget._grid.item(0, 0).foreground().color() == theme.colour("pass")
 
 
 def figure(value: float, **limits: object) -> Figure:

@@ -11,7 +11,6 @@ from pytestqt.qtbot import QtBot
 from app.inspect.section_panel import figure_text as section_text
 from app.measure.figures_text import figure_text
 from app.view2d.map_point import read_at
-from app.view2d.map_view import MapView
 from app.view2d.profile_plot import ProfilePlot
 from app.view3d.surface import ColourScale
 from app.widgets.units import in_unit, use_length_unit
@@ -60,12 +59,3 @@ def test_readings_scales_and_axes_follow_the_unit(um: None, dome: HeightMap, qtb
     qtbot.addWidget(plot)
     plot.show_profiles({})
     assert plot.getAxis("left").scale == 1e3
-
-
-def test_a_colour_bar_keeps_mm_under_its_numbers(qtbot: QtBot) -> None:
-    view = MapView("map", "map", limits=(-1.0, 5.0))
-    qtbot.addWidget(view)
-    view.show_colours("viridis", 0.0, 0.5, "um", factor=1e3)
-    assert view.bar.values == (0.0, 0.5)
-    assert view.bar.axis.scale == 1e3
-    assert "500 um" in view.accessibleDescription()

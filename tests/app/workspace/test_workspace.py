@@ -142,13 +142,6 @@ def test_the_selection_ends_with_its_file(workspace: Workspace, source: Path) ->
     assert workspace.in_use is None
 
 
-@pytest.mark.parametrize("text", ["", "nonsense", "[]", '{"in_use": 7}', '{"in_use": null}'])
-def test_a_damaged_selection_counts_as_none(workspace: Workspace, text: str) -> None:
-    workspace.folder.mkdir()
-    (workspace.folder / "workspace.json").write_text(text)
-    assert workspace.in_use is None
-
-
 def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: Path) -> None:
     place = workspace.import_calibration(source)
     workspace.use(place)
@@ -157,24 +150,12 @@ def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: P
     assert moved.in_use == moved.folder / place.relative_to(workspace.folder)
 
 
-def test_an_absent_workspace_is_empty(workspace: Workspace) -> None:
-    assert workspace.entries() == ()
-    assert not workspace.folder.exists()
-
-
 @given(st.text(max_size=200))
 def test_every_serial_has_a_folder_of_its_own_inside(serial: str) -> None:
     name = folder_name(serial)
     assert name not in ("", ".", "..")
     assert "/" not in name
     assert Path("a") / name != Path("a")
-
-
-def test_a_new_calibration_gets_an_unused_name(workspace: Workspace) -> None:
-    first = workspace.calibration_path("A/001", "calibrated today")
-    assert first.parent.is_dir()
-    first.touch()
-    assert workspace.calibration_path("A/001", "calibrated today") not in (first, first.parent)
 
 
 def test_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
@@ -305,10 +286,6 @@ def test_a_session_that_cannot_be_read_is_listed_under_its_folder(workspace: Wor
     assert [e.serial for e in workspace.sessions()] == ["C-1"]
 
 
-def test_a_missing_workspace_has_no_sessions(workspace: Workspace) -> None:
-    assert workspace.sessions() == ()
-
-
 def measured(serial: str) -> MeasurementRecord:
     return MeasurementRecord(serial, "c", "ball", (Quantity("diameter_mm", 5.0),))
 
@@ -319,13 +296,6 @@ def test_the_records_are_created_at_first_use(workspace: Workspace) -> None:
     assert workspace.records is workspace.records
     workspace.close()
     assert [record.serial for record in workspace.records.measurements()] == ["A"]
-    workspace.close()
-
-
-def test_another_folder_has_its_own_records(workspace: Workspace, tmp_path: Path) -> None:
-    workspace.records.add(measured("A"))
-    workspace.folder = tmp_path / "other"
-    assert workspace.records.measurements() == ()
     workspace.close()
 
 

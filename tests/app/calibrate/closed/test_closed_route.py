@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
@@ -147,12 +146,6 @@ def test_it_stops_asking_when_more_presses_do_not_help(gain: float | None, asks:
     progress = Progress(2.0, gain, (), None)
     assert progress.settled is not asks
     assert ("ring" in progress.sentence()) is asks
-
-
-def test_back_from_the_question_leads_to_the_start(technician: Technician, qtbot: QtBot) -> None:
-    technician.page.begin()
-    qtbot.mouseClick(technician.see("question.back"), Qt.MouseButton.LeftButton)
-    technician.see("start.new")
 
 
 def test_a_folder_without_the_open_stages_is_offered_the_closed_route(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,9 +17,7 @@ from test_lut_model import scatter, start
 from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_editor import NUDGE, LutEditor
 from app.calibrate.reflectance.lut_effect import Effect
-from app.calibrate.reflectance.lut_live import effect_sentence
 from app.calibrate.reflectance.lut_model import CurveEdit
-from app.theme import theme
 
 MOVE_MS = 12
 """The plot processes at most 100 mouse moves per second."""
@@ -113,12 +110,6 @@ def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor: LutEditor) ->
     assert editor.state == states[0]
 
 
-def test_a_drag_outside_of_all_nodes_moves_none(editor: LutEditor) -> None:
-    before = editor.state
-    drag(editor, (0.2, 0.8), (0.3, 0.7))
-    assert editor.state == before
-
-
 def test_a_click_selects_a_node_and_del_removes_it(qtbot: QtBot, editor: LutEditor) -> None:
     count = len(editor.state.curves[0].cosines)
     click(editor, *node(editor, 2))
@@ -186,67 +177,3 @@ def test_an_impossible_edit_is_explained_in_one_sentence(editor: LutEditor) -> N
     editor._add_at(editor.state.curves[0].cosines[2])
     assert "no room" in editor._notice.text()
     assert not editor.undo_stack.canUndo()
-
-
-def test_each_channel_is_edited_alone(qtbot: QtBot, editor: LutEditor) -> None:
-    editor.choose_channel(2)
-    before = editor.state.curves[0]
-    editor.choose_node(5)
-    qtbot.keyClick(editor.plot, Qt.Key.Key_Down)
-    assert editor.state.curves[2] != start().curves[2]
-    assert editor.state.curves[0] == before
-
-
-def test_the_panel_shows_the_newest_state(qtbot: QtBot, editor: LutEditor) -> None:
-    assert editor.live is not None
-    editor.choose_node(4)
-    for _ in range(5):
-        qtbot.keyClick(editor.plot, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
-    expected = effect(editor.state, scatter().names[0])
-    words = effect_sentence(effect(editor._start, scatter().names[0]), expected)
-    qtbot.waitUntil(lambda: editor.live._words.text() == words)
-    _, shown = editor.live._lines["after"].getData()
-    np.testing.assert_allclose(shown, expected.profile_mm)
-
-
-def test_closing_ends_the_thread(qtbot: QtBot) -> None:
-    widget = LutEditor(start(), scatter(), effect=effect)
-    qtbot.addWidget(widget)
-    widget.close()
-    assert "lut-effect" not in {thread.name for thread in threading.enumerate()}
-
-
-@pytest.mark.parametrize("choice", ["light", "dark"])
-def test_it_follows_the_theme(qtbot: QtBot, editor: LutEditor, choice: str) -> None:
-    theme.apply(QApplication.instance(), choice)
-    qtbot.wait(20)
-    shown = editor.plot.backgroundBrush().color()
-    assert shown == theme.colour("base")
-    theme.apply(QApplication.instance(), "light")
-
-
-@pytest.mark.parametrize("width", [620, 1100])
-def test_no_hint_moves_the_plot(qtbot: QtBot, editor: LutEditor, width: int) -> None:
-    editor.resize(width, 700)
-    heights = set()
-    for act in (
-        lambda: editor.choose_node(None),
-        lambda: editor.choose_node(3),
-        lambda: editor._notice.setText("One sentence."),
-        lambda: editor._actions["lasso"].trigger(),
-    ):
-        act()
-        QApplication.processEvents()
-        heights.add(editor.plot.height())
-    assert len(heights) == 1
-
-
-def test_a_node_at_its_neighbour_reports_that_it_cannot_move(
-    qtbot: QtBot, editor: LutEditor
-) -> None:
-    editor.choose_node(3)
-    for _ in range(200):
-        qtbot.keyClick(editor.plot, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
-        if editor._notice.text():
-            break
-    assert "cannot move further" in editor._notice.text()

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.calibrate.reflectance import lut_model as model
-from app.calibrate.reflectance.lut_model import Curve, CurveEdit
+from app.calibrate.reflectance.lut_model import CurveEdit
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
@@ -140,16 +140,6 @@ def test_a_dragged_node_stays_between_its_neighbours(
             assert after[index - 1] < moved < after[index]
 
 
-def test_a_node_can_be_dragged_to_a_free_position() -> None:
-    thin = model.thin_nodes(start(), 1)
-    curve = thin.curves[1]
-    index = len(curve.cosines) // 2
-    cosine = 0.5 * (curve.cosines[index] + curve.cosines[index + 1])
-    value = 0.5 * (curve.values[index] + curve.values[index + 1])
-    moved = model.move_node(thin, 1, index, cosine, value).curves[1]
-    assert (moved.cosines[index], moved.values[index]) == (cosine, value)
-
-
 @given(st.floats(0.02, 0.98))
 def test_an_added_node_hardly_changes_the_curve_and_can_be_removed(cosine: float) -> None:
     thin = model.thin_nodes(start(), 0)
@@ -173,14 +163,6 @@ def test_end_nodes_and_the_last_nodes_cannot_be_removed() -> None:
         model.remove_node(edit, 0, 1)
 
 
-def test_fewer_nodes_draw_nearly_the_same_curve() -> None:
-    thin = model.thin_nodes(start(), 0).curves[0]
-    whole = start().curves[0]
-    assert len(thin.cosines) < len(whole.cosines) / 2
-    at = np.array(whole.cosines)
-    assert np.abs(thin.at(at) - np.array(whole.values)).max() <= model.TOLERANCE * whole.values[-1]
-
-
 def test_snap_moves_a_bent_curve_back_to_the_fit() -> None:
     edit = model.thin_nodes(start(), 2)
     index = len(edit.curves[2].cosines) // 2
@@ -189,17 +171,6 @@ def test_snap_moves_a_bent_curve_back_to_the_fit() -> None:
     for snapped in (model.snap_to_fit(bent, 2, index), model.snap_to_fit(bent, 2)):
         fit = edit.fits[2].at(edit.curves[2].cosines[index])
         assert snapped.curves[2].values[index] == pytest.approx(float(fit))
-
-
-def test_smoothing_reduces_a_bump_and_keeps_a_line() -> None:
-    line = tuple(np.linspace(0.0, 1.0, 11).tolist())
-    straight = Curve(line, line)
-    bump = Curve(line, (*line[:5], 0.58, *line[6:]))
-    base = start()
-    for curve, roughness in ((straight, 0.0), (bump, 0.08)):
-        edit = CurveEdit((curve,) * 3, base.fits, base.coverage, base.left_out)
-        smoothed = np.array(model.smooth(edit, 0).curves[0].values)
-        assert np.abs(smoothed - line).max() == pytest.approx(0.5 * roughness, abs=1e-12)
 
 
 def test_excluded_points_no_longer_bend_the_curve() -> None:
@@ -212,11 +183,6 @@ def test_excluded_points_no_longer_bend_the_curve() -> None:
     assert float(edit.curves[0].at(0.55)) == pytest.approx(true, abs=0.01)
     assert edit.curves[1:] == start().curves[1:]
     assert model.reset_channel(edit, 0, start()) == start()
-
-
-def test_an_outline_around_nothing_is_rejected() -> None:
-    with pytest.raises(InputError, match="no included point"):
-        model.leave_out(start(), 0, [(0.1, 2.0), (0.2, 2.0), (0.2, 2.5)], scatter())
 
 
 def test_an_outline_around_all_points_is_rejected() -> None:
@@ -235,19 +201,3 @@ def test_an_outline_contains_the_points_inside_it(
     away = np.hypot(scatter().cosines[0] - x, scatter().values[0] - y)
     assert out[away < 0.999 * radius * np.cos(np.pi / n)].all()
     assert not out[away > 1.001 * radius].any()
-
-
-@pytest.mark.parametrize(
-    ("cosines", "values"),
-    [
-        ((0.0, 0.3, 0.6, 1.0), (0.0, 0.3, 0.3, 1.0)),
-        ((0.0, 0.6, 0.3, 1.0), (0.0, 0.2, 0.3, 1.0)),
-        ((0.0, 0.3, 0.6, 0.9), (0.0, 0.2, 0.3, 1.0)),
-        ((0.0, 0.3, 0.6, 1.0), (-0.1, 0.2, 0.3, 1.0)),
-        ((0.0, 0.3, 0.6, 1.0), (0.0, 0.2, float("nan"), 1.0)),
-        ((0.0, 0.5, 1.0), (0.0, 0.5, 1.0)),
-    ],
-)
-def test_invalid_curves_are_rejected(cosines: tuple, values: tuple) -> None:
-    with pytest.raises(ValueError):
-        Curve(cosines, values)

@@ -18,7 +18,6 @@ from app.sources.camera.driver import CameraGone, Device, Format
 from app.sources.source import SourceLost
 from app.sources.stopping import join_left_behind
 from app.sources.stream import Stream
-from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
 
 LOCKED = {"exposure_auto": 0.0, "exposure_ms": 20.0, "white_balance_auto": 0.0}
@@ -193,17 +192,6 @@ def test_another_format_reopens_the_camera(
     camera.want(replace(STORED, controls={**LOCKED, "gain": 99.0}))
     eventually(lambda: values(camera)["gain"] == 99.0)
     assert fake.opened == 2  # changing only a setting does not reopen the camera
-
-
-def test_settings_work_through_the_source(camera: Camera, stream: Stream) -> None:
-    stream.capture(1).result(20.0)
-    assert stream.source.set("exposure_auto", 0.0) == 0.0
-    assert (
-        stream.source.set("exposure_ms", 12.34) == 12.3
-    )  # the nearest value that the camera supports
-    assert "gain" in {setting.key for setting in stream.source.settings()}
-    with pytest.raises(InputError, match="no setting focus"):
-        stream.source.set("focus", 1.0)
 
 
 def test_a_lock_fixes_the_present_automatic_values(

@@ -5,8 +5,6 @@ from __future__ import annotations
 from itertools import product
 
 from fake_camera import C310, FORMATS
-from hypothesis import given
-from hypothesis import strategies as st
 
 from app.sources.camera.driver import (
     UNCOMPRESSED,
@@ -45,14 +43,6 @@ ALL = [
         [*UNCOMPRESSED, "MJPG", "H264"], [320, 640, 1280], [240, 480, 960], [1.0, 5.0, 7.5, 30.0]
     )
 ]
-
-
-@given(st.lists(st.sampled_from(ALL), max_size=12))
-def test_the_choice_does_not_depend_on_the_order_of_the_list(listed: list[Format]) -> None:
-    chosen = best_format(tuple(listed))
-    assert best_format(tuple(reversed(listed))) == chosen
-    if any(not f.compressed for f in listed):
-        assert chosen is not None and not chosen.compressed
 
 
 def test_a_camera_is_found_at_another_port_if_it_is_the_only_one_of_its_model() -> None:

@@ -84,12 +84,6 @@ def test_a_film_acts_as_a_camera_and_restarts_at_its_end(film: Device) -> None:
     assert camera.state.format.code == "MJPG"
 
 
-def test_a_missing_film_cannot_be_opened(tmp_path: Path) -> None:
-    absent = Device("film", "absent.avi", "", str(tmp_path / "absent.avi"))
-    with pytest.raises(CameraGone, match="cannot be opened"):
-        OpenCvDriver(interface=cv2.CAP_FFMPEG).open(absent, None)
-
-
 class Capture:
     """A VideoCapture as on Windows: accepts every value, but sets others."""
 
