@@ -12,7 +12,7 @@ cd "$(dirname "$0")/.."
 how=${1:-whole}
 # These also spoil, and write, what only the windows have.
 needs_windows="tests/strangers/test_any_spoilt_file.py tests/strangers/test_clock_set_back.py
-    tests/strangers/test_forgeries.py tests/strangers/test_real_disks.py tests/strangers/test_two_programs.py"
+    tests/strangers/test_forgeries.py tests/strangers/test_two_programs.py"
 core="tests/command_line/test_without_window_libraries.py tests/export tests/io tests/records tests/session tests/test_house.py"
 windows=
 processes=1 # beside the tests with the locked libraries

@@ -62,7 +62,6 @@ LONGEST_FIRST = (
     "experiments/test_virtual_protocol.py",
     "app/calibrate/test_wizard_killed.py",
     "reconstruction/test_uncertainty.py",
-    "strangers/test_real_disks.py",
 )
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 from matplotlib import rcParams
@@ -14,28 +12,9 @@ from matplotlib.figure import Figure
 from gelpolight_core.drawing_thread import THREAD_NAME, in_drawing_thread
 from gelpolight_core.report.drawing import draw
 
-FILES = Path("/proc/self/fd")
-
-
-def open_typefaces() -> int:
-    names = (os.readlink(FILES / name) for name in os.listdir(FILES) if (FILES / name).exists())
-    return sum(name.endswith((".ttf", ".otf", ".ttc")) for name in names)
-
 
 def words(figure: Figure) -> None:
     figure.text(0.1, 0.5, "height (mm)", fontweight="bold")
-
-
-@pytest.mark.skipif(not FILES.is_dir(), reason="open files can be listed on Linux only")
-def test_typefaces_are_opened_once_whoever_asks_for_a_drawing() -> None:
-    draw("first", 20.0, words)
-    before = open_typefaces()
-    for _ in range(4):
-        thread = threading.Thread(target=draw, args=("another", 20.0, words))
-        thread.start()
-        thread.join()
-    assert before > 0
-    assert open_typefaces() == before
 
 
 def test_drawings_asked_for_at_once_are_made_one_after_the_other() -> None:

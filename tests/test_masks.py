@@ -6,11 +6,8 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from gelpolight_core import masks
-from gelpolight_core.reconstruction.near_light.maps import dark_brightness
-from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 
 CORE = Path(masks.__file__).parent
 
@@ -28,16 +25,6 @@ def test_a_node_is_usable_in_view_with_light_and_reflectance_in_all_channels() -
     np.testing.assert_array_equal(
         masks.usable(valid, light, factors), [[True, False, False, False]]
     )
-
-
-@pytest.mark.parametrize("gloss", [0.0, 0.4])
-def test_dark_is_the_brightness_at_grazing_light(gloss: float) -> None:
-    """Lambert's law, and a curve that is twice as bright there."""
-    dark = dark_brightness(Membrane(gloss=gloss))
-    np.testing.assert_allclose(dark, (1.0 - gloss) * masks.DARK_COSINE / np.pi)
-    curve = tuple(np.minimum(2.0 * np.linspace(0.0, 1.0, CURVE_NODES), 1.0).tolist())
-    twice = dark_brightness(Membrane(gloss=gloss, diffuse=(curve,) * 3))
-    np.testing.assert_allclose(twice, 2.0 * dark, rtol=1e-6)
 
 
 def test_no_other_module_of_the_core_has_a_limit_of_its_own_for_saturation() -> None:

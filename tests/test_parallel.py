@@ -18,11 +18,6 @@ def test_results_come_in_the_order_of_the_items() -> None:
     assert list(in_parallel(slow_first, range(4), threads=4)) == [0, 1, 4, 9]
 
 
-def test_pieces_are_worked_on_at_the_same_time() -> None:
-    together = threading.Barrier(3, timeout=10.0)
-    assert len(list(in_parallel(lambda _: together.wait(), range(3), threads=3))) == 3
-
-
 def test_the_error_of_the_first_failing_item_is_raised() -> None:
     with pytest.raises(ValueError, match="item 2"):
         list(in_parallel(_fail_from_two, range(6), threads=3))
@@ -47,7 +42,3 @@ def test_what_was_not_begun_is_left_out_when_the_caller_stops() -> None:
     results.close()
     assert len(begun) < 20
     assert not any(thread.name.startswith("parallel") for thread in threading.enumerate())
-
-
-def test_nothing_to_do_is_done() -> None:
-    assert list(in_parallel(str, [])) == []

@@ -58,11 +58,6 @@ def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
             assert np.quantile(off, 0.9999) < 0.05
 
 
-def test_a_camera_without_bad_pixels_has_none(virtual_results: StageResults) -> None:
-    assert virtual_results.bad is not None
-    assert not virtual_results.bad.pixels.size
-
-
 def test_the_map_is_kept_in_the_file_and_files_without_one_are_read(
     small_calibration: Calibration, tmp_path: Path
 ) -> None:

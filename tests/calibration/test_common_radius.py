@@ -30,12 +30,3 @@ def test_radii_that_are_all_stated_wrong_fail_a_calibration(
     (figure,) = judge_radii(joint)
     assert figure.key == "common_radius_percent"
     assert figure.verdict is verdict
-
-
-def test_it_is_judged_only_if_it_was_looked_for() -> None:
-    known, random = truth(), np.random.default_rng(0)
-    presses = [found_press(pose, random) for pose in BALLS[:3]]
-    pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:3]]
-    joint = refine_jointly(presses, pixels, MIRROR, SLAB, check_radii=True)
-    assert joint.radius_factor is None  # three presses are too few
-    assert judge_radii(joint) == ()

@@ -120,13 +120,6 @@ def test_a_lone_press_is_known_no_better_than_its_own_pixels_say() -> None:
         np.testing.assert_allclose(covariance, excess * inverse, rtol=1e-9)
 
 
-def test_a_prior_that_alone_decides_gives_its_own_deviation() -> None:
-    weak = [np.array([[1e-6]])] * 4
-    prior = np.array([[1.0 / 0.05]])
-    covariance = jackknife_covariance(weak, [np.zeros(1)] * 4, prior, common=1)
-    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.05, rel=1e-6)
-
-
 def test_a_calibration_says_how_sure_its_heights_are(virtual_calibration: Calibration) -> None:
     full = virtual_calibration.full
     assert full is not None

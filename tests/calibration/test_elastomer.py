@@ -41,14 +41,6 @@ def test_it_is_named_later_without_changing_the_calibration(file: Path) -> None:
     assert read_summary(file).elastomer == ""
 
 
-def test_older_programs_find_nothing_unknown_in_the_provenance(file: Path) -> None:
-    name_elastomer(file, "gel 7")
-    with zipfile.ZipFile(file) as archive:
-        manifest = json.loads(archive.read(MANIFEST))
-    assert manifest["elastomer"] == "gel 7"
-    assert "elastomer" not in manifest["provenance"]
-
-
 @pytest.mark.parametrize("name", ["x" * 81, "gel\x00"])
 def test_a_name_that_cannot_be_shown_is_refused(file: Path, name: str) -> None:
     with pytest.raises(InputError, match="elastomer"):

@@ -282,15 +282,6 @@ def test_a_matt_membrane_that_is_not_lamberts_is_a_curve(
     assert (np.ptp(ratio, axis=0) / ratio.mean(axis=0) < 0.04).all()
 
 
-def test_what_was_not_refined_has_no_deviation(
-    glossy: tuple[Truth, JointResult], grazed: tuple[Truth, JointResult]
-) -> None:
-    assert glossy[1].membrane_sd["gloss"] > 0.0
-    flat = grazed[1].membrane_sd
-    assert flat["gloss"] == flat["exponent"] == flat["roughness"] == 0.0
-    assert flat["decay_mm"] > 0.0
-
-
 def test_the_misfit_is_the_noise_of_the_pixels(glossy: tuple[Truth, JointResult]) -> None:
     _, result = glossy
     assert result.misfit == pytest.approx(0.003, rel=0.2)
@@ -343,14 +334,6 @@ def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors(seed
     else:
         assert result.kept == "refined"
         assert after <= before
-
-
-def test_with_too_few_balls_to_hold_out_the_mirror_leds_are_kept() -> None:
-    known = truth(gloss=0.2)
-    result = refined(known, count=3)
-    assert result.kept == "mirror"
-    np.testing.assert_array_equal(result.led_positions_mm, MIRROR, SLAB)
-    assert len(result.balls) == 3
 
 
 def test_pixels_that_do_not_count_change_nothing() -> None:
@@ -406,20 +389,6 @@ def test_a_term_that_is_left_out_stays_neutral_and_is_missed(
     assert stated.kept == "mirror"
     np.testing.assert_array_equal(stated.led_positions_mm, MIRROR, SLAB)
     assert stated.misfit > 1.1 * whole.misfit
-
-
-def test_light_from_around_and_curves_are_left_out_alone() -> None:
-    known = truth(exponent=0.9, interreflection=0.4)
-    dark = refined(known, noise=0.003, count=5, terms=CalibrationTerms(interreflection=False))
-    assert dark.membrane.interreflection == 0.0
-    lobes = refined(known, noise=0.003, count=5, terms=CalibrationTerms(curves=False))
-    assert lobes.membrane_kept == "two-lobe"
-    assert not lobes.membrane.diffuse
-    assert lobes.membrane.interreflection > 0.0
-    whole = refined(known, noise=0.003, count=5)
-    assert whole.membrane_kept == "one-dimensional"
-    assert dark.misfit > 1.1 * whole.misfit
-    assert lobes.misfit > 1.1 * whole.misfit
 
 
 def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> None:

@@ -52,11 +52,3 @@ def test_slopes_are_those_of_moving_every_parameter_alone(curves: bool) -> None:
     # The derivatives by the curves have a closed form, the others use the same steps.
     assert np.abs(slopes - alone)[:, : COMMON + 6].max() < 1e-9 * size.max()
     assert (np.abs(slopes - alone).max(axis=0) <= 2e-3 * size).all()
-
-
-def test_what_is_held_has_no_slopes() -> None:
-    found, x = problem(curves=False)
-    found.free[[1, 4, 10]] = False
-    slopes = found.jacobian(x)
-    assert not slopes[:, ~found.free].any()
-    assert slopes[:, found.free].any(axis=0).all()

@@ -122,8 +122,3 @@ def test_a_damaged_array_is_found_before_it_is_copied(whole: Path, tmp_path: Pat
     damaged = forged(whole, tmp_path / "d.gplcal", ("arrays", "crosstalk"), digest)
     with pytest.raises(InputError, match="crosstalk"):
         refuse_damaged_arrays(damaged)
-
-
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="does not exist"):
-        read_summary(tmp_path / "none.gplcal")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -83,19 +82,3 @@ def test_a_stage_of_nothing_but_bad_captures_fails(
             path.write_bytes(b"not an image")
         if stage is not Stage.BALLS:
             assert project.compute(stage).state is StageState.FAIL
-
-
-def test_the_command_refuses_copies_too(small_session: Path, tmp_path: Path) -> None:
-    from app.command_line.main import main
-    from gelpolight_core.calibration.file import read_calibration
-
-    session, file = tmp_path / "session", tmp_path / "c.gplcal"
-    ignored = shutil.ignore_patterns("presses", "truth")
-    shutil.copytree(small_session, session, ignore=ignored)
-    (session / "balls" / "ball_00.png").write_bytes(b"not an image")
-    (session / "checkerboard" / "zz.png").write_bytes(b"not an image either")
-    assert main(["calibrate", str(session), "-o", str(file), "--model", "paper"]) == 0
-    quality = read_calibration(file).quality
-    assert quality["lens"]["views_left_out"].value == 1.0
-    assert quality["balls"]["balls_left_out"].value == 1.0
-    assert "ball_00.png" in quality["balls"]["balls_left_out"].advice

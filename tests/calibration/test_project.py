@@ -45,12 +45,6 @@ def test_step_by_step_gives_the_same_calibration_as_all_at_once(
     assert made.full.membrane == small_calibration.full.membrane
 
 
-def test_everything_passes_or_says_what_to_do(small_project: CalibrationProject) -> None:
-    for status in small_project.statuses().values():
-        assert status.state in (StageState.PASS, StageState.WARN)
-        assert status.sentence
-
-
 def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(
     project: CalibrationProject,
 ) -> None:
@@ -60,13 +54,6 @@ def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(
     assert {s for s, state in states.items() if state is StageState.STALE} == late
     assert project.stale() == tuple(s for s in Stage if s in late)
     assert "excluded" in project.statuses()[Stage.BALLS].sentence
-
-
-def test_undoing_a_change_makes_the_result_up_to_date_again(project: CalibrationProject) -> None:
-    name = project.session.found("balls")[0].name
-    project.exclude(Stage.BALLS, name)
-    project.exclude(Stage.BALLS, name, False)
-    assert project.stale() == ()
 
 
 def test_another_led_height_makes_all_after_the_lights_stale(project: CalibrationProject) -> None:
@@ -99,24 +86,6 @@ def test_a_new_capture_of_a_single_view_replaces_the_former(
     name = project.add_capture(Stage.LIGHTS, [np.zeros((240, 320, 3), np.uint8)])
     assert [p.name for p in project.session.found("mirror")] == [name]
     assert all(path.is_file() for path in before)
-
-
-def test_a_capture_can_be_undone_and_redone(
-    project: CalibrationProject,
-) -> None:
-    former = [path.name for path in project.session.found("whiteboard")]
-    name = project.add_capture(Stage.RADIANCE, [np.full((240, 320, 3), 90, np.uint8)])
-    press = project.add_capture(Stage.BALLS, [np.full((240, 320, 3), 80, np.uint8)])
-    project.take_back(Stage.BALLS, [press])
-    project.take_back(Stage.RADIANCE, [name])
-    session = read_session(project.session.folder)
-    assert [path.name for path in session.found("whiteboard")] == former
-    assert press not in {path.name for path in session.found("balls")}
-    assert {path.name for path in session.captured("whiteboard")} == {*former, name}
-    project.take_again(Stage.RADIANCE, [name])
-    session = read_session(project.session.folder)
-    assert [path.name for path in session.found("whiteboard")] == [name]
-    assert project.session == session
 
 
 def test_a_name_is_never_given_twice(project: CalibrationProject) -> None:
@@ -310,14 +279,6 @@ def test_a_press_captured_during_a_computation_belongs_to_the_next_one(
     assert project.compute(Stage.BALLS).state in (StageState.PASS, StageState.WARN)
 
 
-def test_a_stage_is_not_computed_on_what_is_stale_itself(project: CalibrationProject) -> None:
-    project.exclude(Stage.LENS, project.session.found("checkerboard")[0].name)
-    assert project.compute(Stage.TOP_POSE).state is StageState.STALE
-    assert Stage.TOP_POSE in project.stale()
-    project.compute(Stage.LENS)
-    assert Stage.TOP_POSE in project.stale()
-
-
 def test_an_image_added_and_removed_during_a_computation_is_in_no_result(
     project: CalibrationProject, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -340,13 +301,3 @@ def test_an_image_added_and_removed_during_a_computation_is_in_no_result(
     monkeypatch.undo()
     project.compute(Stage.RADIANCE)
     assert project.results is not before
-
-
-def test_a_spot_set_in_an_excluded_view_is_not_used_for_the_next(
-    project: CalibrationProject,
-) -> None:
-    project.place_spot(1, (100.25, 50.5))
-    for path in project.session.found("mirror"):
-        project.exclude(Stage.LIGHTS, path.name)
-    project.add_capture(Stage.LIGHTS, [np.zeros((240, 320, 3), np.uint8)])
-    assert not project.session.decisions.spots_px

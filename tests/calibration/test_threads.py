@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from gelpolight_core import parallel
@@ -25,15 +24,3 @@ def test_boards_and_balls_are_found_alike_by_any_number_of_threads(
     assert again.lens.camera == before.lens.camera
     assert [press.pose for press in again.presses] == [press.pose for press in before.presses]
     assert [ball.file for ball in again.balls] == [ball.file for ball in before.balls]
-
-
-def test_the_refinement_is_the_same_to_the_last_bit_with_one_thread(
-    small_project: CalibrationProject, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    session, before = small_project.session, small_project._results
-    monkeypatch.setattr(parallel, "usable_cores", lambda: 1)
-    again = run_stage(Stage.JOINT, session, replace(before, joint=None, full=None))
-    assert before.full is not None and again.full is not None
-    np.testing.assert_array_equal(again.full.led_positions_mm, before.full.led_positions_mm)
-    assert again.full.membrane == before.full.membrane
-    assert again.full.scale_sd == before.full.scale_sd

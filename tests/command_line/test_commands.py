@@ -129,18 +129,6 @@ def test_the_evaluation_measures_every_press_of_the_folder(
     assert cv2.imread(str(tmp_path / "e" / "evaluation.png")) is not None
 
 
-def test_an_evaluation_without_a_measurable_press_is_refused(
-    session: Path, calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    presses = tmp_path / "presses"
-    presses.mkdir()
-    shutil.copy(next((session / "background").iterdir()), presses / "bare.png")
-    head = "file,shape,diameter_mm,side_mm,height_mm"
-    (presses / "truth.csv").write_text(f"{head}\nbare.png,cylinder,5.0,,1.0\n")
-    line = refusal(capsys, "evaluate", str(calibration), str(presses), "-o", str(tmp_path / "e"))
-    assert "one of the 1 presses" in line
-
-
 def test_the_benchmark_lists_the_time_of_each_step(
     calibration: Path, press: Path, tmp_path: Path
 ) -> None:
@@ -152,20 +140,6 @@ def test_the_benchmark_lists_the_time_of_each_step(
     assert {"name", "median_ms", "p95_ms", "bytes"} <= set(timing["steps"][0])
     done = [step["step"] for step in timing["plan"] if step["done"]]
     assert done == [step["name"] for step in timing["steps"]]
-
-
-def test_the_benchmark_of_a_planned_frame_lists_omitted_steps(
-    calibration: Path, press: Path, tmp_path: Path
-) -> None:
-    result = tmp_path / "b.json"
-    arguments = ["benchmark", str(calibration), str(press), "--effort", "fast"]
-    assert main([*arguments, "--repeats", "2", "--json", str(result)]) == 0
-    timing = json.loads(result.read_text())
-    assert timing["effort"] == "fast"
-    done = {step["step"] for step in timing["plan"] if step["done"]}
-    assert done == {step["name"] for step in timing["steps"]}
-    assert all(step["reason"] for step in timing["plan"])
-    assert any(not step["done"] for step in timing["plan"])
 
 
 def test_a_plan_is_explained(
@@ -213,11 +187,3 @@ def test_shadows_come_from_the_leds_of_the_design(
         shadows[height] = [float(row[-1]) for row in point]
     assert sum(shadows[7.0]) > sum(shadows[13.0])
     assert shadows[7.0][-1] > shadows[13.0][-1] > 0.0
-
-
-def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    shown = capsys.readouterr().out
-    for command in ("simulate", "calibrate", "reconstruct", "measure", "evaluate", "--demo"):
-        assert command in shown

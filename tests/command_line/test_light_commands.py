@@ -47,10 +47,6 @@ def test_a_board_needs_no_more_than_a_page(tmp_path: Path) -> None:
     assert (tmp_path / "board.pdf").stat().st_size > 0
 
 
-def test_cameras_are_listed_without_the_compiler() -> None:
-    assert not loaded_by("cameras") & {"numba", "scipy", "matplotlib", "PySide6"}
-
-
 def test_a_design_is_checked_without_the_drawing_library(tmp_path: Path) -> None:
     assert not loaded_by("design", str(tmp_path / "none.toml")) & {"matplotlib", "PySide6"}
 

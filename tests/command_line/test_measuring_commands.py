@@ -114,15 +114,6 @@ def test_the_object_is_selected_by_a_point_in_both_notations(
     assert f"no object lies at the seed point {place} mm" in refusal(capsys, *arguments)
 
 
-def test_a_seed_point_is_not_ignored_with_stored_tools(
-    press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    stored = tmp_path / "tools.json"
-    stored.write_text('[{"tool": "ball"}]')
-    arguments = ("measure", "none.gplcal", str(press), "--tools", str(stored), "--seed", "1", "2")
-    assert "--seed: " in refusal(capsys, *arguments)
-
-
 def test_a_profile_is_written_as_a_table(calibration: Path, press: Path, tmp_path: Path) -> None:
     file = tmp_path / "section.csv"
     ends = ["--from", "-6,0.5", "--to", "6", "-0.5", "--width", "0.4"]

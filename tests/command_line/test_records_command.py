@@ -42,15 +42,6 @@ def test_one_sensor_is_chosen_and_written_as_csv(
     assert [line.split(",")[2] for line in table.read_text("utf-8-sig").splitlines()[1:]] == ["B-2"]
 
 
-def test_damaged_records_are_reported_and_kept(
-    workspace: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (workspace / NAME).write_bytes(b"nonsense" * 1000)
-    assert main(["records", "--workspace", str(workspace)]) == 0
-    assert "The records were damaged. They were saved as" in capsys.readouterr().err
-    assert len(list(workspace.glob("records.damaged-*"))) == 1
-
-
 def test_a_folder_without_records_is_refused_and_stays_empty(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -65,14 +56,3 @@ def test_the_table_does_not_overwrite_the_records(
     kept = (workspace / NAME).read_bytes()
     assert "overwrite" in refusal(capsys, *chosen, str(workspace / NAME))
     assert (workspace / NAME).read_bytes() == kept
-
-
-def test_a_table_that_cannot_be_written_is_refused_before_the_records_are_read(
-    workspace: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(*_arguments: object) -> None:
-        raise AssertionError("the records are read")
-
-    monkeypatch.setattr(Records, "measurements", fail)
-    chosen = ("records", "--workspace", str(workspace), "--csv")
-    assert "A folder has the name" in refusal(capsys, *chosen, str(workspace))

@@ -94,14 +94,6 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
         read_design(tmp_path / "nothing.toml")
 
 
-def test_half_the_pixels_see_the_same_scene() -> None:
-    small = SensorDesign().scaled(0.5).camera
-    assert (small.width_px, small.height_px) == (640, 480)
-    # The left edge of the image (-0.5) stays at the same angle.
-    full = SensorDesign().camera
-    assert (-0.5 - small.cx) / small.fx == pytest.approx((-0.5 - full.cx) / full.fx)
-
-
 def test_the_hard_design_that_is_shipped_is_as_hard_as_it_says() -> None:
     design = read_design(Path(__file__).parents[2] / "resources" / "designs" / "hard.toml")
     signal = 200.0 / 255.0

@@ -109,12 +109,6 @@ def test_the_next_ball_is_asked_for_where_the_membrane_is_seen() -> None:
     assert x_mm < 1.1 and y_mm > 2.0
 
 
-def test_no_change_of_colour_is_no_slope() -> None:
-    coefficients = np.random.default_rng(2).normal(0.0, 1.0, (TERMS, 2))
-    slope_x, slope_y = evaluate(coefficients, np.zeros((8, 9, 3), np.float32))
-    assert not slope_x.any() and not slope_y.any()
-
-
 @pytest.mark.parametrize("centre", [(70.0, 60.0), (4.0, 60.0), (70.0, 112.0)])
 def test_depth_is_right_also_where_the_border_cuts_the_contact(
     centre: tuple[float, float],
@@ -136,18 +130,6 @@ def test_slopes_place_ball_and_contact() -> None:
     assert (found.x, found.y) == pytest.approx((true.x, true.y), abs=0.05)
     contact = contact_by_slopes(slope_x, slope_y, found, smoothing=0.5)
     assert contact == pytest.approx(true.contact, abs=0.6)
-
-
-def test_the_grid_keeps_places_when_it_averages_pixels() -> None:
-    grid = WorkingGrid(ImageSize(1280, 960), 0.02)
-    assert grid.factor == 4
-    y, x = np.mgrid[:960, :1280]
-    places = np.stack([(x - 639.5) * 0.02, (y - 479.5) * 0.02, 0.0 * x], axis=-1)
-    reduced = grid.reduce(places.astype(np.float32))
-    assert reduced[0, :, 0] == pytest.approx(grid.x_mm, abs=1e-5)
-    assert reduced[:, 0, 1] == pytest.approx(grid.y_mm, abs=1e-5)
-    table = grid.table()
-    assert (table.u_px[0, 0], table.v_px[0, 0]) == (1.5, 1.5)
 
 
 def test_a_pin_grid_gives_the_scale() -> None:

@@ -21,16 +21,6 @@ def test_the_image_shows_about_the_working_area(key: str) -> None:
         assert pixels * preset.mm_per_px == pytest.approx(mm, rel=0.15)
 
 
-def test_larger_images_of_the_same_shape_have_smaller_pixels() -> None:
-    mini = preset_named("gelsight-mini")
-    assert mini.scale_for(640, 480) == pytest.approx(
-        (0.5 * mini.mm_per_px, 0.5 * mini.mm_per_px_sd)
-    )
-    with pytest.raises(InputError) as refused:
-        mini.scale_for(240, 320)
-    assert "240x320" in refused.value.found
-
-
 def test_a_sensor_whose_lights_show_no_slope_is_named() -> None:
     assert preset_named("9dtact").limits and not preset_named("digit").limits
 

@@ -51,40 +51,6 @@ def test_a_writer_that_fails_midway_changes_nothing(
     assert os.listdir(tmp_path) == (["press.npz"] if old else [])
 
 
-def test_the_old_file_is_whole_while_the_new_one_is_written(tmp_path: Path) -> None:
-    path = tmp_path / "press.npz"
-    path.write_bytes(b"old")
-
-    def writer(file: BinaryIO) -> None:
-        file.write(b"new, ")
-        file.flush()
-        assert path.read_bytes() == b"old"
-        file.seek(0)
-        file.write(b"New")
-
-    write_atomically(path, writer)
-    assert path.read_bytes() == b"New, "
-
-
-@pytest.mark.parametrize(
-    ("number", "found"),
-    [
-        (errno.ENOSPC, "disk is full"),
-        (errno.EACCES, "not have permission"),
-        (errno.EPERM, "not have permission"),
-        (errno.EROFS, "read-only"),
-        (errno.EIO, "cannot be written"),
-    ],
-)
-def test_a_disk_error_is_reported_in_plain_words(tmp_path: Path, number: int, found: str) -> None:
-    path = tmp_path / "press.npz"
-    with pytest.raises(InputError) as caught:
-        write_atomically(path, half_then(OSError(number, os.strerror(number))))
-    assert found in caught.value.found
-    assert caught.value.where == str(path)
-    assert caught.value.advice
-
-
 def test_a_path_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
     """Minutes of calibration are not wasted on a file that cannot be written."""
     (tmp_path / "kept").write_text("old")
@@ -148,12 +114,6 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     write_atomically(tmp_path / "link", lambda file: file.write(b"new"))
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "real").read_bytes() == b"new"
-
-
-def test_folders_are_made_with_those_above_them(tmp_path: Path) -> None:
-    make_folder(tmp_path / "a" / "b")
-    make_folder(tmp_path / "a" / "b")
-    assert (tmp_path / "a" / "b").is_dir()
 
 
 def test_a_device_is_never_replaced_by_a_file(tmp_path: Path) -> None:

@@ -25,11 +25,6 @@ def test_a_run_that_was_left_can_be_written_by_another(tmp_path: Path) -> None:
     RunLock(tmp_path).release()
 
 
-def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputError):
-        RunLock(tmp_path / "nowhere")
-
-
 def test_a_system_that_knows_no_users_has_runs_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
-from gelpolight_core.lights.positions import direction_condition, light_directions, locate_leds
+from gelpolight_core.lights.positions import locate_leds
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.quality import Verdict
@@ -87,12 +86,6 @@ def test_an_unusable_mirror_image_is_refused_with_the_reason(rgb: np.ndarray, wh
     assert refusal.value.advice
 
 
-def test_a_grey_mirror_image_is_refused() -> None:
-    grey = np.repeat(mirror_image().max(axis=2, keepdims=True), 3, axis=2)
-    with pytest.raises(InputError, match="grey"):
-        find_mirror_spots(LinearImage("m", grey))
-
-
 def test_saturated_spots_are_found_and_warned_of() -> None:
     spots = find_mirror_spots(LinearImage("m", mirror_image(peak=3.0)))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.1)
@@ -123,16 +116,6 @@ def test_leds_in_one_direction_are_refused() -> None:
         locate_leds(spots, camera, plane, led_height_mm=13.7)
 
 
-def test_light_directions_are_unit_and_point_to_the_led() -> None:
-    leds = np.array([[0.0, 12.0, -14.0], [-10.0, -6.0, -14.0], [10.0, -6.0, -14.0]])
-    direction, distance = light_directions(leds, np.array([1.0, 2.0, -0.5]))
-    np.testing.assert_allclose(np.linalg.norm(direction, axis=-1), 1.0)
-    np.testing.assert_allclose(
-        direction * distance[:, None] + np.array([1.0, 2.0, -0.5]), leds, atol=1e-12
-    )
-    assert 1.0 < direction_condition(leds, np.zeros(2)) < 3.0
-
-
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
 def test_the_rendered_mirror_is_read_to_a_tenth_of_a_pixel(shared_data: Path, sensor: str) -> None:
     truth = json.loads((shared_data / sensor / "truth.json").read_text())
@@ -151,11 +134,6 @@ def test_the_rendered_mirror_is_read_to_a_tenth_of_a_pixel(shared_data: Path, se
     assert np.linalg.norm(error, axis=1).max() < 0.35
     truth_matrix = np.array(truth["crosstalk_camera_from_led"])
     np.testing.assert_allclose(crosstalk_from_spots(spots)[0], truth_matrix, atol=0.005)
-
-
-def test_averaged_frames_keep_the_spots() -> None:
-    image = LinearImage("m", mirror_image(noise=0.01))
-    assert find_mirror_spots(replace(image, frame_count=4)).spots[0].area_px > 10
 
 
 def test_crosstalk_is_read_off_the_flanks_of_saturated_spots() -> None:

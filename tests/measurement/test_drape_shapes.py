@@ -11,7 +11,6 @@ from scipy.sparse import csr_matrix, diags_array, eye_array, kron
 from scipy.sparse.linalg import spsolve
 from scipy.special import k0
 
-from gelpolight_core.measurement.corner import corner_drape
 from gelpolight_core.measurement.drape import (
     ball_contact_radius_mm,
     ball_depth,
@@ -20,12 +19,6 @@ from gelpolight_core.measurement.drape import (
 )
 
 Array = NDArray[np.float64]
-
-
-def laplacian(depth: Array, pitch: float) -> Array:
-    inner = depth[1:-1, 1:-1]
-    around = depth[:-2, 1:-1] + depth[2:, 1:-1] + depth[1:-1, :-2] + depth[1:-1, 2:]
-    return (around - 4.0 * inner) / pitch**2
 
 
 def test_a_sharp_cylinder_is_flat_inside_and_decays_like_k0_outside() -> None:
@@ -85,28 +78,6 @@ def test_the_blur_of_a_cylinder_is_that_of_a_gaussian() -> None:
     inner = slice(20, -20)
     # The wall is taken as straight: its curvature changes the result by (blur / radius)**2.
     assert np.abs(model - truth)[inner, inner].max() < 2e-3
-
-
-def test_the_corner_obeys_its_equation_and_meets_both_faces() -> None:
-    pitch = 0.1
-    place = np.arange(-3.0, 3.0, pitch)
-    x, y = np.meshgrid(place, place)
-    drape = corner_drape(x, y)
-    left = laplacian(drape, pitch) - drape[1:-1, 1:-1]
-    x, y = x[1:-1, 1:-1], y[1:-1, 1:-1]
-    away = (np.maximum(x, y) > 2 * pitch) & (np.hypot(x, y) > 0.8)
-    # The table is right to 2e-5 of the height, which the differences divide by pitch**2.
-    assert np.abs(left[away]).max() < 0.01
-    face = corner_drape(np.full(50, 1e-9), np.linspace(-3.0, -0.1, 50))
-    np.testing.assert_allclose(face, 1.0, atol=2e-4)
-
-
-def test_far_from_its_ends_a_long_wall_decays_exponentially() -> None:
-    away = np.linspace(0.0, 4.0, 50)
-    depth = cuboid_depth(
-        5.0 + away, np.zeros(50), side_mm=(10.0, 10.0), height_mm=1.0, decay_mm=0.7
-    )
-    np.testing.assert_allclose(depth, np.exp(-away / 0.7), atol=1e-3)
 
 
 def obstacle_solution(indenter: Array, pitch: float, decay: float) -> Array:

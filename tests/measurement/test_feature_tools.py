@@ -63,14 +63,6 @@ def test_the_stated_sd_of_a_pit_covers_its_error() -> None:
     assert math.sqrt(float(np.mean(np.square(errors)))) < 3.0
 
 
-def test_noise_alone_is_no_feature() -> None:
-    flat = made(tilted, **stated(24, 0.004))
-    found = Pit(Rectangle(CENTRE, (4.0, 4.0))).apply(flat)
-    assert found.verdict == "doubtful"
-    found = Scratch((0.0, -0.7), (3.0, -0.7)).apply(flat)
-    assert found.verdict == "doubtful"
-
-
 @given(
     height=st.sampled_from([-0.1, 0.15]),
     width=st.floats(0.4, 1.0),
@@ -121,11 +113,6 @@ def test_a_section_that_leaves_the_working_area_is_refused() -> None:
     for tool in (Scratch((0.0, 0.0), (0.0, -5.95)), EdgeRadius((0.0, 0.0), (0.0, -5.95))):
         with pytest.raises(InputError):
             tool.apply(made(tilted))
-
-
-def test_a_rectangle_of_few_nodes_is_refused() -> None:
-    with pytest.raises(InputError):
-        Pit(Rectangle(CENTRE, (0.1, 0.1))).apply(made(tilted))
 
 
 def test_the_circle_tool_measures_a_hole_in_a_plate() -> None:

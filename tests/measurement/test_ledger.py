@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.result import Measurement
 
@@ -96,11 +95,3 @@ def test_a_line_cut_short_by_a_crash_costs_that_line_only(tmp_path: Path, cut: i
     found = whole.find("c")
     assert isinstance(whole.find("a"), Measurement)
     assert isinstance(found, Measurement) and found.height_mm == math.pi
-
-
-def test_a_ledger_that_is_no_text_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "m.jsonl"
-    path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not text"):
-        Ledger(path, "n")
-    Ledger(None, "n").keep("a", "kept in memory only")

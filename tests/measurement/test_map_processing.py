@@ -104,17 +104,6 @@ def test_a_difference_is_valid_where_both_maps_are() -> None:
         difference(press, replace(bare, x_mm=bare.x_mm + 100.0))
 
 
-def test_the_reference_of_a_difference_may_have_a_coarser_grid() -> None:
-    plane = made(lambda x, y: 0.02 * x - 0.01 * y + 0.1)
-    coarse = replace(
-        plane, depth_mm=plane.depth_mm[::3, ::3] - np.float32(0.1), x_mm=plane.x_mm[::3],
-        y_mm=plane.y_mm[::3], flags=plane.flags[::3, ::3], pitch_mm=3 * plane.pitch_mm,
-    )  # fmt: skip
-    left = difference(plane, coarse)
-    assert left.depth_mm[usable(left)] == pytest.approx(0.1, abs=1e-5)
-    assert usable(left).mean() > 0.9
-
-
 def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none() -> None:
     press = tilted_press()
     sd = np.full(press.depth_mm.shape, 0.003, np.float32)
@@ -124,10 +113,3 @@ def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none() 
     np.testing.assert_allclose(left.depth_sd_mm, 0.005, rtol=1e-5)
     assert difference(one, press).depth_sd_mm is None
     assert level_by_points(one, ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0))).depth_sd_mm is None
-
-
-def test_a_histogram_counts_every_point_once() -> None:
-    press = tilted_press()
-    counts, edges = histogram(press, bins=20)
-    assert counts.sum() == usable(press).sum()
-    assert edges[0] == pytest.approx(float(press.depth_mm[usable(press)].min()))

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from hypothesis import strategies as st
 from maps import PITCH, X, Y, drawn, made, stated
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.measurement.profile import (
     angle_between,
     slope,
@@ -72,12 +69,6 @@ def test_the_width_of_a_roof_at_a_level_and_at_half_its_height() -> None:
         width_at(profile, 2.0)
 
 
-def test_a_groove_has_a_width_too() -> None:
-    groove = made(lambda x, y: 1.0 - np.clip(1.5 - np.abs(x), 0.0, 0.5))
-    profile = take_profile(groove, (-4.0, 0.0), (4.0, 0.0))
-    assert width_at(profile).value == pytest.approx(2.5, abs=0.01)
-
-
 def test_a_stair_has_its_step_and_a_ridge_its_angle() -> None:
     profile = take_profile(made(lambda x, y: np.where(x > 0.0, 0.7, 0.2)), (-3, 0), (3, 0))
     step = step_height(profile, first_mm=(0.5, 2.0), second_mm=(4.0, 5.5))
@@ -87,15 +78,6 @@ def test_a_stair_has_its_step_and_a_ridge_its_angle() -> None:
     )
     assert angle_between(ridge, (0.5, 2.5), (3.5, 5.5)).value == pytest.approx(40.0, abs=1e-3)
     assert angle_between(ridge, (0.5, 1.5), (1.5, 2.5)).value == pytest.approx(0.0, abs=1e-3)
-
-
-def test_a_range_without_the_map_is_refused() -> None:
-    profile = take_profile(made(lambda x, y: x), (0.0, 0.0), (3.0, 0.0))
-    with pytest.raises(InputError, match="too few points"):
-        step_height(profile, first_mm=(4.0, 5.0), second_mm=(0.0, 1.0))
-    for bad in ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, math.nan, 0.0), (1e7, 0.0, 0.0)):
-        with pytest.raises(InputError, match="a length of"):
-            take_profile(made(lambda x, y: x), (0.0, 0.0), bad[:2], width_mm=bad[2])
 
 
 def test_figures_scatter_by_what_they_state() -> None:
@@ -143,24 +125,3 @@ def test_what_the_model_leaves_open_is_larger_between_far_places_than_near_ones(
     far = step_height(profile, first_mm=(0.0, 0.1), second_mm=(7.9, 8.0)).sd
     assert near < 0.2 * far
     assert far == pytest.approx(math.sqrt(2.0) * 0.01, rel=0.3)
-
-
-def test_a_spreadsheet_reads_the_profile(tmp_path: Path) -> None:
-    heightmap = made(lambda x, y: 0.1 * x + 0.2, **stated(8, 0.003))
-    profile = take_profile(heightmap, (0.0, -6.0), (1.0, 5.0), width_mm=0.3)
-    other = take_profile(heightmap, (0.0, 0.0), (1.0, 0.0))
-    write_profiles({1: profile, 3: other}, tmp_path / "section.csv")
-    with (tmp_path / "section.csv").open(newline="") as stream:
-        whole = list(csv.DictReader(stream))
-    rows = [row for row in whole if row["line"] == "1"]
-    assert [row["line"] for row in whole[len(rows) :]] == ["3"] * other.along_mm.size
-    assert len(rows) == profile.along_mm.size
-    known = [k for k, row in enumerate(rows) if row["depth_mm"]]
-    assert known == np.flatnonzero(np.isfinite(profile.depth_mm)).tolist()
-    for name in ("along_mm", "depth_mm", "depth_sd_mm"):
-        found = [float(rows[k][name]) for k in known]
-        assert found == pytest.approx(getattr(profile, name)[known], abs=1e-6)
-    places = np.array([[float(row["x_mm"]), float(row["y_mm"])] for row in rows])
-    assert places == pytest.approx(profile.points_mm, abs=1e-6)
-    assert [int(row["flags"]) for row in rows] == profile.flags.tolist()
-    assert rows[0]["depth_sd_mm"] == rows[0]["depth_mm"] == ""

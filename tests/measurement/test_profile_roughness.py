@@ -56,13 +56,6 @@ def test_the_filter_passes_what_the_standard_says(length_mm: float) -> None:
     assert np.ptp(middle) / 2.0 == pytest.approx(passed_by_standard(length_mm), abs=0.002)
 
 
-def test_a_long_wave_is_waviness() -> None:
-    found = profile_roughness(wave(8.0), cutoff_mm=CUTOFF_MM)
-    assert found.rz.value < 0.05 * 2e3 * AMPLITUDE_MM
-    total = found.roughness_mm + found.waviness_mm
-    assert np.ptp(total) > np.ptp(found.roughness_mm)
-
-
 def test_a_map_with_errors_gives_the_parameters_theirs() -> None:
     clean = profile_roughness(wave(0.4))
     noisy = profile_roughness(wave(0.4, **stated(40, 1e-3)))

@@ -12,7 +12,7 @@ import pytest
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, nut, press
+from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, press
 from gelpolight_core.simulation.surface import PressedSurface
 
 PITCH = 0.08
@@ -60,15 +60,6 @@ def test_what_the_virtual_sensor_presses_is_recognised(
     assert found is not None
     assert (found.shape, found.candidates) == (shape, (shape,))
     assert min(found.residual_mm, key=lambda name: found.residual_mm[name]) == shape
-
-
-def test_a_nut_is_none_of_them() -> None:
-    assert propose(map_of(press(nut(), pitch_mm=0.06))) is None
-
-
-def test_where_nothing_is_pressed_nothing_is_proposed() -> None:
-    assert propose(map_of()) is None
-    assert propose(map_of(press(Cylinder(4.0, 0.7), x_mm=-8.0, pitch_mm=0.04))) is None
 
 
 def test_what_noise_hides_is_unclear() -> None:

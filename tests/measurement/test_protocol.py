@@ -10,7 +10,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-import scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,7 +18,6 @@ from gelpolight_core.measurement.protocol import (
     ROOM_MM,
     Protocol,
     check_protocol,
-    protocol_reach_mm,
 )
 from gelpolight_core.measurement.protocol_file import read_protocol_file
 from gelpolight_core.measurement.protocol_run import (
@@ -61,25 +59,6 @@ def test_every_object_lies_within_reach_with_the_ground_around_it(seed: int, rea
         assert math.hypot(*press.position_mm) + corner + ROOM_MM <= reach + 0.01
 
 
-def test_random_places_fill_the_room_evenly() -> None:
-    away = [
-        math.hypot(*press.position_mm)
-        for seed in range(40)
-        for press in Protocol(
-            ("cylinder",), (4.0,), (), repeats=0, reach_mm=14.0, seed=seed
-        ).presses()
-    ]
-    # Half of a disc's area is within 1/sqrt(2) of its radius; 1000 places know that to 1.6 %.
-    assert np.mean(np.array(away) < 10.0 / math.sqrt(2.0)) == pytest.approx(0.5, abs=0.05)
-
-
-def test_a_part_of_the_protocol_asks_for_the_same_places_as_the_whole() -> None:
-    whole = {press.file: press for press in Protocol().presses()}
-    part = Protocol(shapes=("cuboid",), sizes_mm=(4.0,), heights_mm=(1.25,), repeats=1, regions=7)
-    assert len(part.presses()) == 2 * 8
-    assert all(whole[press.file] == press for press in part.presses())
-
-
 @pytest.mark.parametrize(
     ("protocol", "message"),
     [
@@ -100,15 +79,6 @@ def test_a_part_of_the_protocol_asks_for_the_same_places_as_the_whole() -> None:
 def test_a_protocol_that_nobody_can_press_is_refused(protocol: Protocol, message: str) -> None:
     with pytest.raises(InputError, match=message):
         check_protocol(protocol)
-
-
-def test_the_reach_is_where_every_point_is_seen() -> None:
-    calibration = scene.calibration()
-    reach = protocol_reach_mm(calibration)
-    grid, valid = calibration.table.grid, calibration.table.valid
-    away = np.hypot(grid.x_mm[None, :], grid.y_mm[:, None])
-    assert valid[away < reach].all()
-    assert not valid[away < reach + 3 * grid.pitch_mm].all() or reach > 0.5 * grid.x_mm[-1]
 
 
 def test_a_run_is_left_and_gone_on_with_where_it_was(tmp_path: Path) -> None:
@@ -144,14 +114,6 @@ def test_the_run_is_the_folder_that_evaluate_reads(tmp_path: Path) -> None:
     assert crossing_of(folder) == SMALL.crossing
     assert presses_folder(folder) == folder
     assert crossing_of(tmp_path) is None
-
-
-def test_frames_of_a_press_are_averaged_with_all_their_bits(tmp_path: Path) -> None:
-    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    image = run.accept(run.wanted[0], [*frames(10, 3), *frames(11)])
-    kept = cv2.imread(str(image), cv2.IMREAD_UNCHANGED)
-    assert kept.dtype == np.uint16
-    assert kept.mean() == pytest.approx(10.25 * 257, abs=0.5)
 
 
 def test_a_press_taken_back_is_asked_for_again_and_its_image_is_kept(tmp_path: Path) -> None:
@@ -252,15 +214,3 @@ def test_a_new_run_does_not_take_the_place_of_another(tmp_path: Path) -> None:
         begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     with pytest.raises(InputError, match=r"there is no protocol\.toml"):
         open_run(tmp_path)
-
-
-def test_of_several_images_that_were_taken_away_all_are_asked_for_again(tmp_path: Path) -> None:
-    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    for press in run.wanted:
-        run.accept(press, frames(10))
-    for press in run.wanted[1:]:
-        run.image(press).unlink()
-    again = open_run(run.folder)
-    again.accept(run.wanted[1], frames(20))
-    assert again.left == (run.wanted[2],)
-    assert open_run(run.folder).left == (run.wanted[2],)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -73,12 +72,3 @@ def test_a_press_beside_the_circle_is_refused_with_how_far() -> None:
     assert not judged.accepted
     assert "pixels away from the circle" in judged.reason
     assert judge_press(frames, bare).accepted
-
-
-def test_frames_that_cannot_be_compared_are_refused() -> None:
-    bare = shot(None, 0)
-    assert "More than one frame" in judge_press([shot(0.0, 1)], bare).reason
-    small = cv2.resize(bare, (64, 48))
-    assert "different sizes" in judge_press([shot(0.0, 1), shot(0.0, 2)], small).reason
-    deep = bare.astype(np.uint16)
-    assert not judge_press([shot(0.0, 1), shot(0.0, 2)], deep).accepted

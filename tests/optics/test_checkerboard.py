@@ -64,20 +64,6 @@ def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: Lin
     assert size.max() < 1.6 * size.min()
 
 
-def test_the_result_tells_how_good_the_view_is(tilted_board: LinearImage) -> None:
-    """Sharpness, contrast, saturation and misfit are shown next to the image."""
-    view = find_board(tilted_board, BOARD)
-    assert view.contrast == pytest.approx(0.75, abs=0.02)
-    # Blur of 0.6 px with the pixel's own 0.29: 2.56 * 0.67.
-    assert view.edge_width_px == pytest.approx(1.7, abs=0.2)
-    assert view.saturated_share == 0.0
-    # A k1 of -0.12 bends the grid; two radial coefficients remove most of it.
-    assert view.grid_rms_px < 0.5 * view.homography_rms_px
-    u_min, v_min, u_max, v_max = view.bounding_box_px
-    assert 0 < u_min < u_max < 480
-    assert 0 < v_min < v_max < 360
-
-
 @pytest.mark.parametrize("stated", [(8, 5), (7, 7), (9, 7), (10, 7), (5, 4), (12, 9)])
 def test_another_board_size_is_refused_and_the_real_one_named(
     tilted_board: LinearImage, stated: tuple[int, int]
@@ -87,13 +73,6 @@ def test_another_board_size_is_refused_and_the_real_one_named(
         find_board(tilted_board, BoardSpec(stated, 3.0))
     assert refusal.value.where == "view.png"
     assert "inner corners" in refusal.value.advice
-
-
-def test_a_board_may_be_stated_lengthwise_or_crosswise(tilted_board: LinearImage) -> None:
-    """9 x 6 and 6 x 9 are the same board."""
-    lengthwise = find_board(tilted_board, BOARD).corners_px
-    crosswise = find_board(tilted_board, BoardSpec((6, 9), 3.0)).corners_px
-    assert distance_to_nearest(crosswise, lengthwise).max() < 0.01
 
 
 def test_uneven_light_does_not_move_the_corners(tilted_board: LinearImage) -> None:
@@ -125,13 +104,6 @@ def test_an_empty_image_is_refused_with_the_reason(image: LinearImage, says: str
         find_board(image, BOARD)
 
 
-def test_noise_alone_is_no_board() -> None:
-    """A detector that always reports a board is not trusted."""
-    noise = np.random.default_rng(3).random((360, 480, 3)).astype(np.float32)
-    with pytest.raises(InputError, match="No checkerboard with 9 x 6"):
-        find_board(LinearImage("noise.png", noise), BOARD)
-
-
 @pytest.mark.parametrize("blur_px", [2.5, 5.0, 12.0])
 def test_a_blurred_board_is_refused_as_blurred(tilted_board: LinearImage, blur_px: float) -> None:
     """A defocused or moved image is reported as blurred, not as a missing board."""
@@ -144,14 +116,6 @@ def test_light_squares_at_the_end_of_the_scale_are_refused(tilted_board: LinearI
     """Clipped light squares have no level from which an edge can be measured."""
     with pytest.raises(InputError, match="light squares are saturated"):
         find_board(LinearImage("bright.png", np.clip(tilted_board.rgb * 1.6, 0.0, 1.0)), BOARD)
-
-
-def test_a_board_that_is_half_covered_is_not_accepted(tilted_board: LinearImage) -> None:
-    """Half a board is not accepted as a whole one."""
-    covered = tilted_board.rgb.copy()
-    covered[:, :200] = 0.3
-    with pytest.raises(InputError):
-        find_board(LinearImage("covered.png", covered), BOARD)
 
 
 @pytest.mark.parametrize(

@@ -159,16 +159,6 @@ def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg: tuple[flo
     assert "held_0.png" in refusal.value.found
 
 
-def test_a_failed_image_among_good_ones_is_left_out_and_named() -> None:
-    """A black frame among the views is named, but not fatal."""
-    image, truth = lying_board()
-    black = LinearImage("black.png", np.zeros_like(image.rgb))
-    result = estimate_top_pose([black, image], BOARD, CAMERA)
-    assert [view.used for view in result.views] == [False, True]
-    assert "black" in result.views[0].reason
-    assert result.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
-
-
 def test_the_focal_length_s_uncertainty_reaches_the_distance() -> None:
     """The distance cannot be known better than the focal length."""
     image, _ = lying_board()

@@ -7,7 +7,6 @@ import importlib.util
 import os
 import re
 import subprocess
-import sys
 import tomllib
 import xml.etree.ElementTree as ET
 from importlib.metadata import distribution
@@ -27,7 +26,6 @@ from gelpolight_core.recording.recording import ENDING as RECORDING
 ROOT = Path(__file__).resolve().parents[2]
 DEB = ROOT / "packaging" / "deb"
 MIME = "{http://www.freedesktop.org/standards/shared-mime-info}"
-SYSTEM = "/usr/lib/x86_64-linux-gnu/"
 SITE = "/build/venv/lib/python3.11/site-packages/"
 
 
@@ -147,24 +145,6 @@ def test_what_nothing_uses_is_left_out(place: str) -> None:
     assert not taken(place)
 
 
-def test_libraries_that_belong_to_the_graphics_driver_come_from_the_system() -> None:
-    """An older C++ runtime of ours would keep a newer driver from being loaded."""
-    for name in ("libstdc++.so.6", "libX11.so.6", "libglib-2.0.so.0", "libreadline.so.8"):
-        assert not taken(name, SYSTEM + name)
-    for name in ("libpython3.11.so.1.0", "libsqlite3.so.0", "libffi.so.8", "libz.so.1"):
-        assert taken(name, SYSTEM + name)
-
-
-def test_bytecode_is_made_for_our_modules_only(tmp_path: Path) -> None:
-    source = tmp_path / "one.py"
-    source.write_text("answer = 42\n")
-    entries = [("app/one.py", str(source), "DATA"), ("cv2/config.py", str(source), "DATA")]
-    made = parts.compiled(entries, tmp_path / "made")
-    name = f"app/__pycache__/one.{sys.implementation.cache_tag}.pyc"
-    assert [place for place, _, _ in made] == [name]
-    assert Path(made[0][1]).stat().st_size > 0
-
-
 def test_a_changed_module_changes_the_stamp_of_the_compiled_loops(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -184,17 +164,6 @@ def test_compiled_loops_and_fonts_are_kept_in_a_folder_of_the_user(
     frozen_start.choose_caches(tmp_path / "cache")
     assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "cache" / "kernels")
     assert Path(os.environ["MPLCONFIGDIR"]).parent == tmp_path / "cache"
-
-
-def test_where_the_user_has_no_room_for_them_the_program_runs_all_the_same(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(os, "environ", {})
-    (tmp_path / "file").write_text("")
-    frozen_start.choose_caches(tmp_path / "file" / "cache")
-    spare = Path(os.environ["NUMBA_CACHE_DIR"]).parent
-    assert spare.is_dir()
-    spare.rmdir()
 
 
 def test_programs_that_are_opened_find_their_own_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -228,18 +197,6 @@ def test_the_file_types_are_those_that_the_program_opens() -> None:
         for found in kind.iter(f"{MIME}glob")
     ]
     assert globs == [f"*{ending}" for ending in OPENED] == [f"*{CALIBRATION}", f"*{RECORDING}"]
-
-
-def test_the_control_file_of_the_package_is_well_formed() -> None:
-    lines = (DEB / "control.in").read_text("utf-8").splitlines()
-    fields = dict(line.split(": ", 1) for line in lines if not line.startswith(" "))
-    assert {"Package", "Version", "Architecture", "Maintainer", "Description", "Depends"} <= set(
-        fields
-    )
-    assert all(len(line) < 80 for line in lines)
-    places = set(re.findall(r"@(\w+)@", "\n".join(lines)))
-    script = (ROOT / "packaging" / "freeze.sh").read_text("utf-8")
-    assert places == set(re.findall(r"s/@(\w+)@/", script))
 
 
 def test_the_package_asks_for_what_windows_need_on_a_bare_machine() -> None:

@@ -109,11 +109,6 @@ def test_a_recording_never_replaces_a_file(tmp_path: Path) -> None:
     assert (tmp_path / "a.gplrec").read_text() == "precious"
 
 
-def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="The folder does not exist"):
-        RecordingWriter(tmp_path / "gone" / "a.gplrec", RecordingHeader())
-
-
 @pytest.mark.parametrize(
     ("rgb", "number", "time_s"),
     [
@@ -136,11 +131,3 @@ def test_a_frame_that_does_not_match_the_others_is_refused(
     with Recording.open(tmp_path / "a.gplrec") as recording:
         assert len(recording) == 1
         assert not recording.truncated
-
-
-def test_there_is_no_frame_before_the_first_or_behind_the_last(tmp_path: Path) -> None:
-    write_recording(tmp_path / "a.gplrec")
-    with Recording.open(tmp_path / "a.gplrec") as recording:
-        for index in (-1, 3):
-            with pytest.raises(IndexError):
-                recording.frame(index)

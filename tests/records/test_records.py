@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import sqlite3
-import threading
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
@@ -16,13 +15,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.records.entry import (
     MeasurementRecord,
     Quantity,
     indenter_record,
-    verdict_of,
 )
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.records.statistics import statistics_of
@@ -114,23 +111,6 @@ def test_the_uses_of_a_calibration_are_counted_without_removed_ones(records: Rec
     assert records.uses("c1") == (2, NOON + timedelta(hours=2.0))
 
 
-def test_what_was_removed_can_be_brought_back(records: Records) -> None:
-    kept, removed = records.add(cylinder(1.0)), records.add(cylinder(2.0))
-    records.remove(removed)
-    assert [r.id for r in records.measurements()] == [kept]
-    assert [r.id for r in records.measurements(removed=True)] == [removed]
-    records.restore(removed)
-    assert [r.id for r in records.measurements()] == [kept, removed]
-
-
-def test_a_note_can_be_written_later(records: Records) -> None:
-    number = records.add(cylinder(1.0))
-    records.update_note(number, "the gel was warm")
-    assert records.measurements()[0].note == "the gel was warm"
-    with pytest.raises(InputError, match="Measurement 99 does not exist"):
-        records.update_note(99, "?")
-
-
 def test_statistics_of_repeated_measurements() -> None:
     heights = [1.00, 1.02, 1.05, 0.99]
     found = statistics_of(heights)
@@ -146,13 +126,6 @@ def test_two_measurements_differ_by_less_than_the_repeatability_in_95_of_100() -
     assert np.mean(np.abs(pairs[:, 0] - pairs[:, 1]) < limit) == pytest.approx(0.95, abs=0.005)
 
 
-def test_one_measurement_says_nothing_of_scatter() -> None:
-    found = statistics_of([2.0])
-    assert (found.n, found.mean, found.spread) == (1, 2.0, 0.0)
-    assert math.isnan(found.sd)
-    assert math.isnan(found.repeatability)
-
-
 def test_the_table_opens_in_a_spreadsheet(records: Records, tmp_path: Path) -> None:
     records.add(replace(cylinder(1.04), note='too "soft", said Zoë', operator="Zoë"))
     records.add(cylinder(1.0, serial="B-2"))
@@ -166,18 +139,6 @@ def test_the_table_opens_in_a_spreadsheet(records: Records, tmp_path: Path) -> N
     assert rows[0]["time_utc"] == "2026-03-01 12:00:00"
 
 
-def test_several_threads_may_keep_measurements(records: Records) -> None:
-    threads = [
-        threading.Thread(target=lambda: [records.add(cylinder(1.0)) for _ in range(5)])
-        for _ in range(4)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(records.measurements()) == 20
-
-
 def test_the_data_of_a_calibration_are_stored(records: Records) -> None:
     records.add(cylinder(1.0))
     records.know_calibration("c1", "A-1", model="full", made="2026-01-01", verdict="pass")
@@ -186,15 +147,6 @@ def test_the_data_of_a_calibration_are_stored(records: Records) -> None:
         rows = other.execute("SELECT id, serial, model, made, verdict FROM calibrations")
         known = rows.fetchall()
     assert known == [("c1", "A-1", "full", "2026-01-01", "pass")]
-
-
-@pytest.mark.parametrize(
-    ("value", "limit", "verdict"), [(1.05, 8.0, "pass"), (1.1, 8.0, "fail"), (1.1, None, "")]
-)
-def test_the_verdict_is_the_worst_one(value: float, limit: float | None, verdict: str) -> None:
-    good = Quantity("diameter_mm", 5.0, None, 5.0, limit)
-    assert verdict_of([good, Quantity("height_mm", value, None, 1.0, limit)]) == verdict
-    assert verdict_of([good], doubtful=True) == "doubtful"
 
 
 def test_what_no_measurement_is_is_refused() -> None:

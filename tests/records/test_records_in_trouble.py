@@ -12,8 +12,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.records import schema
@@ -81,13 +79,6 @@ def test_a_killed_program_loses_or_splits_no_measurement(tmp_path: Path) -> None
         records.add(RECORD)
 
 
-def test_two_programs_use_the_records_at_once(tmp_path: Path) -> None:
-    with Records.open(tmp_path / NAME) as ours, Records.open(tmp_path / NAME) as theirs:
-        first, second = ours.add(RECORD), theirs.add(RECORD)
-        assert [r.id for r in ours.measurements()] == [first, second]
-        assert [r.id for r in theirs.measurements()] == [first, second]
-
-
 def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path: Path) -> None:
     path = tmp_path / NAME
     with Records.open(path, busy_s=0.05) as records:
@@ -137,24 +128,6 @@ def test_damaged_records_are_set_aside_and_new_ones_created(
     with Records.open(path) as records:
         assert not records.notice
         assert len(records.measurements()) == 1
-
-
-@settings(deadline=None, max_examples=60)
-@given(data=st.data())
-def test_whatever_is_damaged_ends_in_a_sentence_or_in_new_records(
-    whole: bytes, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
-    path = tmp_path_factory.mktemp("damaged") / NAME
-    spoilt = bytearray(whole)
-    for _ in range(data.draw(st.integers(1, 4))):
-        spoilt[data.draw(st.integers(0, len(whole) - 1))] ^= data.draw(st.integers(1, 255))
-    path.write_bytes(spoilt[: data.draw(st.integers(0, 2 * len(whole)))])
-    try:
-        with Records.open(path) as records:
-            records.measurements()
-            records.add(RECORD)
-    except InputError as error:
-        assert str(path) in str(error)
 
 
 def test_the_database_of_another_program_is_left_alone(tmp_path: Path) -> None:
@@ -209,11 +182,6 @@ def test_a_change_of_the_tables_that_fails_changes_nothing(
     with pytest.raises(InputError, match="The records cannot be used"):
         Records.open(path)
     assert path.read_bytes() == before
-
-
-def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="The records cannot be opened or created here"):
-        Records.open(tmp_path / "gone" / NAME)
 
 
 def test_records_that_can_only_be_read_are_read(tmp_path: Path) -> None:

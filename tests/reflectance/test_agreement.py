@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,9 +100,3 @@ def test_dirt_on_a_contact_is_named(small_project: CalibrationProject) -> None:
     (odd,) = [a for a in compared(results, images) if a.fault]
     assert odd.name.endswith(ODD)
     assert "dirt" in odd.fault
-
-
-def test_three_presses_say_nothing_of_each_other(small_project: CalibrationProject) -> None:
-    results = small_project.results
-    few = replace(results, balls=results.balls[:3])
-    assert compared(few, few.images) == ()

@@ -20,10 +20,7 @@ from gelpolight_core.reflectance.ball_detection import (
     detect_ball,
     find_indentation,
 )
-from gelpolight_core.reflectance.ball_shading import fit_shading
-from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.reflectance.indentation_checks import Reason
-from gelpolight_core.reflectance.markers import find_markers
 from tests.reflectance.test_indentation import HEIGHT, WIDTH, read_rgb, scene, shade
 
 Image = NDArray[np.float32]
@@ -78,14 +75,6 @@ def test_balls_are_found_among_printed_dots(pitch: float, diameter: float) -> No
     assert np.mean(in_sd) >= 0.9
 
 
-def test_known_markers_give_the_same_as_markers_looked_for() -> None:
-    image, background = marked_scene((150.0, 120.0, 35.0), pitch=20.0, diameter=6.0)
-    known = find_markers(background)
-    first, second = detect_ball(image, background), detect_ball(image, background, markers=known)
-    assert second.markers is known
-    assert first.centre_px == second.centre_px
-
-
 # -- what is known of the uncertainty -------------------------------------------------------------
 
 
@@ -121,22 +110,6 @@ def test_only_a_second_ball_makes_several() -> None:
     image, background = scene((90.0, 120.0, 30.0))
     cv2.line(image, (200, 60), (260, 180), (0.1, 0.1, 0.1), 8)
     assert detect_ball(image, background).reason is Reason.OK
-
-
-def test_values_that_are_not_numbers_are_left_out_of_the_shading() -> None:
-    # Where compression leaves 0 in image and background, their ratio is not a number.
-    y, x = np.indices((120, 160), dtype=np.float64)
-    rise = np.clip(1.0 - ((x - 80.0) ** 2 + (y - 60.0) ** 2) / 30.0**2, 0.0, None)
-    change = np.stack([(x - 80.0) * rise, (y - 60.0) * rise, (80.0 - x) * rise], axis=-1) / 60.0
-    start = Circle(82.0, 58.0, 33.0)
-    usable = np.ones(x.shape, bool)
-    whole = fit_shading(change.astype(np.float32), usable, start)
-    change[40:44, 70:90] = np.nan
-    holed = fit_shading(change.astype(np.float32), usable, start)
-    assert whole is not None
-    assert holed is not None
-    assert np.hypot(holed.circle.x - whole.circle.x, holed.circle.y - whole.circle.y) < 1.0
-    assert holed.circle.radius == pytest.approx(whole.circle.radius, rel=0.05)
 
 
 def test_contact_much_larger_than_the_stated_ball_is_refused() -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gelpolight_core.masks import reflects_light
-from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.gathered_light import Slab, ratio_reflected, returned_to_flat
 from gelpolight_core.reflectance.membrane import Membrane
 
@@ -39,20 +38,6 @@ def test_an_even_matt_membrane_receives_what_its_mirror_image_shows(thickness_mm
     share = float(np.trapezoid(rings, angle))
     middle = found[NODES // 2 - 4 : NODES // 2 + 5, NODES // 2 - 4 : NODES // 2 + 5]
     assert middle.mean() / 0.3 == pytest.approx(share, rel=0.05)
-
-
-def test_a_face_to_the_same_medium_returns_nothing() -> None:
-    seen = np.full((64, 64, 3), 0.2)
-    x, y = np.meshgrid(SIDE * np.arange(64.0), SIDE * np.arange(64.0))
-    points = np.stack([x, y, np.zeros_like(x)], axis=-1)
-    view = np.broadcast_to([0.0, 0.0, -1.0], points.shape)
-    found = returned_to_flat(seen, points, view, LEDS, Membrane(), SIDE, Slab(6.0, 1.0))
-    assert found == pytest.approx(np.zeros_like(found), abs=1e-6)
-
-
-def test_a_window_counts_by_its_optical_thickness() -> None:
-    slab = Slab.of(LayerStack((20.0, 2.0, 14.0), (1.0, 1.49, 1.41)))
-    assert slab == pytest.approx((14.0 + 2.0 * 1.41 / 1.49, 1.41))
 
 
 def test_a_saturated_or_dim_part_reflects_light_and_a_hole_reflects_none() -> None:

@@ -45,12 +45,6 @@ def test_printed_dots_are_found_with_their_size_and_pitch(pitch: float, diameter
     assert found.mask.mean() < 2.5 * dark.mean()
 
 
-def test_dots_of_a_large_image_are_found() -> None:
-    found = find_markers(dotted(gel(scale=4), pitch=80.0, diameter=24.0))
-    assert found.pitch_px == pytest.approx(80.0, rel=0.05)
-    assert found.mask.shape == (4 * ROWS, 4 * COLUMNS)
-
-
 def test_a_plain_gel_has_no_markers() -> None:
     assert not find_markers(gel())
     assert not no_markers((ROWS, COLUMNS)).mask.any()

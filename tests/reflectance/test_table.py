@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.reflectance.table import ReflectanceTable, cosine_table, fit_channel
+from gelpolight_core.reflectance.table import ReflectanceTable, fit_channel
 
 RNG = np.random.default_rng(0)
 
@@ -66,11 +66,6 @@ def test_the_fast_table_is_the_table() -> None:
     place = value * scale[0]
     fast = np.interp(place, np.arange(2048), lookup[0])
     assert fast == pytest.approx(float(table.cosine(0, np.array(value))), abs=1e-4)
-
-
-def test_values_out_of_range_stay_cosines() -> None:
-    table = cosine_table()
-    np.testing.assert_array_equal(table.cosine(0, np.array([-1.0, 5.0])), [0.0, 1.0])
 
 
 @pytest.mark.parametrize(

@@ -62,11 +62,6 @@ def test_a_mistake_in_it_is_named(session: Session, line: str, by: str, words: s
         read_session(session.folder)
 
 
-def test_a_calibration_keeps_its_camera_as_texts() -> None:
-    assert settings_of_texts(SETTINGS.as_texts()) == SETTINGS
-    assert settings_of_texts({}) is None
-
-
 words = st.sampled_from(["name", "width", "control.gain", "1e400", "-3", "nan", "", "x" * 999])
 
 

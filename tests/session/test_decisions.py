@@ -43,10 +43,6 @@ def test_decisions_are_read_back_as_they_were_written(
     assert read_decisions(folder) == decisions
 
 
-def test_a_session_without_decisions_has_none(tmp_path: Path) -> None:
-    assert read_decisions(tmp_path) == Decisions()
-
-
 @pytest.mark.parametrize(
     "text",
     [

@@ -115,14 +115,6 @@ def test_a_series_whose_times_do_not_fit_is_refused(
         session.series()
 
 
-def test_an_empty_folder_is_no_stage(tmp_path: Path) -> None:
-    for name in ("response", "single_led"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / ".DS_Store").touch()
-    session = session_of(tmp_path)
-    assert session.optional_stages == ()
-
-
 def test_single_led_images_are_ordered_red_green_blue(tmp_path: Path) -> None:
     names = ("single_led/blue.png", "single_led/green.tif", "single_led/red.png")
     session = session_of(tmp_path, "", *names)

@@ -29,25 +29,11 @@ def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path: Path) -
             files.refuse_changed(path)
 
 
-def test_a_new_file_is_reported(tmp_path: Path) -> None:
-    path = tmp_path / "decisions.toml"
-    files = KnownFiles([path])
-    path.write_text("a = 1")
-    assert files.changed() == (path,)
-
-
 def test_a_change_of_the_same_length_is_reported(path: Path) -> None:
     files = KnownFiles([path])
     path.write_text("a = 2")
     os.utime(path, ns=(1, 1))
     assert files.changed() == (path,)
-
-
-def test_a_file_saved_again_without_changes_is_unchanged(path: Path) -> None:
-    files = KnownFiles([path])
-    path.write_text("a = 1")
-    os.utime(path, ns=(1, 1))
-    assert files.changed() == ()
 
 
 def test_what_was_written_here_is_known(path: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.session.file_hashes import refuse_copies
-from gelpolight_core.session.images import average, read_image, require_colour
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.session.session import read_session
 
 GOOD = """format = "gelpolight-session"
@@ -146,15 +146,6 @@ def test_a_copied_image_is_refused_and_both_files_named(tmp_path: Path) -> None:
     assert refusal.value.where == str(files[2])
 
 
-def test_hidden_files_are_not_images(tmp_path: Path) -> None:
-    """Some systems leave such files on every disk that they copy to."""
-    session = read_session(session_folder(tmp_path))
-    (tmp_path / "mirror").mkdir()
-    for name in ("m.PNG", "._m.PNG"):
-        (tmp_path / "mirror" / name).touch()
-    assert [p.name for p in session.files("mirror")] == ["m.PNG"]
-
-
 def write_rgb(path: Path, rgb: np.ndarray) -> None:
     """Write an RGB image, converted to the colour order of OpenCV."""
     assert cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1]))
@@ -182,11 +173,6 @@ def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path: Path) ->
     write_rgb(tmp_path / "mirror/3.png", np.zeros((4, 6, 3), np.uint8))
     with pytest.raises(InputError, match=r"6x4.*5x4"):
         session.averaged("mirror")
-
-
-def test_a_lone_frame_is_passed_on() -> None:
-    image = LinearImage("a", np.ones((2, 2, 3), np.float32))
-    assert average([image], name="mean") is image
 
 
 @pytest.mark.parametrize("data", [b"", b"not an image", b"\x89PNG\r\n\x1a\n" + b"\0" * 40])

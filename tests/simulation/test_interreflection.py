@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gelpolight_core.design.parts import CameraDesign, LayerDesign, MembraneDesign
-from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation import interreflection
 from gelpolight_core.simulation.interreflection import FLAT, indirect_light
 from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
@@ -18,13 +17,6 @@ from gelpolight_core.simulation.paths import membrane_hit
 from gelpolight_core.simulation.scattering import scattered
 from gelpolight_core.simulation.shading import Material, metallic_lobe, metallic_rise
 from gelpolight_core.simulation.surface import PressedSurface
-from gelpolight_core.simulation.truth import truth_table
-from gelpolight_core.simulation.virtual_sensor import (
-    BareMembrane,
-    PressedMembrane,
-    VirtualSensor,
-    Whiteboard,
-)
 
 HALF_ANGLE_DEG, RADIUS_MM = 72.0, 1.5
 OPENING_MM = RADIUS_MM * math.sin(math.radians(HALF_ANGLE_DEG))
@@ -144,36 +136,8 @@ def test_the_lower_face_returns_the_sum_over_mirror_images() -> None:
         assert light.maps[0, i, j] == pytest.approx(0.8 * received, rel=0.05)
 
 
-@pytest.mark.usefixtures("fewer_paths")
-def test_without_reflections_nothing_is_added() -> None:
-    plain, more = VirtualSensor(design_of(0)), VirtualSensor(design_of(2))
-    for state in (Whiteboard(), BareMembrane(), PressedMembrane(wall(1.0))):
-        light = plain.brightness(state)
-        assert np.array_equal(VirtualSensor(design_of(0)).brightness(state), light)
-        # Relative to direct light: the exposure differs, as the board lights itself, too.
-        extra = more.brightness(state) / more.exposure - light / plain.exposure
-        assert extra.min() > -1e-15
-        assert extra.max() > 0.0
-    assert "interreflection" not in truth_table(plain, ())["transport"]
-    assert "at most 2 reflections" in truth_table(more, ())["transport"]
-
-
 class Stopped(Exception):
     """The exception that the test uses to stop the work."""
-
-
-@pytest.mark.usefixtures("fewer_paths")
-def test_tracing_paths_is_stopped() -> None:
-    design = design_of(2)
-    lamps, factors = lamp_table(lamps_of(design)), even_factor(design.membrane)
-    checks = iter(range(3))
-
-    def interrupt() -> None:
-        if next(checks, None) is None:
-            raise Stopped
-
-    with pytest.raises(Stopped):
-        indirect_light(design, lamps, FLAT, factors, Material(0.8), interrupt=interrupt)
 
 
 def wall(height_mm: float) -> PressedSurface:
@@ -196,13 +160,6 @@ def test_a_wall_lights_the_membrane_on_its_lit_side_and_a_higher_one_more() -> N
     low, high = beside(0.5, 1.6), beside(1.0, 1.6)
     assert high > 1.3 * low > 0.0
     assert high > 3.0 * beside(1.0, -1.6)
-
-
-@pytest.mark.usefixtures("fewer_paths")
-def test_a_rendering_with_interreflection_is_repeatable() -> None:
-    state = PressedMembrane(wall(1.0))
-    first, second = (VirtualSensor(design_of(3), 1).brightness(state) for _ in range(2))
-    assert np.array_equal(first, second)
 
 
 def test_a_ray_meets_the_wall_where_the_geometry_puts_it() -> None:
@@ -245,16 +202,3 @@ def test_drawn_directions_scatter_as_much_as_the_integral_over_the_hemisphere(
             reflected = material[0] + material[1] * metallic_rise(v_h) * lobe
             total += reflected * cosine / math.pi * step * (2.0 * math.pi / 120)
     assert np.mean([some[3] for some in drawn]) == pytest.approx(total, rel=0.01)
-
-
-def test_the_interreflecting_design_that_is_shipped_is_as_it_says() -> None:
-    folder = Path(__file__).parents[2] / "resources" / "designs"
-    design = read_design(folder / "interreflecting.toml")
-    signal = 200.0 / 255.0
-    noise = (design.camera.shot_variance * signal + design.camera.read_sd**2) ** 0.5
-    assert 20.0 * math.log10(signal / noise) == pytest.approx(35.0, abs=0.1)
-    for led in design.leds:
-        assert math.hypot(led.x_mm, led.y_mm) == pytest.approx(9.5, abs=0.1)
-        assert led.height_mm == pytest.approx(design.ring.nominal_height_mm, abs=0.1)
-    assert design.membrane.bounces == 14
-    assert read_design(folder / "hard.toml").membrane.bounces == 0

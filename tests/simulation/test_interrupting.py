@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.indenters import Cuboid, press
 from gelpolight_core.simulation.rays import (
-    pixel_directions,
-    project_to_pixels,
     trace_pixels,
     trace_points,
 )
@@ -62,16 +58,6 @@ def test_images_of_a_press_and_of_a_board_can_be_stopped(sensor: VirtualSensor) 
             sensor.brightness(shown, interrupt=StopAfter(1))
 
 
-def test_uninterrupted_work_gives_the_same_image(sensor: VirtualSensor) -> None:
-    ticks: list[float] = []
-    look_up = lambda: ticks.append(time.monotonic())  # noqa: E731
-    state = pressed_membrane(DESIGN, Cuboid(4.0, 1.0), x_mm=1.0, y_mm=0.0, interrupt=look_up)
-    watched = sensor.brightness(state, interrupt=look_up)
-    alone = sensor.brightness(pressed_membrane(DESIGN, Cuboid(4.0, 1.0), x_mm=1.0, y_mm=0.0))
-    assert np.array_equal(watched, alone)
-    assert len(ticks) > 5
-
-
 def test_pixels_are_traced_alike_in_bands_and_at_once() -> None:
     camera = DESIGN.camera
     v, u = np.mgrid[: camera.height_px, : camera.width_px].astype(float)
@@ -80,14 +66,6 @@ def test_pixels_are_traced_alike_in_bands_and_at_once() -> None:
     # 1e-12 mm: the last bit of the numbers.
     assert np.allclose(in_bands.x_mm, at_once.x_mm, rtol=0.0, atol=1e-12)
     assert np.allclose(in_bands.transmission, at_once.transmission, rtol=0.0, atol=1e-12)
-
-
-def test_a_pixels_direction_is_seen_at_that_pixel() -> None:
-    camera = SensorDesign().camera
-    v, u = np.mgrid[0:960:37, 0:1280:41].astype(float)
-    back = project_to_pixels(camera, pixel_directions(camera, u, v))
-    assert np.allclose(back[..., 0], u, rtol=0.0, atol=1e-9)
-    assert np.allclose(back[..., 1], v, rtol=0.0, atol=1e-9)
 
 
 def test_the_poses_of_a_session_are_had_one_by_one(sensor: VirtualSensor) -> None:

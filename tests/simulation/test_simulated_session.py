@@ -18,7 +18,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.simulation.boards import board_views
-from gelpolight_core.simulation.session import press_names, simulate_session
+from gelpolight_core.simulation.session import simulate_session
 
 SCALE = 0.25
 DESIGN = replace(
@@ -73,13 +73,6 @@ def test_a_closed_sensor_shows_background_balls_and_scale_only(
     # The membrane is 34.26 mm behind the lens as refraction shows it, the focal length 346.4 px.
     assert read.mm_per_px == pytest.approx(34.26 / 346.4, rel=0.02)
     assert read.ball_radius_mm("ball_01.png") == 4.0
-
-
-def test_images_are_in_colour_and_boards_are_grey(session: Path) -> None:
-    for path in session.rglob("*.png"):
-        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        grey = path.parent.name in ("checkerboard", "top_pose")
-        assert image.shape == ((240, 320) if grey else (240, 320, 3))
 
 
 def test_description_and_truth_say_what_was_simulated(session: Path) -> None:
@@ -172,11 +165,6 @@ def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(
     assert not list(tmp_path.iterdir())
 
 
-def test_repeated_presses_get_names_of_their_own() -> None:
-    presses = (Press("cylinder", 5.0, 1.0), Press("cylinder", 5.0, 1.0), Press("coin", 8.0, 0.6))
-    assert press_names(presses) == ("cylinder_s5_d100", "cylinder_s5_d100_r2", "object_coin")
-
-
 def test_what_a_design_asks_for_besides_is_there(tmp_path: Path) -> None:
     """A camera of gamma 2.2 that declares nothing, with a series and single-LED images."""
     design = replace(
@@ -201,8 +189,3 @@ def test_what_a_design_asks_for_besides_is_there(tmp_path: Path) -> None:
     for channel, name in zip((2, 1, 0), ("red", "green", "blue"), strict=True):
         lit = cv2.imread(str(tmp_path / "bent/single_led" / f"{name}.png"))[place]
         assert int(np.argmax(lit)) == channel
-
-
-def test_a_session_that_asks_for_nothing_has_no_folder_for_it(session: Path) -> None:
-    assert not (session / "response").exists()
-    assert not (session / "single_led").exists()

@@ -15,7 +15,6 @@ from written import calibration
 
 from app.workspace import trash as trash_module
 from app.workspace import workspace as workspace_module
-from app.workspace.sessions import file_time
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.measurement import protocol_run
@@ -57,14 +56,6 @@ def kept(workspace: Workspace, name: str, created: datetime) -> Path:
     path = workspace.calibration_path("T-1", name)
     write_calibration(replace(calibration(), provenance=origin), path)
     return path
-
-
-def test_a_calibration_of_tomorrow_is_new_and_stands_first(workspace: Workspace) -> None:
-    kept(workspace, "older", NOW - timedelta(days=10))
-    tomorrow = kept(workspace, "newer", NOW + timedelta(days=1))
-    entries = workspace.entries()
-    assert entries[0].path == tomorrow
-    assert [round(entry.age_days(NOW) or 0.0) for entry in entries] == [0, 10]
 
 
 def test_two_things_removed_in_the_same_second_can_both_be_put_back(
@@ -120,9 +111,3 @@ def test_a_file_that_was_replaced_is_noticed_whatever_its_time_says(tmp_path: Pa
     os.utime(other, ns=(path.stat().st_atime_ns, path.stat().st_mtime_ns))
     os.replace(other, path)
     assert known.changed() == (path,)
-
-
-@pytest.mark.parametrize("seconds", [1e12, -1e12, 1e300])
-def test_a_file_of_no_time_that_calendars_have_has_a_time(seconds: float) -> None:
-    """Some disks keep whatever time an archive says; a session from there is listed."""
-    assert (file_time(seconds) > NOW) == (seconds > 0.0)

@@ -18,7 +18,6 @@ from app.workspace.workspace import Workspace
 from gelpolight_core.batch.results import FILE, FrameRow, finished_frames, keep_rows
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.recording import layout
@@ -78,25 +77,6 @@ def lines_before(content: bytes, size: int) -> int:
     return content[:size].count(b"\n")
 
 
-def test_measurements_of_a_run_cut_anywhere_keep_every_whole_line_and_go_on(tmp_path: Path) -> None:
-    path = tmp_path / "measured.jsonl"
-    ledger = Ledger(path, "c")
-    for number in range(3):
-        ledger.keep(f"k{number}", f"sentence {number}")
-    content = path.read_bytes()
-    for size in range(len(content) + 1):
-        path.write_bytes(content[:size])
-        again = Ledger(path, "c")
-        whole = lines_before(content, size)
-        # Of the last line only its end may be missing.
-        found = sum(again.find(f"k{number}") is not None for number in range(3))
-        assert whole <= found <= whole + 1
-        again.keep("new", "after the cut")
-        reread = Ledger(path, "c")
-        assert reread.find("new") == "after the cut"
-        assert sum(reread.find(f"k{number}") is not None for number in range(3)) == found
-
-
 def test_frames_of_a_batch_cut_anywhere_keep_every_whole_line_and_go_on(tmp_path: Path) -> None:
     path = tmp_path / FILE
     keep_rows([FrameRow(f"a{k}", "s", "a.png") for k in range(3)], tmp_path)
@@ -109,18 +89,6 @@ def test_frames_of_a_batch_cut_anywhere_keep_every_whole_line_and_go_on(tmp_path
         keep_rows([FrameRow("new", "s", "a.png")], tmp_path)
         # A line of which only the end was missing is whole again now.
         assert finished_frames(tmp_path) - {(f"a{whole}", "s")} == expected | {("new", "s")}
-
-
-def test_refusals_cut_anywhere_leave_the_run_as_it_is(tmp_path: Path) -> None:
-    begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
-    run = open_run(tmp_path)
-    run.accept(run.wanted[0], [noisy(0)])
-    run.refuse(run.wanted[1], "nothing is pressed")
-    path = tmp_path / "refused.csv"
-    content = path.read_bytes()
-    for size in range(len(content) + 1):
-        path.write_bytes(content[:size])
-        assert open_run(tmp_path).done == run.wanted[:1]
 
 
 def test_a_recording_without_any_block_of_what_was_not_on_the_disk_gives_no_wrong_frame(

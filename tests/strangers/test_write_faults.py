@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
-import subprocess
-import sys
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -28,7 +25,7 @@ from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME, Records
-from gelpolight_core.session.decisions import Decisions, read_decisions, write_decisions
+from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.known_files import KnownFiles
 from gelpolight_core.simulation.session import session_toml
 
@@ -142,67 +139,3 @@ def test_a_recording_goes_on_when_the_clock_is_set_back(tmp_path: Path) -> None:
         assert recording.numbers.tolist() == [0, 1, 2]
         assert not recording.truncated
         assert all(np.array_equal(recording.frame(k).rgb, noisy(k)) for k in range(3))
-
-
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EIO])
-@pytest.mark.parametrize("when", ["write", "sync", "replace"])
-def test_what_the_disk_refuses_leaves_the_old_decisions_whole(
-    session: Path, monkeypatch: pytest.MonkeyPatch, number: int, when: str
-) -> None:
-    old = Decisions(excluded=frozenset({"balls/a.png"}))
-    write_decisions(old, session)
-
-    def refuse(*_: object, **__: object) -> None:
-        raise OSError(number, os.strerror(number))
-
-    match when:
-        case "write":
-            monkeypatch.setattr("tomli_w.dump", refuse)
-        case "sync":
-            monkeypatch.setattr(os, "fsync", refuse)
-        case _:
-            monkeypatch.setattr(os, "replace", refuse)
-    with pytest.raises(InputError, match=r"decisions\.toml: "):
-        write_decisions(Decisions(), session)
-    monkeypatch.undo()
-    assert read_decisions(session) == old
-    assert sorted(p.name for p in session.iterdir()) == ["decisions.toml", "session.toml"]
-
-
-def test_a_power_cut_while_decisions_are_written_leaves_the_old_or_the_new_ones(
-    session: Path,
-) -> None:
-    """The cut leaves a part of the temporary file, of any length, beside the old file."""
-    old, new = Decisions(excluded=frozenset({"balls/a.png"})), Decisions()
-    write_decisions(new, session)
-    written = (session / "decisions.toml").read_bytes()
-    write_decisions(old, session)
-    for size in range(len(written)):
-        (session / ".decisions.toml.0badcafe.part").write_bytes(written[:size])
-        assert read_decisions(session) == old
-
-
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from gelpolight_core.io.atomic import write_atomically
-
-def write(stream):
-    stream.write(b"x" * 100_000)
-    stream.flush()
-    os.kill(os.getpid(), signal.SIGKILL)
-
-write_atomically(Path(sys.argv[1]), write)
-"""
-
-
-def test_a_program_that_is_killed_while_it_writes_leaves_the_old_file(tmp_path: Path) -> None:
-    path = tmp_path / "workspace.json"
-    path.write_text(json.dumps({"in_use": "a"}))
-    ended = subprocess.run(
-        [sys.executable, "-c", KILLED, str(path)],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        check=False,
-    )
-    assert ended.returncode < 0
-    assert json.loads(path.read_text()) == {"in_use": "a"}

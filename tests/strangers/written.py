@@ -18,7 +18,6 @@ from gelpolight_core.batch.results import FILE, FrameRow, keep_rows, write_summa
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.export.board_page import write_board
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.measurement.ledger import Ledger
@@ -36,7 +35,7 @@ from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.capture import write_image
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import write_description
-from gelpolight_core.session.session import BoardSpec, Session, read_session
+from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.simulation.session import session_toml
 
 RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),))
@@ -115,10 +114,6 @@ def _table(folder: Path, which: int) -> None:
 
 def _report(ending: str, folder: Path, which: int) -> None:
     write_report(replace(report(), title=f"Report {which}"), folder / f"report.{ending}")
-
-
-def _board(folder: Path, which: int) -> None:
-    write_board(BoardSpec((9 - which, 6), 3.0), folder / "board.pdf")
 
 
 def _protocol(folder: Path, which: int) -> None:
@@ -207,6 +202,3 @@ KINDS = (
     Written("summary of a batch", _summary),
     Written("settings of a batch", _settings),
 )  # fmt: skip
-
-# Of these the drawing takes long; they are tried on the real disks only.
-DRAWN = (Written("report as PDF", partial(_report, "pdf")), Written("board", _board))
