@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
+import hashlib
 import os
 import pickle
 import shutil
+import sys
 import time
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -64,6 +68,8 @@ LONGEST_FIRST = (
     "reconstruction/test_uncertainty.py",
 )
 
+CORE = Path(__file__).resolve().parents[1] / "gelpolight_core"
+KEPT_S = 24 * 3600.0  # of what was made for sources that have changed since
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -92,32 +98,59 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
-    """Return a function that makes something in a folder once for all processes of a test run.
+def made_once(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """Return a function that makes something in a folder once, for all processes and test runs.
 
-    It is given a name and what makes it; every process gets the pickled result.
+    It is given a name and what makes it; every process gets the pickled result. It is made again
+    when a source or a library has changed, or when something else has changed its folder.
     """
-    alone = "PYTEST_XDIST_WORKER" not in os.environ
+    from gelpolight_core.io.atomic import write_atomically
+
+    cache = getattr(request.config, "cache", None)
     base = tmp_path_factory.getbasetemp()
-    shared = base if alone else base.parent
+    if cache is not None:
+        shared = cache.mkdir("made") / _state_of_sources()
+    else:
+        shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    shared.mkdir(exist_ok=True)
+    os.utime(shared)
+    for other in shared.parent.iterdir() if cache is not None else ():
+        if other.stat().st_mtime < time.time() - KEPT_S:
+            shutil.rmtree(other, ignore_errors=True)
 
     def once(name: str, make: Callable[[Path], Any]) -> Any:
         folder, made = shared / f"once-{name}", shared / f"once-{name}.pickle"
-        try:
-            folder.mkdir()
-        except FileExistsError:
-            until = time.monotonic() + 600.0
-            while not made.exists():
-                if time.monotonic() > until:
-                    pytest.fail(f"another process did not finish {name}")
-                time.sleep(0.2)
-        else:
-            partial = made.with_suffix(".partial")
-            partial.write_bytes(pickle.dumps(make(folder)))
-            partial.rename(made)
-        return pickle.loads(made.read_bytes())
+        # The system ends the lock with its process, also where that is killed.
+        with made.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            files, result = pickle.loads(made.read_bytes()) if made.exists() else (None, b"")
+            if files != _files_of(folder):
+                shutil.rmtree(folder, ignore_errors=True)
+                folder.mkdir()
+                result = pickle.dumps(make(folder))
+                whole = pickle.dumps((_files_of(folder), result))
+                write_atomically(made, lambda stream: stream.write(whole))
+        return pickle.loads(result)
 
     return once
+
+
+def _state_of_sources() -> str:
+    """Return a name for what decides a result: core, this file, libraries, place, shared data."""
+    state = hashlib.sha256(f"{CORE} {sys.version}".encode())
+    for library in ("numpy", "scipy", "opencv-contrib-python-headless", "numba"):
+        state.update(version(library).encode())
+    for path in (*sorted(CORE.rglob("*")), Path(__file__)):
+        if path.suffix in (".py", ".toml", ".json", ".csv"):
+            state.update(path.read_bytes())
+    state.update(repr(_files_of(SHARED_DATA)).encode())
+    return state.hexdigest()[:16]
+
+
+def _files_of(folder: Path) -> list[tuple[str, int, int]]:
+    """Return name, size and time of every file."""
+    files = ((path, path.stat()) for path in sorted(folder.rglob("*")) if path.is_file())
+    return [(str(path), stat.st_size, stat.st_mtime_ns) for path, stat in files]
 
 
 @pytest.fixture(scope="session")
