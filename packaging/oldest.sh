@@ -3,7 +3,7 @@
 # the core and the commands while Qt and VTK are not installed, then the windows and what reads their files.
 #
 #     sh packaging/oldest.sh         all of the core, and a choice of the windows
-#     sh packaging/oldest.sh thin    from images to measured sizes by the commands, and all files; no windows
+#     sh packaging/oldest.sh thin    from saved calibrations to measured sizes by the commands, and all files; no windows
 #
 # Needs what "sh packaging/setup.sh test" installs from the system. PYTHON=/path/to/python chooses another Python.
 set -eu

@@ -8,9 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import pytest
 
-from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.recording.reader import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -60,16 +61,18 @@ def test_only_window_libraries_are_blocked_in_a_process_and_its_children(
     assert ("is not here" in done.stderr) == (module != "numpy")
 
 
-def test_a_sensor_is_calibrated_and_its_presses_measured(
-    blocked: dict[str, str], small_session: Path, tmp_path: Path
-) -> None:
-    press = small_session / "presses" / "cylinder_s5_d100.png"
+def test_images_become_depth_maps_and_sizes(blocked: dict[str, str], tmp_path: Path) -> None:
+    """From saved files; with the oldest libraries, nothing is calibrated beside the other tests."""
+    sensor = ROOT / "tests/data/2026-11-23/workspace/sensors/small-1"
+    recording = sensor / "recordings/press.gplrec"
+    with Recording.open(recording) as opened:
+        assert cv2.imwrite(str(tmp_path / "press.png"), opened.frame(1).rgb[..., ::-1])
     (tmp_path / "commands.py").write_text(COMMANDS)
-    lines = f"""calibrate {small_session} -o c.gplcal --json results.json
-reconstruct c.gplcal {press} -o depth --format npz,vtp,tif --pictures
-measure c.gplcal {press} --shape cylinder --json measured.json
-batch c.gplcal {press} {press.parent / "object_coin.png"} -o batch --workers 2
-benchmark c.gplcal {press} --json times.json --model paper
+    lines = f"""inspect {sensor / "first.gplcal"}
+reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif --pictures
+measure {sensor / "first.gplcal"} press.png --shape cylinder --json measured.json
+batch {sensor / "first.gplcal"} press.png {recording} -o batch
+benchmark {sensor / "first.gplcal"} press.png --json times.json --model paper
 """
     done = subprocess.run(
         [sys.executable, "commands.py"],
@@ -80,7 +83,7 @@ benchmark c.gplcal {press} --json times.json --model paper
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    results = json.loads((tmp_path / "results.json").read_text())
-    assert results["id"] == read_calibration(tmp_path / "c.gplcal").identity
-    for name in ("measured.json", "times.json", "batch/batch.csv", f"depth/{press.stem}.vtp"):
+    measured = json.loads((tmp_path / "measured.json").read_text())
+    assert measured["diameter_mm"] == pytest.approx(5.0, abs=0.1)
+    for name in ("times.json", "batch/batch.csv", "depth/press.vtp"):
         assert (tmp_path / name).stat().st_size > 0, name
