@@ -1,0 +1,153 @@
+"""The number of code lines in each folder, which may fall by itself and rises only for a reason."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import io
+import tokenize
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+WHAT_TO_DO = (
+    "Remove something; or raise the number in tests/test_size.py, and say in the commit what was "
+    "removed for it."
+)
+NO_CODE = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}
+
+# Lines that are not blank, a comment or a docstring. "." holds the files beside the folders.
+MOST = {
+    "app/.": 171,
+    "app/bench": 266,
+    "app/calibrate": 6826,
+    "app/cameras": 621,
+    "app/command_line": 2605,
+    "app/context": 419,
+    "app/inspect": 2659,
+    "app/live": 2654,
+    "app/measure": 4741,
+    "app/sensors": 1036,
+    "app/services": 886,
+    "app/shell": 1509,
+    "app/sources": 2696,
+    "app/start": 224,
+    "app/theme": 200,
+    "app/tools": 660,
+    "app/view2d": 1071,
+    "app/view3d": 1739,
+    "app/widgets": 479,
+    "app/workspace": 730,
+    "gelpolight_core/.": 750,
+    "gelpolight_core/batch": 611,
+    "gelpolight_core/calibration": 3686,
+    "gelpolight_core/design": 327,
+    "gelpolight_core/design_check": 458,
+    "gelpolight_core/experiments": 5054,
+    "gelpolight_core/export": 606,
+    "gelpolight_core/factors": 193,
+    "gelpolight_core/health": 1156,
+    "gelpolight_core/image": 382,
+    "gelpolight_core/in_place": 1222,
+    "gelpolight_core/io": 440,
+    "gelpolight_core/lights": 581,
+    "gelpolight_core/measurement": 4693,
+    "gelpolight_core/optics": 1673,
+    "gelpolight_core/radiance": 224,
+    "gelpolight_core/reconstruction": 5847,
+    "gelpolight_core/recording": 532,
+    "gelpolight_core/records": 637,
+    "gelpolight_core/reflectance": 2241,
+    "gelpolight_core/report": 1898,
+    "gelpolight_core/response": 413,
+    "gelpolight_core/session": 1089,
+    "gelpolight_core/simulation": 2302,
+    "tests/.": 1329,
+    "tests/app": 11782,
+    "tests/batch": 476,
+    "tests/calibration": 1681,
+    "tests/command_line": 986,
+    "tests/data": 154,
+    "tests/design": 89,
+    "tests/design_check": 75,
+    "tests/docs": 531,
+    "tests/experiments": 982,
+    "tests/export": 438,
+    "tests/factors": 77,
+    "tests/golden": 197,
+    "tests/health": 264,
+    "tests/image": 143,
+    "tests/in_place": 675,
+    "tests/io": 204,
+    "tests/lights": 226,
+    "tests/long": 1957,
+    "tests/measurement": 1833,
+    "tests/optics": 510,
+    "tests/packaging": 306,
+    "tests/radiance": 78,
+    "tests/reconstruction": 2785,
+    "tests/recording": 312,
+    "tests/records": 384,
+    "tests/reflectance": 965,
+    "tests/report": 190,
+    "tests/response": 131,
+    "tests/session": 489,
+    "tests/simulation": 796,
+    "tests/strangers": 1075,
+}
+
+
+def code_lines(source: str) -> int:
+    """Return how many lines are not blank, a comment or a docstring."""
+    lines: set[int] = set()
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type not in NO_CODE:
+            lines.update(range(token.start[0], token.end[0] + 1))
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, documented) and ast.get_docstring(node, clean=False) is not None:
+            lines -= set(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+    return len(lines)
+
+
+@functools.cache
+def sizes() -> Counter[str]:
+    """Return the code lines of every folder of the core, the program and the tests."""
+    found: Counter[str] = Counter()
+    for top in ("gelpolight_core", "app", "tests"):
+        for path in (ROOT / top).rglob("*.py"):
+            inside = path.relative_to(ROOT / top).parts
+            folder = inside[0] if len(inside) > 1 else "."
+            found[f"{top}/{folder}"] += code_lines(path.read_text(encoding="utf-8"))
+    return found
+
+
+def test_code_is_counted_without_blanks_comments_and_docstrings() -> None:
+    head = '"""About.\n\nMore.\n"""\n# why\n\n'
+    body = 'def f(\n    x\n):\n    """Do."""\n    return """a\nb"""\n'
+
+    assert code_lines(head + body) == 5  # three of the signature, two of the text that is returned
+
+
+def test_no_folder_grows() -> None:
+    grown = [
+        f"{folder} has {lines} code lines, {lines - MOST.get(folder, 0)} more than {MOST[folder]}"
+        if folder in MOST
+        else f"{folder} has {lines} code lines and no number yet"
+        for folder, lines in sorted(sizes().items())
+        if lines > MOST.get(folder, -1)
+    ]
+
+    assert not grown, "\n".join([*grown, WHAT_TO_DO])
+
+
+def test_no_number_outlives_its_folder() -> None:
+    gone = sorted(MOST.keys() - sizes().keys())
+    assert not gone, f"Remove these lines from tests/test_size.py: {gone}"
