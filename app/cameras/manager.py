@@ -83,12 +83,6 @@ class CameraManager(QObject):
         self._driver = driver
         self._cameras.clear()
 
-    def beside(self, status: StatusModel) -> CameraManager:
-        """Return the manager of another sensor's cameras, with a reference of its own."""
-        other = CameraManager(settings=self._settings, status=status, toasts=self._toasts)
-        other.driver = self.driver
-        return other
-
     # Connected cameras
 
     def infos(self) -> tuple[SourceInfo, ...]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -25,15 +24,8 @@ if TYPE_CHECKING:
 class SourceChoice(QObject):
     """The selected source. The live pages open and close it.
 
-    Parameters
-    ----------
-    owner : str, optional
-        What it is the source of, in a few words.
-
     Attributes
     ----------
-    other : SourceChoice or None
-        The source of another sensor that is open at the same time. A camera belongs to one of them.
     info : SourceInfo or None
         The source.
     bench : Bench or None
@@ -42,35 +34,13 @@ class SourceChoice(QObject):
 
     changed = Signal()
 
-    def __init__(self, owner: str = "") -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._owner = owner or tr("the first sensor")
-        self.other: SourceChoice | None = None
         self.info: SourceInfo | None = None
         self.bench: Bench | None = None
 
-    def owner_of(self, camera: SourceInfo) -> str:
-        """Return which other sensor uses a camera, in a few words. Empty: none."""
-        used = None if self.other is None else self.other.info
-        if self.other is None or used is None or used.kind != "camera":
-            return ""
-        return self.other._owner if (used.kind, used.detail) == (camera.kind, camera.detail) else ""
-
     def choose(self, info: SourceInfo | None) -> None:
-        """Select a source, or none.
-
-        Raises
-        ------
-        InputError
-            If it is a camera that the other sensor uses.
-        """
-        owner = "" if info is None else self.owner_of(info)
-        if info is not None and owner:
-            raise InputError(
-                tr("The camera is in use by {owner}").format(owner=owner),
-                where=info.name,
-                advice=tr("Select another camera, or another source for that sensor first"),
-            )
+        """Select a source, or none."""
         if info is not self.info:
             self.info = info
             self.changed.emit()
@@ -128,7 +98,7 @@ class SourceChoice(QObject):
             self.choose_recording(Path(place))
         elif kind == "camera":
             for camera in cameras.infos():
-                if camera.detail == place and not self.owner_of(camera):
+                if camera.detail == place:
                     self.choose(camera)
 
 

@@ -13,7 +13,6 @@ from app.context.recordings_dialog import RecordingsDialog
 from app.sources.source import SourceInfo
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
-from gelpolight_core.errors import InputError
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
 
@@ -66,12 +65,12 @@ class SourceButton(QToolButton):
             menu.removeAction(action)
             action.deleteLater()
         infos = self._context.cameras.infos()
-        self._found = [QAction(self._line(info), menu) for info in infos] or [
+        self._found = [QAction(info.name, menu) for info in infos] or [
             QAction(tr("No camera connected"), menu)
         ]
         for number, action in enumerate(self._found):
             action.setObjectName(f"{self._page}.source.camera.{number}")
-            action.setEnabled(bool(infos) and not self._context.source.owner_of(infos[number]))
+            action.setEnabled(bool(infos))
             if infos:
                 info = infos[number]
                 action.setToolTip(plain_tip(info.detail))
@@ -82,16 +81,7 @@ class SourceButton(QToolButton):
         """Use the images of a camera. Selecting the same camera again changes nothing."""
         now = self._context.source.info
         if now is None or (now.kind, now.detail) != (info.kind, info.detail):
-            try:
-                self._context.source.choose(info)
-            except InputError as error:
-                self._context.toasts.show(str(error), "fail")
-
-    def _line(self, info: SourceInfo) -> str:
-        """Return the name of a camera, and which other sensor uses it."""
-        owner = self._context.source.owner_of(info)
-        text = tr("{name} (in use by {owner})")
-        return text.format(name=info.name, owner=owner) if owner else info.name
+            self._context.source.choose(info)
 
     def show_settings(self) -> None:
         """Show the camera settings and let the user change them."""
@@ -149,5 +139,5 @@ def show_settings_of_source(context: AppContext, parent: QWidget) -> None:
         from app.cameras.dialog import show_camera_dialog  # created at first use
 
         dialog = show_camera_dialog(context.cameras, camera, parent)
-        # It keeps the camera open, which another sensor may use next.
+        # It keeps the camera open, which another window of the program may use next.
         context.source.changed.connect(dialog.close)

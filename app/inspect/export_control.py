@@ -31,30 +31,16 @@ class ExportControl(QObject):
         Gets the action.
     context : AppContext
         Holds the settings and the messages.
-    page : str, optional
-        Start of the name of the action.
-    key : str, optional
-        Shortcut of the action. Empty for none.
-    folder : str, optional
-        Name of the folder that is proposed.
     """
 
     def __init__(
-        self,
-        depth: LiveDepth,
-        jobs: Jobs,
-        owner: QWidget,
-        *,
-        context: AppContext,
-        page: str = "inspect",
-        key: str = "Ctrl+E",
-        folder: str = "depth",
+        self, depth: LiveDepth, jobs: Jobs, owner: QWidget, *, context: AppContext
     ) -> None:
         super().__init__(owner)
-        self._depth, self._jobs, self._owner = depth, jobs, owner
-        self._context, self._folder = context, folder
+        self._depth, self._jobs = depth, jobs
+        self._owner, self._context = owner, context
         self.action = make_action(
-            owner, f"{page}.export", tr("Export…"), self.ask, keys=(key,),
+            owner, "inspect.export", tr("Export…"), self.ask, keys=("Ctrl+E",),
             icon_name="export", tip=tr("Write the depth to files"),
         )  # fmt: skip
 
@@ -67,7 +53,7 @@ class ExportControl(QObject):
         if isinstance(source, RecordingSource):
             now = source.playback()
             count, at = now.count, now.position
-        folder = self._context.settings.folder("height_map") / self._folder
+        folder = self._context.settings.folder("height_map") / "depth"
         dialog = ExportDialog(folder, count=count, at=at, parent=self._owner)
         dialog.chosen.connect(self.run)
         dialog.open()

@@ -18,7 +18,6 @@ from app.inspect.export_control import ExportControl
 from app.inspect.modes import ModeChoice
 from app.inspect.processing_panel import ProcessedLine
 from app.inspect.record_control import RecordControl
-from app.inspect.second_dock import SecondDock
 from app.inspect.stream import DepthStream
 from app.inspect.views import Views
 from app.live.advice import advise
@@ -72,10 +71,9 @@ class InspectPage(QWidget):
         self._pixel_map: PixelMap | None = None
         self._shown: Shown | None = None
         self._recorded = ""
-        self.second = SecondDock(self.views, self, context=context)
         self._lay_out()
         self._connect()
-        self.second.restore()
+        self.views.restore()
 
     def _lay_out(self) -> None:
         foot = QWidget()
@@ -150,7 +148,6 @@ class InspectPage(QWidget):
         self._texts = QTimer(self)
         self._texts.setInterval(TEXT_MS)
         self._texts.timeout.connect(self._show_texts)
-        self._texts.timeout.connect(self.second.show_texts)
 
     # Called by the main window
 
@@ -158,7 +155,6 @@ class InspectPage(QWidget):
         """Show the source through the calibration in use."""
         self._want()
         self.depth.enter()
-        self.second.enter()
         self._texts.start()
         self.setFocus()
 
@@ -167,7 +163,6 @@ class InspectPage(QWidget):
         self._texts.stop()
         self.recorder.stop()
         self.live.enter(False)
-        self.second.leave()
         self.views.keep()
 
     def may_close(self) -> bool:
@@ -177,7 +172,6 @@ class InspectPage(QWidget):
         self.views.keep()
         self.jobs.close()
         self.modes.close()
-        self.second.finish()
         self.depth.finish()
         self.views.finish()
         return True
@@ -194,10 +188,6 @@ class InspectPage(QWidget):
         """Show what is sent to other programs."""
         self.stream.show_dialog()
 
-    def show_second_sensor(self) -> None:
-        """Show a second sensor beside the first one."""
-        self.second.open()
-
     def begin_demo(self) -> None:
         """Use the virtual sensor."""
         self.context.source.choose_virtual_sensor()
@@ -213,7 +203,6 @@ class InspectPage(QWidget):
         """Freeze the image, or continue."""
         self.pause_action.setChecked(on)
         self.live.pause(on)
-        self.second.pause(on)
         self._want()
 
     def _want(self) -> None:

@@ -30,10 +30,6 @@ class RecordControl(QObject):
         Gets the action.
     context : AppContext
         Holds the library and the messages.
-    page : str, optional
-        Start of the name of the action.
-    key : str, optional
-        Shortcut of the action. Empty for none.
 
     Signals
     -------
@@ -43,21 +39,13 @@ class RecordControl(QObject):
 
     reported = Signal(str)
 
-    def __init__(
-        self,
-        depth: LiveDepth,
-        owner: QWidget,
-        *,
-        context: AppContext,
-        page: str = "inspect",
-        key: str = "R",
-    ) -> None:
+    def __init__(self, depth: LiveDepth, owner: QWidget, *, context: AppContext) -> None:
         super().__init__(owner)
         self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
         self._warned = False
         self.action: QAction = make_action(
-            owner, f"{page}.record", tr("Record"), self.toggle, keys=(key,),
+            owner, "inspect.record", tr("Record"), self.toggle, keys=("R",),
             icon_name="record", tip=tr("Record every frame without loss"),
         )  # fmt: skip
         self.action.setCheckable(True)

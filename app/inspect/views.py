@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QByteArray, Qt, Signal
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QDockWidget,
     QMainWindow,
@@ -42,7 +41,6 @@ from gelpolight_core.translation import tr
 # Raised when views are added, so that an old layout is not applied to them.
 LAYOUT_VERSION = 3
 AREAS = Qt.DockWidgetArea
-FIRST_WIDTHS = [560, 400, 260]
 
 
 class Views(QMainWindow):
@@ -56,14 +54,11 @@ class Views(QMainWindow):
         Position (x, y) under the pointer in one of the views, mm. NaN for none.
     image_pointed(float, float)
         Pixel (u, v) under the pointer in the camera image. NaN for none.
-    arranged()
-        The default layout was restored.
     """
 
     wanted_changed = Signal()
     pointed = Signal(float, float)
     image_pointed = Signal(float, float)
-    arranged = Signal()
 
     def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
         super().__init__()
@@ -113,10 +108,6 @@ class Views(QMainWindow):
         """Add a control next to the camera button."""
         self.bar.insertWidget(self.bar.actions()[-1], widget)
 
-    def offer(self, action: QAction) -> None:
-        """Add an action to the menu of the views."""
-        self._menu.insertAction(self._menu_end, action)
-
     def _make_docks(self) -> None:
         table = (
             ("surface", tr("3D"), self.surface, "Alt+1"),
@@ -140,7 +131,7 @@ class Views(QMainWindow):
             action.setShortcut(keys)
             self.addAction(action)
             self._menu.addAction(action)
-        self._menu_end = self._menu.addSeparator()
+        self._menu.addSeparator()
         self._menu.addAction(
             make_action(self, "inspect.layout", tr("Reset the layout"), self.arrange)
         )
@@ -166,12 +157,11 @@ class Views(QMainWindow):
         docks["look"].raise_()
         self.resizeDocks(
             [docks["surface"], docks["height"], docks["look"]],
-            FIRST_WIDTHS,
+            [560, 400, 260],
             Qt.Orientation.Horizontal,
         )
         self.resizeDocks([docks["surface"], docks["section"]], [460, 200], Qt.Orientation.Vertical)
         self.resizeDocks([docks["look"], docks["bench"]], [240, 600], Qt.Orientation.Vertical)
-        self.arranged.emit()
         self.follow_source()
 
     def _connect(self) -> None:

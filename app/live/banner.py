@@ -3,14 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QProgressBar,
-    QPushButton,
-    QSizePolicy,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.live.advice import Advice
 from app.services.jobs import Jobs
@@ -32,10 +25,6 @@ class Banner(QWidget):
         Their progress is shown, and they can be stopped.
     idle : str
         Shown in muted colour if there is no advice.
-    page : str, optional
-        First part of the object names.
-    narrow : bool, optional
-        Put the button below the text.
 
     Signals
     -------
@@ -45,32 +34,26 @@ class Banner(QWidget):
 
     act_wanted = Signal(str)
 
-    def __init__(
-        self, jobs: Jobs, *, idle: str, page: str = "inspect", narrow: bool = False
-    ) -> None:
+    def __init__(self, jobs: Jobs, *, idle: str) -> None:
         super().__init__()
-        named(self, f"{page}.banner", tr("What to do next"))
+        named(self, "inspect.banner", tr("What to do next"))
         self._advice, self._idle = Advice(), idle
-        self._text = named(PlainLabel(), f"{page}.advice", tr("Advice"))
+        self._text = named(PlainLabel(), "inspect.advice", tr("Advice"))
         self._text.setWordWrap(True)
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._button = named(QPushButton(), f"{page}.advised", tr("Do this"))
+        self._button = named(QPushButton(), "inspect.advised", tr("Do this"))
         self._button.clicked.connect(lambda: self.act_wanted.emit(self._advice.act))
-        self._bar = named(QProgressBar(), f"{page}.progress", tr("Progress"))
+        self._bar = named(QProgressBar(), "inspect.progress", tr("Progress"))
         self._bar.setFixedWidth(220)
-        self._stop = named(QPushButton(tr("Stop")), f"{page}.stop", tr("Stop the work"))
+        self._stop = named(QPushButton(tr("Stop")), "inspect.stop", tr("Stop the work"))
         self._stop.clicked.connect(jobs.cancel)
         jobs.progressed.connect(self.show_work)
-        row = QHBoxLayout()
-        for widget in (self._button, self._bar, self._stop):
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 4, 10, 4)
+        for widget in (self._text, self._button, self._bar, self._stop):
             row.addWidget(widget)
-        whole = QVBoxLayout(self) if narrow else QHBoxLayout(self)
-        whole.setContentsMargins(10, 4, 10, 4)
-        whole.addWidget(self._text)
-        whole.addLayout(row)
         line, button = self._text.fontMetrics().lineSpacing(), self._button.sizeHint().height()
-        room = 3 * line + whole.spacing() + button if narrow else max(2 * line, button)
-        self.setFixedHeight(room + 8)
+        self.setFixedHeight(max(2 * line, button) + 8)
         self._working = False
         self._show()
 

@@ -27,8 +27,6 @@ class HeightPanel(QWidget):
     ----------
     adjustable : bool, optional
         Whether the ends of the colour range can be dragged.
-    page : str, optional
-        First part of the object names.
 
     Signals
     -------
@@ -41,11 +39,11 @@ class HeightPanel(QWidget):
     range_dragged = Signal(float, float)
     range_released = Signal()
 
-    def __init__(self, *, adjustable: bool = False, page: str = "inspect") -> None:
+    def __init__(self, *, adjustable: bool = False) -> None:
         super().__init__()
-        named(self, f"{page}.height", tr("Height map"))
+        named(self, "inspect.height", tr("Height map"))
         limits = LIMITS_MM if adjustable else None
-        self.map = MapView(f"{page}.height.map", tr("Height map"), limits=limits)
+        self.map = MapView("inspect.height.map", tr("Height map"), limits=limits)
         self._since_histogram = QElapsedTimer()
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)

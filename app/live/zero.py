@@ -27,8 +27,8 @@ from gelpolight_core.reconstruction.background_shift import (
 from gelpolight_core.translation import tr
 
 FRAMES = 8
-SUFFIX, SECOND_SUFFIX = "-zero", "-zero-2"
-"""Ends of the names of calibrations set to zero: each sensor that is open has a file of its own."""
+SUFFIX = "-zero"
+"""End of the name of a calibration set to zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +61,10 @@ class ZeroControl(QObject):
         Runs the computation.
     context : AppContext
         Holds the library and the messages.
-    suffix : str, optional
-        End of the name of the calibration set to zero.
     """
 
-    def __init__(
-        self, live: LiveSession, jobs: Jobs, *, context: AppContext, suffix: str = SUFFIX
-    ) -> None:
+    def __init__(self, live: LiveSession, jobs: Jobs, *, context: AppContext) -> None:
         super().__init__(live)
-        self._suffix = suffix
         self._live, self._jobs, self._context = live, jobs, context
 
     def set_zero(self) -> None:
@@ -82,12 +77,12 @@ class ZeroControl(QObject):
 
     def _on_captured(self, frames: list[NDArray[Any]]) -> None:
         workspace = self._context.workspace
-        used, suffix = workspace.in_use, self._suffix
+        used = workspace.in_use
         if used is not None:
             self._jobs.submit(
                 Job(
                     tr("Setting zero"),
-                    lambda _progress: zero_calibration(workspace, used, frames, suffix=suffix),
+                    lambda _progress: zero_calibration(workspace, used, frames),
                     self._on_zeroed,
                     self._on_failed,
                 )
@@ -120,9 +115,7 @@ class ZeroControl(QObject):
         self._context.requests.calibrations_changed.emit()
 
 
-def zero_calibration(
-    workspace: Workspace, used: Path, frames: Sequence[NDArray[Any]], *, suffix: str = SUFFIX
-) -> Zeroed:
+def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[Any]]) -> Zeroed:
     """Write the calibration in use with the present background, and put it into use.
 
     The new file is next to the original, which is not changed. Zeroing again replaces the new file.
@@ -135,8 +128,6 @@ def zero_calibration(
         The calibration in use, which may itself be one set to zero.
     frames : sequence of (height, width, 3)
         Images of the untouched sensor.
-    suffix : str, optional
-        End of the name of the new file.
 
     Raises
     ------
@@ -148,7 +139,7 @@ def zero_calibration(
     before = background_shift(frames[0], calibration)
     made = datetime.now(UTC).isoformat(timespec="seconds")
     changed = zeroed(calibration, frames, operator=user_name(), made=made)
-    path = origin.with_name(f"{origin.stem}{suffix}{ENDING}")
+    path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")
     write_calibration(changed, path)
     workspace.use(path)
     return Zeroed(path, origin, before)
@@ -156,8 +147,5 @@ def zero_calibration(
 
 def original_of(used: Path) -> Path:
     """Return the original of a calibration set to zero. Any other is its own original."""
-    for suffix in (SUFFIX, SECOND_SUFFIX):
-        origin = used.with_name(f"{used.stem.removesuffix(suffix)}{ENDING}")
-        if used.stem.endswith(suffix) and origin.is_file():
-            return origin
-    return used
+    origin = used.with_name(f"{used.stem.removesuffix(SUFFIX)}{ENDING}")
+    return origin if origin.is_file() else used

@@ -178,36 +178,12 @@ class Settings:
     @property
     def source(self) -> tuple[str, str]:
         """Kind and place of the source that was selected last. An empty kind: none."""
-        return self._source("source")
+        return self._text("source/kind"), self._text("source/file")
 
     @source.setter
     def source(self, chosen: tuple[str, str]) -> None:
-        self._keep_source("source", chosen)
-
-    @property
-    def second_source(self) -> tuple[str, str]:
-        """The same for the second sensor of Inspect."""
-        return self._source("second_sensor")
-
-    @second_source.setter
-    def second_source(self, chosen: tuple[str, str]) -> None:
-        self._keep_source("second_sensor", chosen)
-
-    @property
-    def second_sensor(self) -> bool:
-        """Whether Inspect shows a second sensor."""
-        return self._text("second_sensor/open") == "yes"
-
-    @second_sensor.setter
-    def second_sensor(self, on: bool) -> None:
-        self._store.setValue("second_sensor/open", "yes" if on else "no")
-
-    def _source(self, group: str) -> tuple[str, str]:
-        return self._text(f"{group}/kind"), self._text(f"{group}/file")
-
-    def _keep_source(self, group: str, chosen: tuple[str, str]) -> None:
         for key, value in zip(("kind", "file"), chosen, strict=True):
-            self._store.setValue(f"{group}/{key}", value)
+            self._store.setValue(f"source/{key}", value)
 
     @property
     def limits(self) -> Limits:

@@ -404,10 +404,6 @@ class MainWindow(QMainWindow):
         """Show what is sent to other programs, on the Inspect page."""
         self._with_page("inspect", lambda page: _call(page, "show_stream"))
 
-    def show_second_sensor(self) -> None:
-        """Show a second sensor beside the first one, on the Inspect page."""
-        self._with_page("inspect", lambda page: _call(page, "show_second_sensor"))
-
     def _show_tool(self, name: str, make: Callable[[], QDialog]) -> None:
         """Show a dialog that keeps its results while the program runs."""
         if name not in self._tools:

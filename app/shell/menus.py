@@ -35,16 +35,6 @@ class Menus:
         menu = window.menuBar().addMenu(tr("&View"))
         menu.addActions(list(window.page_actions.values()))
         menu.addSeparator()
-        if "inspect" in window.entries:
-            menu.addAction(
-                make_action(
-                    window,
-                    "view.second_sensor",
-                    tr("&Second sensor"),
-                    window.show_second_sensor,
-                    icon_name="two-sensors",
-                )
-            )
         themes = menu.addMenu(tr("&Theme"))
         themes.addActions(list(self.themes.values()))
         menu.addAction(

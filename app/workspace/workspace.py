@@ -2,8 +2,7 @@
 
 ::
 
-    workspace.json                       the calibration in use
-    second-sensor.json                   the one of the second sensor of Inspect
+    workspace.json                       the calibration put into use last
     sensors/SERIAL/NAME.gplcal           calibrations, with NAME.validation.json next to them
     sensors/SERIAL/sessions/NAME/        session folders
     sensors/SERIAL/recordings/TIME.gplrec
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     from gelpolight_core.sensor_calibration import Calibration
 
 ENDING = ".gplcal"
-STATE, SECOND_STATE = "workspace.json", "second-sensor.json"
+STATE = "workspace.json"
 NAME_BYTES = 160
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{n}{k}" for n in ("COM", "LPT") for k in range(10))}
 
@@ -52,12 +51,11 @@ class Workspace:
     ----------
     folder : Path
         It need not exist. It is created when the first file is added.
-    state : str, optional
-        Name of the file that keeps the calibration in use.
     """
 
-    def __init__(self, folder: Path, *, state: str = STATE) -> None:
-        self.folder, self._state = folder, state
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._in_use: tuple[Path, Path | None] | None = None
         self._records: Records | None = None
 
     @property
@@ -215,14 +213,23 @@ class Workspace:
 
     @property
     def in_use(self) -> Path | None:
-        """The calibration in use. None if none was selected or it no longer exists."""
+        """The calibration in use. None if none was selected or it no longer exists.
+
+        Another window of the program, with another sensor, has its own: the file is only read at
+        the start.
+        """
+        if self._in_use is None or self._in_use[0] != self.folder:
+            self._in_use = self.folder, self._last_in_use()
+        path = self._in_use[1]
+        return path if path is not None and path.is_file() else None
+
+    def _last_in_use(self) -> Path | None:
         try:
-            stored = parse_json(read_file(self.folder / self._state))["in_use"]
-            path = self.folder / stored
-            inside = ".." not in path.parts and path.is_relative_to(self.sensors_folder)
-            return path if inside and path.is_file() else None
+            path = self.folder / parse_json(read_file(self.folder / STATE))["in_use"]
         except (InputError, OSError, ValueError, TypeError, KeyError):
             return None  # the user can easily select it again
+        inside = ".." not in path.parts and path.is_relative_to(self.sensors_folder)
+        return path if inside else None
 
     def use(self, path: Path | None) -> None:
         """Select the calibration in use, or none.
@@ -237,7 +244,8 @@ class Workspace:
             self._refuse_outside(path)
         text = json.dumps({"in_use": path and path.relative_to(self.folder).as_posix()}) + "\n"
         make_folder(self.folder)
-        write_bytes(self.folder / self._state, text.encode())
+        write_bytes(self.folder / STATE, text.encode())
+        self._in_use = self.folder, path
 
     def import_calibration(self, source: Path) -> Path:
         """Copy a calibration file into the folder of its sensor, completely or not at all.

@@ -51,25 +51,6 @@ def inspect(operator: Operator) -> None:
     page.views.docks["camera"].raise_()
 
 
-def second_sensor(operator: Operator) -> None:
-    """Look at a second virtual sensor beside the first."""
-    page = inspect_page(operator)
-    page.show_second_sensor()
-    pane = page.second.pane
-    used = operator.window.context.workspace.in_use
-    assert pane is not None and used is not None
-    pane.context.source.bench = Bench(bench(operator).design)
-    pane.context.source.choose_virtual_sensor()
-    pane.context.workspace.use(used)
-    operator.window.context.requests.calibrations_changed.emit()
-    operator.until(lambda: pane.depth.live_reconstructor is not None, "the second calibration")
-    pane.context.source.bench.lay("cylinder")
-    operator.pause(6.0)
-    operator.window.context.toasts.clear()
-    operator.shot("inspect-second")
-    page.second.close()
-
-
 def recording(operator: Operator) -> None:
     """Record a press, and replay it."""
     page = inspect_page(operator)
@@ -195,4 +176,4 @@ def measure_page(operator: Operator) -> MeasurePage:
     return found
 
 
-SCENES = (library, inspect, second_sensor, recording, drift, measure, evaluation)
+SCENES = (library, inspect, recording, drift, measure, evaluation)

@@ -1,4 +1,4 @@
-"""Only one program at a time writes to a run's folder; others get an error that names it."""
+"""Only one program at a time writes to a run's folder or uses a camera; others get its name."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import errno
 import os
 import socket
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
@@ -23,23 +24,23 @@ FILE = ".writing"
 _LOCKED_BYTE = 4096
 
 
-class RunLock:
-    """The lock on a run's folder, until it is released or the program ends in any way.
+class FileLock:
+    """A lock that others respect, until it is released or the program ends in any way.
 
     Parameters
     ----------
-    folder : Path
-        Folder of the run.
+    path : Path
+        File that is locked, and that names its holder.
+    refusal : callable
+        Returns the error for a holder: user, computer and process.
 
     Raises
     ------
     InputError
-        If another program has the lock, or the folder cannot be written.
+        If another program has the lock, or the file cannot be written.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        path = folder / FILE
+    def __init__(self, path: Path, refusal: Callable[[str], InputError]) -> None:
         try:
             self._handle: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
@@ -52,11 +53,7 @@ class RunLock:
             self.release()
             if error.errno not in (errno.EAGAIN, errno.EACCES):
                 raise cannot_write(error, path) from error
-            raise InputError(
-                tr("This run is being written by {holder}").format(holder=holder),
-                where=str(folder),
-                advice=tr("Stop the other run first, or choose a new folder"),
-            ) from error
+            raise refusal(holder) from error
         try:
             os.ftruncate(self._handle, 0)
             os.lseek(self._handle, 0, os.SEEK_SET)
@@ -65,7 +62,7 @@ class RunLock:
             self.release()
             raise cannot_write(error, path) from error
 
-    def __enter__(self) -> RunLock:
+    def __enter__(self) -> FileLock:
         """Hold the lock for a block."""
         return self
 
@@ -78,6 +75,27 @@ class RunLock:
         handle, self._handle = self._handle, None
         if handle is not None:
             os.close(handle)
+
+
+class RunLock(FileLock):
+    """The lock on a run's folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        super().__init__(folder / FILE, self._refusal)
+
+    def _refusal(self, holder: str) -> InputError:
+        return InputError(
+            tr("This run is being written by {holder}").format(holder=holder),
+            where=str(self.folder),
+            advice=tr("Stop the other run first, or choose a new folder"),
+        )
 
 
 def _lock(handle: int) -> None:

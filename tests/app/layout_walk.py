@@ -32,10 +32,6 @@ def walk(context: AppContext, sizes: tuple[tuple[int, int], ...] = SIZES) -> Ite
             yield from _wizard(window, context, sizes)
         else:
             yield from _at_sizes(window, name, sizes)
-        if name == "inspect":
-            page.show_second_sensor()
-            yield from _at_sizes(window, "inspect with two sensors", sizes)
-            page.second.close()
         for tabs in page.findChildren(QTabWidget, "measure.tabs"):
             for index in range(1, tabs.count()):
                 tabs.setCurrentIndex(index)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
+import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
+
+import platformdirs
 
 from app.sources.camera.applying import Applied, apply_settings, locked
 from app.sources.camera.camera_state import CameraState, format_of
@@ -23,6 +27,8 @@ from app.sources.camera.driver import (
 from app.sources.source import Frame
 from app.sources.stopping import join
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.io.lock import FileLock
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
@@ -227,7 +233,7 @@ class Camera:
             number = self._number
             try:
                 self._use(end)
-            except CameraGone as error:
+            except InputError as error:  # it is away, or in use by another window
                 self._went_away(str(error))
             except Exception as error:
                 _LOG.exception("The camera %s failed", self.device.name)
@@ -261,16 +267,17 @@ class Camera:
         asked = format_of(wanted) or best_format(offered)
         if end.is_set():
             return
-        opened = self._driver.open(device, asked)
-        try:
-            if not end.is_set():
-                self._first_image(opened, end, offered, wanted)
-            while not end.is_set() and not self._reopen.is_set():
-                self._next_image(opened, end)
-                self._carry_out_changes(opened)
-        finally:
-            self._fail_changes()
-            opened.close()
+        with camera_lock(device):
+            opened = self._driver.open(device, asked)
+            try:
+                if not end.is_set():
+                    self._first_image(opened, end, offered, wanted)
+                while not end.is_set() and not self._reopen.is_set():
+                    self._next_image(opened, end)
+                    self._carry_out_changes(opened)
+            finally:
+                self._fail_changes()
+                opened.close()
 
     def _first_image(
         self,
@@ -385,3 +392,28 @@ class Camera:
             where=self.device.name,
             advice=tr("The program tries again automatically"),
         )
+
+
+def camera_lock(device: Device) -> FileLock:
+    """Reserve a camera for this window of the program, until it is released.
+
+    Raises
+    ------
+    InputError
+        If another window uses it, which is named.
+    """
+    folder = platformdirs.user_state_path("gelpolight") / "cameras"
+    make_folder(folder)
+    # Computers that share the user's folder have cameras of their own.
+    place = f"{socket.gethostname()} {device.identity}".encode()
+
+    def refusal(holder: str) -> InputError:
+        return CameraGone(
+            tr("the camera is used by another window of this program ({holder})").format(
+                holder=holder
+            ),
+            where=device.name,
+            advice=tr("Select another camera here, or another source in that window"),
+        )
+
+    return FileLock(folder / hashlib.sha256(place).hexdigest()[:16], refusal)

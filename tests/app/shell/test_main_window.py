@@ -30,7 +30,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from app.context.context import AppContext, SourceChoice
+from app.context.context import AppContext
 from app.context.pages import PageEntry
 from app.desktop import open_files
 from app.services.settings import Limits, Settings
@@ -194,7 +194,7 @@ def test_the_source_of_the_last_run_is_selected_again(
     assert context.source.remembered == ("folder", str(folder))
 
 
-def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected_and_free(
+def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected(
     context: AppContext, make_window: MakeWindow, qtbot: QtBot
 ) -> None:
     camera = FakeCamera()
@@ -208,11 +208,6 @@ def test_the_camera_of_the_last_run_is_selected_again_if_it_is_connected_and_fre
     assert context.source.info is None
     assert context.settings.source == ("camera", C310.identity), "it is kept for the next start"
     camera.plugged = True
-    other = SourceChoice("the second sensor")
-    other.info, context.source.other = context.cameras.infos()[0], other
-    context.source.choose_again(*context.settings.source, context.cameras)
-    assert context.source.info is None
-    context.source.other = None
     make_window().choose_source_again()
     qtbot.waitUntil(lambda: context.source.info is not None)
     assert context.source.info is not None and context.source.info.detail == C310.identity

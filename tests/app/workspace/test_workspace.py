@@ -142,6 +142,20 @@ def test_the_selection_ends_with_its_file(workspace: Workspace, source: Path) ->
     assert workspace.in_use is None
 
 
+def test_each_window_of_the_program_has_its_own_calibration_in_use(
+    workspace: Workspace, source: Path
+) -> None:
+    one = workspace.import_calibration(source)
+    two = workspace.calibration_path("other", "two")
+    shutil.copy(one, two)
+    workspace.use(one)
+    window = Workspace(workspace.folder)
+    assert window.in_use == one
+    window.use(two)
+    assert (workspace.in_use, window.in_use) == (one, two)
+    assert Workspace(workspace.folder).in_use == two
+
+
 def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: Path) -> None:
     place = workspace.import_calibration(source)
     workspace.use(place)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -151,6 +155,41 @@ def test_a_camera_used_by_another_program_is_waited_for(
     assert "cannot be opened" in eventually(lambda: stream.figures().lost)
     fake.in_use = False
     eventually(lambda: stream.figures().lost is None)
+
+
+ANOTHER_WINDOW = """
+from fake_camera import C310, FakeCamera, FakeDriver, eventually
+from app.sources.camera.camera import Camera
+camera = Camera(FakeDriver(FakeCamera()), C310)
+camera.attach(lambda _frame: None)
+eventually(lambda: camera.state.phase == "live")
+print("live", flush=True)
+input()
+"""
+
+
+def test_a_camera_in_another_window_of_the_program_is_refused_with_its_name_until_it_is_free(
+    camera: Camera,
+) -> None:
+    tests = Path(__file__).parents[3]
+    paths = os.pathsep.join(map(str, (tests, tests.parent)))
+    window = subprocess.Popen(
+        [sys.executable, "-c", ANOTHER_WINDOW],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": paths},
+        text=True,
+    )
+    assert window.stdout is not None
+    eventually(lambda: window.stdout.readline() == "live\n")
+    stream = Stream(CameraSource(camera))
+    stream.start()
+    why = eventually(camera.trouble)
+    assert f"process {window.pid}" in why and C310.name in why
+    window.kill()
+    window.communicate()
+    assert stream.capture(1).result(20.0)
+    stream.stop()
 
 
 def test_closing_during_opening_does_not_block(fake: FakeCamera, camera: Camera) -> None:
