@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -13,14 +13,13 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.context.context import AppContext
-from app.inspect.movie_source import play_surfaces
+from app.inspect.movie_source import recorded_surfaces
 from app.inspect.views import Views
 from app.live.depth import LiveDepth
-from app.services.jobs import Job, Jobs
 from app.sources.recording import RecordingSource
 from app.view2d.quantities import Reference
 from app.view3d.image_dialog import ImageChoice, ImageDialog
-from app.view3d.saving import Player, ViewSaving
+from app.view3d.saving import Played, ViewSaving
 from app.view3d.surface import Surface
 from app.widgets.actions import make_action
 from gelpolight_core.errors import InputError
@@ -40,8 +39,6 @@ class FileActions(QObject):
         Holds the open source and the current frame.
     views : Views
         Source of the screenshots.
-    jobs : Jobs
-        Runs long work.
     owner : QWidget
         The page.
     context : AppContext
@@ -49,16 +46,10 @@ class FileActions(QObject):
     """
 
     def __init__(
-        self,
-        depth: LiveDepth,
-        views: Views,
-        jobs: Jobs,
-        owner: QWidget,
-        *,
-        context: AppContext,
+        self, depth: LiveDepth, views: Views, owner: QWidget, *, context: AppContext
     ) -> None:
         super().__init__(owner)
-        self._depth, self._views, self._jobs = depth, views, jobs
+        self._depth, self._views = depth, views
         self._owner, self._context = owner, context
         self.image_action = make_action(
             owner, "inspect.screenshot", tr("Screenshot…"), self.screenshot,
@@ -140,27 +131,22 @@ class FileActions(QObject):
             return
         self._views.compare_with(Reference(heightmap, path.name))
 
-    def _player(self) -> Player | None:
-        """Return the function that plays the recording for a movie, if one is open."""
+    def _player(self) -> Played | None:
+        """Return the frames of the open recording for a movie, if there is one."""
         source, reconstructor = self._depth.live.source, self._depth.reconstructor
         if not isinstance(source, RecordingSource) or reconstructor is None:
             return None
-        path, wanted, count = source.path, self._views.wanted(), source.playback().count
+        path, wanted = source.path, self._views.wanted()
 
-        def play(put: Callable[[Surface | None], bool]) -> int:
+        def surfaces() -> Iterator[Surface]:
             # The page's own processing is paused: a reconstructor serves one thread.
             self._depth.live.rest(True)
-            self._jobs.submit(
-                Job(
-                    tr("Playing the recording"),
-                    lambda progress: play_surfaces(path, reconstructor, wanted, put, progress),
-                    failed=lambda sentence: self._report(sentence, "fail"),
-                    ended=lambda: self._depth.live.rest(False),
-                )
-            )
-            return count
+            try:
+                yield from recorded_surfaces(path, reconstructor, wanted)
+            finally:
+                self._depth.live.rest(False)
 
-        return play
+        return source.playback().count, surfaces()
 
     # Screenshots
 

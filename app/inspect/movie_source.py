@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
+
+from PySide6.QtCore import QCoreApplication
 
 from app.live.frame_results import Maker, Wanted
 from app.view3d.surface import Surface
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 
+WAIT_S = 0.02
+"""Longest time between two looks at the events of the window: it follows the mouse."""
 
-def play_surfaces(
-    path: Path,
-    reconstructor: Reconstructor,
-    wanted: Wanted,
-    put: Callable[[Surface | None], bool],
-    progress: Callable[[float], None],
-) -> None:
-    """Make the surface of every frame of a recording and pass it on.
+
+def recorded_surfaces(
+    path: Path, reconstructor: Reconstructor, wanted: Wanted
+) -> Iterator[Surface]:
+    """Yield the surface of every frame of a recording. Meanwhile the window can be used.
 
     Parameters
     ----------
@@ -28,11 +30,6 @@ def play_surfaces(
         No other thread may use it at the same time.
     wanted : Wanted
         How the surface is coloured.
-    put : callable
-        Gets each surface, and None at the end in every case. Returns False if the surfaces are no
-        longer needed.
-    progress : callable
-        Called with the progress (0 to 1). An exception from it stops the work.
 
     Raises
     ------
@@ -41,15 +38,15 @@ def play_surfaces(
     """
     maker = Maker(reconstructor)
     maker.wanted = Wanted(surface=True, display=wanted.display, reference=wanted.reference)
+    recording = Recording.open(path)
     try:
-        recording = Recording.open(path)
-        try:
+        with ThreadPoolExecutor(1, "movie") as pool:
             for index in range(len(recording)):
-                progress(index / len(recording))
-                surface = maker(recording.frame(index)).surface
-                if surface is not None and not put(surface):
-                    return
-        finally:
-            recording.close()
+                made = pool.submit(lambda frame: maker(frame).surface, recording.frame(index))
+                while wait([made], WAIT_S).not_done:
+                    QCoreApplication.processEvents()
+                surface = made.result()
+                if surface is not None:
+                    yield surface
     finally:
-        put(None)
+        recording.close()

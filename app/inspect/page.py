@@ -97,9 +97,7 @@ class InspectPage(QWidget):
         )  # fmt: skip
         self.recorder = RecordControl(self.depth, self, context=self.context)
         self.stream = DepthStream(self.depth, self, context=self.context)
-        self.file_actions = FileActions(
-            self.depth, self.views, self.jobs, self, context=self.context
-        )
+        self.file_actions = FileActions(self.depth, self.views, self, context=self.context)
         self.export = ExportControl(self.depth, self.jobs, self, context=self.context)
         surface_menu = self.views.surface.menu
         surface_menu.mesh_wanted.connect(self.export.ask)

@@ -1,171 +1,111 @@
-"""Makes a movie frame by frame between other events, so that the window stays usable."""
+"""Movies of the 3D view: a turntable, or the surfaces of a recording, as MP4 or GIF."""
 
 from __future__ import annotations
 
-import queue
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
-from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QProgressBar,
-    QVBoxLayout,
-    QWidget,
-)
+import cv2
+import numpy as np
+from PIL import Image
+from PySide6.QtWidgets import QProgressDialog
 
-from app.view3d.images import MovieWriter, Studio
+from app.view3d.images import Rgb, Studio
 from app.view3d.surface import Surface
-from app.widgets.naming import named
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.translation import tr
 
-Step = Callable[[Studio], None]
-WAIT_MS = 20
+
+class MovieCancelled(Exception):
+    """The user does not want the movie any more."""
 
 
-def turntable(frames: int) -> Iterator[Step]:
-    """Return the steps of one whole turn."""
-    for number in range(frames):
-        yield lambda studio, first=number == 0: None if first else studio.turn(360.0 / frames)
+def turntable(studio: Studio, count: int) -> Iterator[Rgb]:
+    """Yield the images of one whole turn."""
+    for _ in range(count):
+        yield studio.draw()
+        studio.turn(360.0 / count)
 
 
-def frame_by_frame(feed: SurfaceFeed) -> Iterator[Step | None]:
-    """Return a step for each surface of a feed, or None while the next one is not ready."""
-    while True:
-        try:
-            surface = feed.surfaces.get_nowait()
-        except queue.Empty:
-            yield None
-            continue
-        if surface is None:
-            return
-        yield lambda studio, surface=surface: studio.scene.show_surface(surface)
+def playback(studio: Studio, surfaces: Iterable[Surface]) -> Iterator[Rgb]:
+    """Yield an image of each surface."""
+    for surface in surfaces:
+        studio.scene.show_surface(surface)
+        yield studio.draw()
 
 
-class SurfaceFeed:
-    """Passes surfaces from the thread that makes them to the movie."""
-
-    def __init__(self) -> None:
-        self.surfaces: queue.Queue[Surface | None] = queue.Queue(maxsize=2)
-        self.ended = threading.Event()
-
-    def put(self, surface: Surface | None) -> bool:
-        """Pass on the next surface, None for the end. Return False if they are no longer needed."""
-        while not self.ended.is_set():
-            try:
-                self.surfaces.put(surface, timeout=0.1)
-            except queue.Full:
-                continue
-            return True
-        return False
+def watched(images: Iterable[Rgb], progress: QProgressDialog) -> Iterator[Rgb]:
+    """Yield images, and show how many there were, until the user cancels."""
+    for number, rgb in enumerate(images, 1):
+        progress.setValue(number)  # also handles the events of the window
+        if progress.wasCanceled():
+            raise MovieCancelled
+        yield rgb
 
 
-class ProgressDialog(QDialog):
-    """Shows the progress of a movie, and cancels it.
+def write_movie(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
+    """Write images to an MP4 (MPEG-4 part 2) or GIF file, completely or not at all.
 
     Parameters
     ----------
-    count : int
-        Frames of the movie.
-    parent : QWidget
-        Owner.
-    """
-
-    def __init__(self, count: int, parent: QWidget) -> None:
-        super().__init__(parent)
-        named(self, "view3d.movie.progress", tr("Saving the movie"))
-        self.setWindowTitle(tr("Saving the movie"))
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.bar = named(QProgressBar(), "view3d.movie.bar", tr("Frames saved"))
-        self.bar.setRange(0, count)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
-        buttons.rejected.connect(self.reject)
-        column = QVBoxLayout(self)
-        column.addWidget(self.bar)
-        column.addWidget(buttons)
-
-
-class MovieMaker(QObject):
-    """Draws and writes one frame whenever the window is idle.
-
-    Parameters
-    ----------
-    studio : Studio
-        Draws the frames. Closed at the end.
     path : Path
-        The file: complete at the end, or not created.
+        Ends with ``.mp4`` or ``.gif``.
     rate_hz : float
         Frames per second.
-    steps : iterator
-        The change for each frame. None: wait.
+    images : iterable of (height, width, 3) uint8
+        All of the same size.
+
+    Returns
+    -------
     count : int
         Number of frames.
-    parent : QWidget
-        Owner of the progress dialog.
 
-    Signals
-    -------
-    ended(str, str)
-        The result, as a sentence and its kind: ``pass``, ``warn`` or ``fail``.
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
     """
+    if path.suffix.lower() == ".gif":
+        return _write_gif(path, rate_hz, images)
+    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
+    video, count = cv2.VideoWriter(), 0
+    try:
+        for rgb in images:
+            # The codec only accepts even sizes.
+            rgb = rgb[: rgb.shape[0] // 2 * 2, : rgb.shape[1] // 2 * 2]
+            if not count:
+                code, size = cv2.VideoWriter.fourcc(*"mp4v"), (rgb.shape[1], rgb.shape[0])
+                video.open(str(partial), code, rate_hz, size)
+            video.write(cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2BGR))
+            count += 1
+        video.release()
+        if not partial.is_file() or partial.stat().st_size == 0:
+            raise _refusal(path)
+        partial.replace(path)
+    finally:
+        video.release()
+        partial.unlink(missing_ok=True)
+    return count
 
-    ended = Signal(str, str)
 
-    def __init__(
-        self, studio: Studio, path: Path, rate_hz: float, steps: Iterator[Step | None],
-        count: int, *, parent: QWidget,
-    ) -> None:  # fmt: skip
-        super().__init__(parent)
-        self._studio, self._path, self._steps = studio, path, steps
-        self._writer = MovieWriter(path, rate_hz)
-        self._done = 0
-        self._progress = ProgressDialog(count, parent)
-        self._progress.rejected.connect(self.cancel)
-        self._progress.open()
-        self._timer = QTimer(self)
-        self._timer.timeout.connect(self._draw_next)
-        self._timer.start(0)
+def _write_gif(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
+    frames = [Image.fromarray(rgb).convert("P", palette=Image.Palette.ADAPTIVE) for rgb in images]
+    if not frames:
+        raise _refusal(path)
+    step_ms = max(round(1e3 / rate_hz), 20)  # programs show shorter steps at another rate
+    write_atomically(
+        path,
+        lambda file: frames[0].save(
+            file, "GIF", save_all=True, append_images=frames[1:], duration=step_ms, loop=0
+        ),
+    )
+    return len(frames)
 
-    def cancel(self) -> None:
-        """Stop, and delete the unfinished file."""
-        if self._timer.isActive():
-            self._writer.cancel()
-            self._end(tr("Saving the movie was cancelled."), "warn")
 
-    def _draw_next(self) -> None:
-        try:
-            step = next(self._steps)
-        except StopIteration:
-            self._finish()
-            return
-        self._timer.setInterval(WAIT_MS if step is None else 0)
-        if step is None:
-            return
-        try:
-            step(self._studio)
-            self._writer.add(self._studio.draw())
-        except InputError as error:
-            self._end(str(error), "fail")
-            return
-        self._done += 1
-        self._progress.bar.setValue(self._done)
-
-    def _finish(self) -> None:
-        try:
-            self._writer.finish()
-        except InputError as error:
-            self._end(str(error), "fail")
-        else:
-            words = tr("Movie of {n} frames saved to {path}")
-            self._end(words.format(n=self._done, path=self._path), "pass")
-
-    def _end(self, sentence: str, kind: str) -> None:
-        self._timer.stop()
-        self._studio.close()
-        self._progress.rejected.disconnect()
-        self._progress.accept()
-        self.ended.emit(sentence, kind)
-        self.deleteLater()
+def _refusal(path: Path) -> InputError:
+    return InputError(
+        tr("The movie cannot be written"),
+        where=str(path),
+        advice=tr("Choose another folder, or GIF instead of MP4"),
+    )

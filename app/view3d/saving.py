@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QFileDialog, QProgressDialog, QWidget
 
 from app.services.settings import Settings
 from app.view3d.image_dialog import ImageChoice, ImageDialog, MovieChoice, MovieDialog
 from app.view3d.panel import SurfacePanel
 from app.view3d.surface import Surface
+from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.translation import tr
 
-# Plays the recording of a page for a movie: gets a function that takes each surface until it
-# returns False. Returns the number of frames.
-Player = Callable[[Callable[[Surface | None], bool]], int]
+# The recording of a page for a movie: the number of its frames, and their surfaces.
+Played = tuple[int, Iterator[Surface]]
 
 
 class ViewSaving(QObject):
@@ -37,7 +37,7 @@ class ViewSaving(QObject):
     settings : Settings
         Store the last folder.
     player : callable, optional
-        Returns a Player while a recording is open, else None.
+        Returns the frames of the open recording, or None.
 
     Signals
     -------
@@ -53,7 +53,7 @@ class ViewSaving(QObject):
         owner: QWidget,
         *,
         settings: Settings,
-        player: Callable[[], Player | None] = lambda: None,
+        player: Callable[[], Played | None] = lambda: None,
     ) -> None:
         super().__init__(owner)
         self._panel, self._owner, self._settings, self._player = panel, owner, settings, player
@@ -104,23 +104,35 @@ class ViewSaving(QObject):
             self.save_movie(path, choice)
 
     def save_movie(self, path: Path, choice: MovieChoice) -> None:
-        """Save a movie, frame by frame."""
-        from app.view3d.images import Studio
-        from app.view3d.movie import MovieMaker, SurfaceFeed, frame_by_frame, turntable
+        """Save a movie, frame by frame. It can be cancelled."""
+        from app.view3d.images import studio
+        from app.view3d.movie import MovieCancelled, playback, turntable, watched, write_movie
 
         assert self._panel.view is not None
         if path.suffix.lower() not in (".mp4", ".gif"):
             path = path.with_suffix(".mp4")
-        feed, player = SurfaceFeed(), self._player()
-        if choice.what == "recording" and player is not None:
-            count, steps = player(feed.put), frame_by_frame(feed)
-        else:
-            count = max(round(choice.rate_hz * choice.seconds), 2)
-            steps = turntable(count)
-        studio = Studio(self._panel.view.scene, choice.size)
-        maker = MovieMaker(studio, path, choice.rate_hz, steps, count, parent=self._owner)
-        maker.ended.connect(feed.ended.set)
-        maker.ended.connect(self.reported)
+        count = max(round(choice.rate_hz * choice.seconds), 2)
+        played = self._player() if choice.what == "recording" else None
+        progress = QProgressDialog(tr("Saving the movie"), tr("Cancel"), 0, count, self._owner)
+        named(progress, "view3d.movie.progress", tr("Saving the movie"))
+        progress.setWindowModality(Qt.WindowModality.WindowModal)
+        progress.setMinimumDuration(0)
+        with studio(self._panel.view.scene, choice.size) as opened:
+            images = turntable(opened, count)
+            if played is not None:
+                progress.setMaximum(played[0])
+                images = playback(opened, played[1])
+            try:
+                done = write_movie(path, choice.rate_hz, watched(images, progress))
+            except InputError as error:
+                self.reported.emit(str(error), "fail")
+            except MovieCancelled:
+                self.reported.emit(tr("Saving the movie was cancelled."), "warn")
+            else:
+                text = tr("Movie of {n} frames saved to {path}")
+                self.reported.emit(text.format(n=done, path=path), "pass")
+            finally:
+                progress.deleteLater()
 
     def _ask_path(self, ending: str, title: str, kinds: str) -> Path | None:
         name = f"surface-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.{ending}"

@@ -19,6 +19,7 @@ from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
 from app.live.zero import FRAMES, zero_calibration
 from app.sources.processor import Outcome
+from app.view3d.image_dialog import MovieChoice
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -252,9 +253,9 @@ def test_the_frame_that_is_shown_is_exported_as_reconstructed(
         np.testing.assert_array_equal(stored["depth_mm"], last.heightmap.depth_mm)
 
 
-def test_a_recording_is_made_and_replayed(
+def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     page: InspectPage, presses: Path, context: AppContext, small_calibration: Calibration,
-    qtbot: QtBot,
+    tmp_path: Path, qtbot: QtBot,
 ) -> None:  # fmt: skip
     page.enter()
     _use(page, small_calibration)
@@ -271,6 +272,13 @@ def test_a_recording_is_made_and_replayed(
     assert page.replay.isVisible()
     source = page.live.stream.source  # type: ignore[union-attr]
     assert source.header.calibration_id == small_calibration.identity  # type: ignore[attr-defined]
+    qtbot.waitUntil(lambda: page.views.surface.view is not None, timeout=WAIT_MS)
+    choice = MovieChoice("recording", (160, 120), 10.0, 1.0)
+    page.file_actions.saving.save_movie(tmp_path / "press.mp4", choice)
+    movie = cv2.VideoCapture(str(tmp_path / "press.mp4"))
+    assert movie.get(cv2.CAP_PROP_FRAME_COUNT) == source.playback().count  # type: ignore[attr-defined]
+    shown = page.views.height.map.shown_images
+    qtbot.waitUntil(lambda: page.views.height.map.shown_images > shown, timeout=WAIT_MS)
 
 
 def test_reopening_the_camera_ends_the_recording(

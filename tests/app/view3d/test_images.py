@@ -8,18 +8,18 @@ import cv2
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
+from PySide6.QtCore import QTimer
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QPushButton, QWidget
-from pytestqt.qtbot import QtBot
+from PySide6.QtWidgets import QProgressDialog, QPushButton
 
 from app.services.settings import Settings
 from app.view3d.image_dialog import ImageChoice, MovieChoice
-from app.view3d.images import MovieWriter, image_of
-from app.view3d.movie import ProgressDialog
+from app.view3d.images import image_of
+from app.view3d.movie import write_movie
 from app.view3d.panel import SurfacePanel
 from app.view3d.saving import ViewSaving
 from gelpolight_core.errors import InputError
-from tests.app.view3d.conftest import WAIT_MS, Made, pixels
+from tests.app.view3d.conftest import Made, pixels
 
 
 @pytest.fixture
@@ -75,11 +75,10 @@ def test_the_image_is_copied(panel: SurfacePanel, saving: ViewSaving) -> None:
 
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
 def test_a_turntable_turns_once(
-    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, ending: str, qtbot: QtBot
+    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, ending: str
 ) -> None:
     path = tmp_path / f"turn.{ending}"
-    with qtbot.waitSignal(saving.reported, timeout=WAIT_MS):
-        saving.save_movie(path, MovieChoice("turntable", (240, 180), 5.0, 1.2))
+    saving.save_movie(path, MovieChoice("turntable", (240, 180), 5.0, 1.2))
     frames = _frames(path)
     assert len(frames) == 6 and frames[0].shape == (180, 240, 3)
     assert np.abs(frames[0].astype(int) - frames[3]).mean() > 2.0  # half way round
@@ -98,44 +97,43 @@ def _frames(path: Path) -> list[np.ndarray]:
         frames.append(bgr[..., ::-1])
 
 
+@pytest.mark.parametrize("ending", ["mp4", "gif"])
 def test_a_cancelled_movie_leaves_no_file(
-    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, qtbot: QtBot
+    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, ending: str
 ) -> None:
     reported = _reported(saving)
-    saving.save_movie(tmp_path / "turn.mp4", MovieChoice("turntable", (240, 180), 30.0, 10.0))
-    progress = panel.findChild(ProgressDialog, "view3d.movie.progress")
-    assert progress is not None
-    qtbot.waitUntil(lambda: progress.bar.value() > 1, timeout=WAIT_MS)
-    progress.findChild(QPushButton).click()
+
+    def cancel() -> None:
+        progress = panel.findChild(QProgressDialog, "view3d.movie.progress")
+        assert progress is not None
+        if progress.value() > 1:
+            progress.findChild(QPushButton).click()
+            timer.stop()
+
+    timer = QTimer(panel)
+    timer.timeout.connect(cancel)
+    timer.start(10)
+    choice = MovieChoice("turntable", (240, 180), 30.0, 10.0)
+    saving.save_movie(tmp_path / f"turn.{ending}", choice)
     assert [kind for _, kind in reported] == ["warn"]
     assert [p.name for p in tmp_path.iterdir() if "turn" in p.name] == []
 
 
 def test_a_recording_is_saved_surface_by_surface(
-    panel: SurfacePanel, settings: Settings, made: Made, tmp_path: Path, qtbot: QtBot
+    panel: SurfacePanel, settings: Settings, made: Made, tmp_path: Path
 ) -> None:
     surfaces = [made(factor=factor, largest=128) for factor in (0.1, 0.5, 1.0)]
-
-    def player(put):  # type: ignore[no-untyped-def]
-        import threading
-
-        def feed() -> None:
-            for surface in (*surfaces, None):
-                put(surface)
-
-        threading.Thread(target=feed).start()
-        return len(surfaces)
-
-    saving = ViewSaving(panel, QWidget(panel), settings=settings, player=lambda: player)
-    with qtbot.waitSignal(saving.reported, timeout=WAIT_MS):
-        saving.save_movie(tmp_path / "film.mp4", MovieChoice("recording", (240, 180), 5.0, 1.0))
+    played = len(surfaces), iter(surfaces)
+    saving = ViewSaving(panel, panel, settings=settings, player=lambda: played)
+    saving.save_movie(tmp_path / "film.mp4", MovieChoice("recording", (240, 180), 5.0, 1.0))
     frames = _frames(tmp_path / "film.mp4")
     assert len(frames) == 3
     yellow = [int((np.abs(f.astype(int) - (253, 231, 37)).max(axis=2) < 60).sum()) for f in frames]
     assert yellow[2] > yellow[0]
 
 
-def test_a_movie_without_frames_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ending", ["mp4", "gif"])
+def test_a_movie_without_frames_is_refused(tmp_path: Path, ending: str) -> None:
     with pytest.raises(InputError):
-        MovieWriter(tmp_path / "none.mp4", 5.0).finish()
+        write_movie(tmp_path / f"none.{ending}", 5.0, [])
     assert not list(tmp_path.glob("*none*"))
