@@ -12,7 +12,7 @@ from app.live.advice import Known, LiveState, Size, advise
 from app.live.calibration_choice import CalibrationBox, CalibrationChoice
 from app.live.first_calibration import begin_first_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
-from app.live.gel_care import GelCareLog
+from app.live.gel_care import PressCounter
 from app.live.session import LiveSession
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
@@ -83,7 +83,7 @@ class LiveDepth(QObject):
         self._info: SourceInfo | None = None
         self._lost = self._failure = ""
         self._watch = HealthWatch()
-        self._gel = GelCareLog(self, context=context)
+        self._gel = PressCounter(self, context=context)
         self._fault: Finding | None = None
         self._shown_s: deque[float] = deque()
         self._tally = TraceTally()
@@ -194,7 +194,7 @@ class LiveDepth(QObject):
         return ", ".join(texts)
 
     def trace_text(self) -> str:
-        """Return the state of the gel and the computed steps, of the shown frame and minute."""
+        """Return the presses on the gel and the computed steps, of the shown frame and minute."""
         heightmap = None if self.last is None else self.last.heightmap
         if heightmap is None:
             return ""
@@ -278,7 +278,7 @@ class LiveDepth(QObject):
             return
         findings = self._watch.update(heightmap.health, shown.frame.time_s).findings
         if self._info is not None and self._info.kind in PRESSED_LIVE:
-            self._gel.follow(heightmap.calibration_id, self._watch.gel)
+            self._gel.follow(heightmap.calibration_id, self._watch.presses)
         self._set_fault(findings[0] if findings else None)
 
     def _set_fault(self, fault: Finding | None) -> None:

@@ -24,7 +24,6 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from app.workspace.entries import Entry, parse_time
-from app.workspace.gel_care import GelCare
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.quality import Verdict, verdict_word
@@ -76,12 +75,12 @@ class Details(QWidget):
         layout.addWidget(self.busy)
         layout.addWidget(self._area, 1)
 
-    def show_entry(self, entry: Entry | None, uses: str = "", care: GelCare | str = "") -> None:
-        """Show a calibration, or none; how often it was used, and the use of its gel."""
+    def show_entry(self, entry: Entry | None, uses: str = "", presses: str = "") -> None:
+        """Show a calibration, or none; how often it was used, and the presses on its gel."""
         summary = None if entry is None else entry.summary
         self.gel.setVisible(summary is not None)
         if summary is not None:
-            self.gel.show_gel(summary.elastomer, care)
+            self.gel.show_gel(summary.elastomer, presses)
         if entry is None:
             self._title.setText("")
             self._facts.setText(tr("Select a calibration to see its quality."))

@@ -1,19 +1,17 @@
-"""The gel of a calibration: its name, its presses, and how fast it recovers from them."""
+"""The gel of a calibration: its name and its presses."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
-from app.context.gel_care_text import care_lines
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
-from app.workspace.gel_care import GelCare
 from gelpolight_core.translation import tr
 
 
 class GelCarePanel(QWidget):
-    """Shows the use of the gel since a calibration, with the name of the elastomer to edit.
+    """Shows the presses on the gel since a calibration, with the name of the elastomer to edit.
 
     Signals
     -------
@@ -45,12 +43,12 @@ class GelCarePanel(QWidget):
         column.addLayout(row)
         column.addWidget(self._care)
 
-    def show_gel(self, elastomer: str, care: GelCare | str) -> None:
-        """Show the name of the elastomer, and its use or why that is not known."""
+    def show_gel(self, elastomer: str, presses: str) -> None:
+        """Show the name of the elastomer, and its presses or why they are not known."""
         if elastomer != self._name or not self.elastomer.hasFocus():
             self._name = elastomer
             self.elastomer.setText(elastomer)
-        self._care.setText(care if isinstance(care, str) else ". ".join(care_lines(care)) + ".")
+        self._care.setText(presses)
 
     def _on_edited(self) -> None:
         name = self.elastomer.text().strip()

@@ -30,7 +30,7 @@ from app.services.jobs import Job, Jobs
 from app.widgets.actions import make_action
 from app.widgets.naming import named
 from app.workspace.entries import Entry
-from app.workspace.gel_care import GelCare, read_gel_care
+from app.workspace.gel_care import presses_text, read_presses
 from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
@@ -304,7 +304,7 @@ class SensorsPage(QWidget):
 
     def _show_chosen(self) -> None:
         entry = self.chosen()
-        self._details.show_entry(entry, self._uses(entry), self._care(entry))
+        self._details.show_entry(entry, self._uses(entry), self._presses(entry))
         self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
         self.report.setEnabled(entry is not None and not entry.broken and not self._writing)
         self.reveal.setEnabled(entry is not None)
@@ -319,15 +319,15 @@ class SensorsPage(QWidget):
         except InputError as error:
             return str(error)
 
-    def _care(self, entry: Entry | None) -> GelCare | str:
-        """Return the use of the gel since a calibration, or why that is not known."""
+    def _presses(self, entry: Entry | None) -> str:
+        """Return the presses on the gel since a calibration, or why they are not known."""
         if entry is None or entry.summary is None:
-            return GelCare()
+            return ""
         try:
-            care = read_gel_care(self._context.workspace.folder)
+            presses = read_presses(self._context.workspace.folder)
         except InputError as error:
             return str(error)
-        return care.get(entry.summary.identity, GelCare())
+        return presses_text(presses.get(entry.summary.identity, 0))
 
     def _on_elastomer(self, name: str) -> None:
         self._with_chosen(lambda entry: self._library.name_elastomer(entry, name))

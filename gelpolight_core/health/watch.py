@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,23 +30,6 @@ LEAST_CHANGE = 0.05
 STRONGEST = 12
 APART_S = 0.5
 """A press counts as another one if the gel was free for so long before it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Gel:
-    """The presses that a watch has seen.
-
-    Attributes
-    ----------
-    presses : int
-        Their number.
-    recovery_s : float or None
-        Time from the first frame after the last press until less than 1 % of it was left; None
-        until then.
-    """
-
-    presses: int = 0
-    recovery_s: float | None = None
 
 
 class HealthWatch:
@@ -85,9 +67,9 @@ class HealthWatch:
         return health_of(lasting, unknown=health.unknown, untouched=health.untouched)
 
     @property
-    def gel(self) -> Gel:
-        """The presses seen so far, and how the gel recovered from the last one."""
-        return self._recovery.gel
+    def presses(self) -> int:
+        """Number of presses seen so far."""
+        return self._recovery.presses
 
     def _lasted(self, key: str) -> bool:
         return self._last[key][0] - self._since[key] >= LASTING_S
@@ -98,14 +80,13 @@ class Recovery:
 
     Attributes
     ----------
-    gel : Gel
-        The presses seen so far. A press that was there from the start is not among them.
+    presses : int
+        Number of presses seen so far. One that was there from the start is not among them.
     """
 
     def __init__(self) -> None:
-        self.gel = Gel()
-        self._was_free = False
-        self._freed_s = 0.0
+        self.presses = 0
+        self._was_free = self._recovered = False
         self._pattern: Array | None = None
         self._size = 0.0
         self._pressed_s = 0.0
@@ -133,8 +114,7 @@ class Recovery:
             self._pressed_s = time_s
             self._left.clear()
             return None
-        if not self._was_free:
-            self._was_free, self._freed_s = True, time_s
+        self._was_free = True
         if self._pattern is None:
             return None
         square = float((self._pattern**2).sum())
@@ -143,8 +123,7 @@ class Recovery:
             self._left.popleft()
         now = self._left[-1][1]
         if now < RECOVERED:
-            if self.gel.presses and self.gel.recovery_s is None:
-                self.gel = Gel(self.gel.presses, time_s - self._freed_s)
+            self._recovered = True
             return None
         first_s, first = self._left[0]
         return now if time_s - first_s >= FALLS_S and now < FALLS * first else None
@@ -152,9 +131,9 @@ class Recovery:
     def _count(self, time_s: float) -> None:
         """Add a pressed frame; count the press if it is a new one."""
         apart = bool(self._left) and time_s - self._pressed_s >= APART_S
-        another = self._pattern is None or self.gel.recovery_s is not None or apart
-        if self._was_free and another:
-            self.gel = Gel(self.gel.presses + 1)
+        if self._was_free and (self._pattern is None or self._recovered or apart):
+            self.presses += 1
+            self._recovered = False
         self._was_free = False
 
 

@@ -70,7 +70,7 @@ class FormPage(QScrollArea):
         self.serial.setPlaceholderText(tr("for example A-001"))
         self.elastomer = named(
             QLineEdit(), "setup.elastomer", tr("Name or serial number of the elastomer"),
-            tr("Tells elastomers apart: presses and recovery times are kept for it. May be empty"),
+            tr("Tells elastomers apart: the presses are counted for each. May be empty"),
         )  # fmt: skip
         self.elastomer.setMaxLength(ELASTOMER_LENGTH)
         self.elastomer.setPlaceholderText(tr("for example gel 7"))

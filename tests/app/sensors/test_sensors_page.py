@@ -22,7 +22,6 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
-from app.context.gel_care_text import care_lines
 from app.sensors.gel_care import GelCarePanel
 from app.sensors.model import cells_of
 from app.sensors.page import SensorsPage
@@ -32,7 +31,7 @@ from app.services.settings import Limits
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.question import Question
 from app.workspace.entries import read_entry
-from app.workspace.gel_care import GelCare, write_gel_care
+from app.workspace.gel_care import presses_text, write_presses
 from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
@@ -321,12 +320,10 @@ def test_the_gel_of_a_calibration_is_shown_and_named(
     page.open_path(source)
     chosen = page.chosen()
     assert chosen is not None and chosen.summary is not None
-    care = GelCare(12, (0.5,), (0.8,))
-    write_gel_care({chosen.summary.identity: care}, context.workspace.folder)
+    write_presses({chosen.summary.identity: 12}, context.workspace.folder)
     page.refresh()
     panel = page.findChild(GelCarePanel)
-    shown = panel.findChild(QLabel, "sensors.gel.care").text()
-    assert all(line in shown for line in care_lines(care))
+    assert panel.findChild(QLabel, "sensors.gel.care").text() == presses_text(12)
     panel.elastomer.setFocus()
     qtbot.keyClicks(panel.elastomer, "gel 7")
     qtbot.keyClick(panel.elastomer, Qt.Key.Key_Return)

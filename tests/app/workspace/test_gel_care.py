@@ -6,36 +6,33 @@ from pathlib import Path
 
 import pytest
 
-from app.workspace.gel_care import FILE, KEPT, GelCare, read_gel_care, write_gel_care
+from app.workspace.gel_care import FILE, read_presses, write_presses
 from gelpolight_core.errors import InputError
 
 
-def test_the_first_and_the_last_recovery_times_are_kept() -> None:
-    care = GelCare()
-    for n in range(30):
-        care = care.later(2, (0.1 * n,))
-    assert care.presses == 60
-    assert len(care.first_s) == len(care.last_s) == KEPT
-    assert care.early_s == pytest.approx(0.45)
-    assert care.lately_s == pytest.approx(2.45)
-    assert GelCare(3).lately_s is None
-
-
 def test_it_comes_back_and_a_workspace_without_it_has_none(tmp_path: Path) -> None:
-    assert read_gel_care(tmp_path / "new") == {}
-    care = {"S-1": GelCare(3, (0.5,), (0.5, 0.7)), "S-2": GelCare()}
-    write_gel_care(care, tmp_path / "new")
-    assert read_gel_care(tmp_path / "new") == care
+    assert read_presses(tmp_path / "new") == {}
+    presses = {"S-1": 3, "S-2": 0}
+    write_presses(presses, tmp_path / "new")
+    assert read_presses(tmp_path / "new") == presses
+
+
+def test_a_file_of_version_1_is_read(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_text(
+        '{"format": "gelpolight-gel-care", "version": 1, "calibrations": '
+        '{"S": {"presses": 7, "first_s": [0.5], "last_s": [0.8]}}}'
+    )
+    assert read_presses(tmp_path) == {"S": 7}
 
 
 @pytest.mark.parametrize(
     "text",
     ["{", '{"format": "other"}', '{"format": "gelpolight-gel-care", "version": 1}',
-     '{"format": "gelpolight-gel-care", "version": 2, "calibrations": {}}',
+     '{"format": "gelpolight-gel-care", "version": 3, "calibrations": {}}',
      '{"format": "gelpolight-gel-care", "version": 1, "calibrations": '
-     '{"S": {"presses": -1, "first_s": [], "last_s": []}}}'],
+     '{"S": {"presses": -1}}}'],
 )  # fmt: skip
 def test_a_damaged_or_newer_file_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE).write_text(text)
     with pytest.raises(InputError, match="list of presses"):
-        read_gel_care(tmp_path)
+        read_presses(tmp_path)
