@@ -17,8 +17,7 @@ from gelpolight_core.measurement.profile import (
     width_at,
     width_ends,
 )
-from gelpolight_core.measurement.profile_roughness import profile_roughness
-from gelpolight_core.measurement.roughness import roughness
+from gelpolight_core.measurement.roughness import profile_roughness, roughness
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 Point = tuple[float, float]
@@ -130,14 +129,14 @@ def cut(heightmap: HeightMap, section: Section, region: Rectangle | None) -> Cut
                 sentences.append(error.found)
         if section.cutoff_mm is not None:
             try:
-                figures.extend(profile_roughness(profile, cutoff_mm=section.cutoff_mm).figures)
+                figures.extend(profile_roughness(profile, cutoff_mm=section.cutoff_mm))
             except InputError as error:
                 sentences.append(str(error))
         if any(figure.name == "width" for figure in figures):
             ends = width_ends(profile, section.level_mm)
     if region is not None:
         try:
-            figures.extend(roughness(heightmap, region).figures)
+            figures.extend(roughness(heightmap, region))
         except InputError as error:
             sentences.append(error.found)
     return Cut(profiles, section.chosen, tuple(figures), tuple(dict.fromkeys(sentences)), ends)

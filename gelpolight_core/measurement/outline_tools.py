@@ -114,7 +114,7 @@ class RectangleTool:
             *sides,
             Measured(area.yaw_deg, None, "deg", "yaw"),
             *_depth_figures(heightmap, nodes),
-            *roughness(heightmap, area).figures,
+            *roughness(heightmap, area),
         )
         return tool_result(self, figures, (area.outline_mm,), nodes.flags)
 

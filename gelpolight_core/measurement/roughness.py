@@ -1,82 +1,40 @@
-"""Areal roughness of a region: Sa, Sq and Sz of ISO 25178-2."""
+"""Roughness of a region (Sa, Sq, Sz; ISO 25178-2) and of a profile (Ra, Rq, Rz; ISO 21920-2)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import Measured, map_errors, measured
+from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
-Levelled = Literal["plane", "none"]
+Parameters = tuple[Measured, Measured, Measured]
 UM = 1e3
 ERROR_NODES = 2000
 """Nodes at which errors are propagated. More nodes give the same result and take more time."""
+SECTIONS = 5
+"""Sections of one cut-off each in the evaluation length, as ISO 21920-3 sets by default."""
+ALPHA = math.sqrt(math.log(2.0) / math.pi)
+"""Of the Gaussian filter: it passes half of a wave as long as the cut-off (ISO 16610-21)."""
+LEAST_PITCHES = 5.0
+"""With a shorter cut-off, the result would show the grid of the map."""
 
 
-@dataclass(frozen=True, slots=True)
-class Roughness:
-    """Height parameters of a region.
+def roughness(heightmap: HeightMap, rectangle: Rectangle) -> Parameters:
+    """Return Sa, Sq and Sz of a region in um.
 
-    Attributes
-    ----------
-    sa_um, sq_um, sz_um : float
-        Arithmetic mean and root mean square of the height about the mean plane; highest peak plus
-        deepest pit.
-    count : int
-        Nodes in the region.
-    levelled : str
-        ``plane``: the least-squares plane was taken off; ``none``: only the mean height.
-    sd_um : (float, float, float) or None
-        Standard deviations of Sa, Sq and Sz; None where the height map states none.
-    noise_sq_um : float or None
-        The Sq of a smooth surface by the map's errors alone. A measured Sq near this value contains
-        no information on the surface.
-    """
-
-    sa_um: float
-    sq_um: float
-    sz_um: float
-    count: int
-    levelled: Levelled
-    sd_um: tuple[float, float, float] | None = None
-    noise_sq_um: float | None = None
-
-    @property
-    def figures(self) -> tuple[Measured, Measured, Measured]:
-        """Sa, Sq and Sz as measured values."""
-        sd = self.sd_um or (None, None, None)
-        return (
-            Measured(self.sa_um, sd[0], "um", "sa"),
-            Measured(self.sq_um, sd[1], "um", "sq"),
-            Measured(self.sz_um, sd[2], "um", "sz"),
-        )
-
-
-def roughness(
-    heightmap: HeightMap, rectangle: Rectangle, *, levelled: Levelled = "plane"
-) -> Roughness:
-    """Return the roughness of a region.
-
-    All nodes have the same weight. Only the plane is subtracted, without an S-filter or an
-    L-filter: the resolution of the camera replaces the S-filter, and waviness within the region is
-    included.
-
-    Parameters
-    ----------
-    heightmap : HeightMap
-        The surface.
-    rectangle : Rectangle
-        The region.
-    levelled : {"plane", "none"}, optional
-        What is subtracted first.
+    All nodes have the same weight. Only the least-squares plane is subtracted, without an S-filter
+    or an L-filter: the resolution of the camera replaces the S-filter, and waviness within the
+    region is included.
 
     Raises
     ------
@@ -89,22 +47,80 @@ def roughness(
     height), Sz (maximum height: maximum peak height plus maximum pit depth).
     """
     nodes = nodes_inside(heightmap, rectangle)
-    left = _levelled(nodes.x_mm, nodes.y_mm, nodes.depth_mm, levelled)
-    found = Roughness(_sa(left), _sq(left), _sz(left), left.size, levelled)
     few = nodes.thinned(ERROR_NODES)
     errors = map_errors(heightmap, few.x_mm, few.y_mm)
-    if errors is None:
-        return found
+    height = _levelled(nodes.x_mm, nodes.y_mm, nodes.depth_mm)
 
-    def sd(height_parameter: Callable[[Array], float]) -> float:
-        def compute(depth: Array, stretch: float) -> float:
-            return height_parameter(_levelled(few.x_mm, few.y_mm, depth, levelled))
+    def figure(name: str, parameter: Callable[[Array], float]) -> Measured:
+        def compute(depths: Array, stretch: float) -> float:
+            return UM * parameter(_levelled(few.x_mm, few.y_mm, depths))
 
-        return measured("", "um", compute, few.depth_mm, errors).sd or 0.0
+        of_few = measured(name, "um", compute, few.depth_mm, errors)
+        return replace(of_few, value=UM * parameter(height))
 
-    alone = [_levelled(few.x_mm, few.y_mm, error, levelled) for error in errors.depth_mm]
-    noise = math.sqrt(float(np.mean([_sq(error) ** 2 for error in alone])))
-    return replace(found, sd_um=(sd(_sa), sd(_sq), sd(_sz)), noise_sq_um=noise)
+    return figure("sa", _mean), figure("sq", _rms), figure("sz", lambda z: float(np.ptp(z)))
+
+
+def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> Parameters:
+    """Return Ra, Rq and Rz of a profile in um.
+
+    The least-squares line is subtracted, then the Gaussian filter separates roughness from
+    waviness. Half a cut-off at each end is not used, because the filter has too few neighbours
+    there. There is no filter for the shortest waves (Nis): the camera's resolution replaces it.
+
+    Parameters
+    ----------
+    profile : Profile
+        From :func:`~gelpolight_core.measurement.profile.take_profile`.
+    cutoff_mm : float, optional
+        Longest wave that counts as roughness (Nic, formerly lambda c).
+
+    Raises
+    ------
+    InputError
+        If the line is too short for the cut-off, leaves the working area, or the cut-off is not
+        longer than the map resolves.
+
+    References
+    ----------
+    ISO 21920-2:2021 (Ra, Rq, Rz; Ra and Rz as in ISO 4287 for five sections), ISO 21920-3:2021
+    (sections), ISO 16610-21:2011, Eq. (1) (Gaussian filter).
+    """
+    _check_cutoff(cutoff_mm, profile.pitch_mm)
+    inside = _inside(profile)
+    step, count = float(profile.along_mm[1] - profile.along_mm[0]), inside.stop - inside.start
+    section = max(round(cutoff_mm / step), 1)
+    sections = min((count - 2 * math.ceil(0.5 * section)) // section, SECTIONS)
+    if sections < 1:
+        raise InputError(
+            tr("a line of {length:.2f} mm is too short for a cut-off of {cutoff:g} mm").format(
+                length=step * count, cutoff=cutoff_mm
+            ),
+            where=tr("profile roughness"),
+            advice=tr("Draw a line of at least two cut-offs; six allow the standard evaluation"),
+        )
+    first = (count - sections * section) // 2
+    errors = profile.errors and replace(profile.errors, depth_mm=profile.errors.depth_mm[:, inside])
+
+    def figure(name: str, parameter: Callable[[Array], float]) -> Measured:
+        def compute(depths: Array, stretch: float) -> float:
+            rough = depths - _waves(depths, step, cutoff_mm)
+            return UM * parameter(rough[first : first + sections * section])
+
+        return measured(name, "um", compute, profile.depth_mm[inside], errors)
+
+    def rz(z: Array) -> float:
+        return float(np.mean(np.ptp(z.reshape(sections, section), axis=1)))
+
+    return figure("ra", _mean), figure("rq", _rms), figure("rz", rz)
+
+
+def _mean(height: Array) -> float:
+    return float(np.mean(np.abs(height)))
+
+
+def _rms(height: Array) -> float:
+    return math.sqrt(float(np.mean(height**2)))
 
 
 def fit_plane(x_mm: Array, y_mm: Array, depth_mm: Array) -> tuple[float, float, float]:
@@ -115,21 +131,67 @@ def fit_plane(x_mm: Array, y_mm: Array, depth_mm: Array) -> tuple[float, float, 
     return level, slope_x, slope_y
 
 
-def _levelled(x_mm: Array, y_mm: Array, depth_mm: Array, how: Levelled) -> Array:
-    if how == "none":
-        return np.asarray(depth_mm - depth_mm.mean())
+def _levelled(x_mm: Array, y_mm: Array, depth_mm: Array) -> Array:
     level, slope_x, slope_y = fit_plane(x_mm, y_mm, depth_mm)
     plane = level + slope_x * (x_mm - x_mm.mean()) + slope_y * (y_mm - y_mm.mean())
     return np.asarray(depth_mm - plane)
 
 
-def _sa(height_mm: Array) -> float:
-    return UM * float(np.mean(np.abs(height_mm)))
+def gaussian_mean_line(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Array:
+    """Return the mean line of the Gaussian profile filter, (n,).
+
+    Parameters
+    ----------
+    depth_mm : (n,)
+        Finite depths at equal distances.
+    step_mm, cutoff_mm : float
+        Their distance, and the cut-off of the filter.
+
+    References
+    ----------
+    ISO 16610-21:2011, Eq. (1): s(x) = exp(-pi (x / (alpha lambda_c))^2) / (alpha lambda_c). At the
+    ends, the weights of the points that are there are scaled to a sum of 1.
+    """
+    reach = math.ceil(cutoff_mm / step_mm)
+    x = np.arange(-reach, reach + 1) * step_mm
+    weight = np.exp(-math.pi * (x / (ALPHA * cutoff_mm)) ** 2)
+    # "same" keeps the longer of the two lengths.
+    count = depth_mm.size
+    total = np.convolve(depth_mm, weight)[reach : reach + count]
+    there = np.convolve(np.ones(count), weight)[reach : reach + count]
+    return np.asarray(total / there)
 
 
-def _sq(height_mm: Array) -> float:
-    return UM * math.sqrt(float(np.mean(height_mm**2)))
+def _waves(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Array:
+    """Return the least-squares line plus the mean line of what is left."""
+    x = np.arange(depth_mm.size) * step_mm
+    slope, level = np.polyfit(x - x.mean(), depth_mm, 1)
+    line = level + slope * (x - x.mean())
+    return np.asarray(line + gaussian_mean_line(depth_mm - line, step_mm, cutoff_mm))
 
 
-def _sz(height_mm: Array) -> float:
-    return UM * float(np.ptp(height_mm))
+def _check_cutoff(cutoff_mm: float, pitch_mm: float) -> None:
+    if math.isfinite(cutoff_mm) and cutoff_mm >= LEAST_PITCHES * pitch_mm:
+        return
+    raise InputError(
+        tr(
+            "the cut-off is {cutoff:g} mm, but the points of the map are {pitch:.3f} mm apart"
+        ).format(cutoff=cutoff_mm, pitch=pitch_mm),
+        where=tr("profile roughness"),
+        advice=tr("Choose at least {least:.2f} mm; 0.8 mm is usual").format(
+            least=LEAST_PITCHES * pitch_mm
+        ),
+    )
+
+
+def _inside(profile: Profile) -> slice:
+    """Return the part of a profile inside the working area."""
+    there = np.flatnonzero(np.isfinite(profile.depth_mm))
+    whole = there.size > 1 and there.size == there[-1] - there[0] + 1
+    if not whole:
+        raise InputError(
+            tr("the line crosses points without depth"),
+            where=tr("profile roughness"),
+            advice=tr("Draw it where the map has no gaps"),
+        )
+    return slice(int(there[0]), int(there[-1]) + 1)
