@@ -11,6 +11,7 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import TextIO
 
@@ -157,16 +158,25 @@ def _log_warning(
 def _write_log(text: str) -> Path | None:
     """Append to the log, in the temporary folder if necessary, and return its path."""
     entry = f"{datetime.now(UTC).isoformat()} gelpolight {__version__}\n{text}\n"
-    for folder in (platformdirs.user_log_path("gelpolight"), Path(tempfile.gettempdir())):
-        log = folder / LOG
+    for make_folder in (_log_folder, _private_folder):
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            log = make_folder() / LOG
             with log.open("a", encoding="utf-8") as stream:
                 stream.write(entry)
         except OSError:  # a full disk or a read-only home folder
             continue
         return log
     return None
+
+
+def _log_folder() -> Path:
+    return platformdirs.user_log_path("gelpolight", ensure_exists=True)
+
+
+@cache
+def _private_folder() -> Path:
+    """Return a new temporary folder, in which nobody else can have placed a link."""
+    return Path(tempfile.mkdtemp(prefix="gelpolight-log-"))
 
 
 if __name__ == "__main__":

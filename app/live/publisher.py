@@ -12,8 +12,10 @@ from gelpolight_core.translation import tr
 HOST, PORT = "127.0.0.1", 5557
 ANY_HOST = "0.0.0.0"
 """All networks of this computer."""
-WAITING = 2
+WAITING = 1
 """Messages that wait for a slow receiver. It loses the ones after them; the others lose none."""
+MOST_RECEIVED = 4096
+"""Bytes of one message from a receiver: subscriptions to a topic, and the protocol's own."""
 
 
 class Publisher:
@@ -52,6 +54,7 @@ class Publisher:
         self._socket = self._context.socket(self._zmq.PUB)
         self._socket.setsockopt(self._zmq.LINGER, 0)
         self._socket.setsockopt(self._zmq.SNDHWM, WAITING)
+        self._socket.setsockopt(self._zmq.MAXMSGSIZE, MOST_RECEIVED)
         try:
             self._socket.bind(f"tcp://{host}:{port or '*'}")
         except self._zmq.ZMQError as error:

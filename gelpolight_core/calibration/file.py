@@ -28,20 +28,19 @@ from gelpolight_core.calibration.manifest import (
     MANIFEST,
     UNREADABLE,
     VERSION,
+    check_arrays,
     damaged,
     declared_bytes,
     opened,
     quality_rows,
     read_manifest,
-    read_member,
     read_quality,
-    refuse_bomb,
 )
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.io.npy import array_of
-from gelpolight_core.io.reading import brief, plain_text, written_text
+from gelpolight_core.io.reading import brief, plain_text, read_member, written_text
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import MembraneGrid, visible_grid
@@ -140,7 +139,7 @@ def read_calibration(path: str | PathLike[str]) -> AnyCalibration:
     try:
         with opened(path) as archive:
             manifest = read_manifest(archive, path)
-            refuse_bomb(manifest["arrays"], archive)
+            check_arrays(manifest["arrays"], archive)
             arrays = {
                 name: _read_array(archive, name, entry)
                 for name, entry in manifest["arrays"].items()

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -17,13 +16,13 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import brief, parse_json, read_file
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr
 
 MOST_FRAMES = 80
 """Most images used, evenly selected, from folders with thousands of images of a robot's raster."""
-LABEL_LIMIT = 64_000
 TABLE_LIMIT = 20_000_000
 RADIUS_RANGE = (0.05, 500.0)
 FORMS = "catalog.csv, annotations/annotations.csv, annotate.csv"
@@ -208,10 +207,10 @@ def _text(table: Path) -> str:
 def _label(path: Path) -> PlacedCircle:
     """Return the circle of a label file: arrays ``center`` and ``radius``, pixels."""
     try:
-        with np.load(io.BytesIO(read_file(path, LABEL_LIMIT)), allow_pickle=False) as label:
-            x, y = np.asarray(label["center"], np.float64).ravel()
-            radius = float(np.asarray(label["radius"], np.float64).reshape(()))
-    except (ValueError, KeyError, TypeError, OSError, zipfile.BadZipFile) as error:
+        label = read_arrays(path, ("center", "radius"))
+        x, y = label["center"].astype(np.float64).ravel()
+        radius = float(label["radius"].astype(np.float64).reshape(()))
+    except (FileNotFoundError, ValueError, KeyError) as error:
         raise InputError(
             tr("The label contains no circle (center, radius)"),
             where=str(path),

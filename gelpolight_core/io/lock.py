@@ -41,10 +41,17 @@ class FileLock:
     """
 
     def __init__(self, path: Path, refusal: Callable[[str], InputError]) -> None:
+        # Others may write to this folder: a link placed there would redirect what is written.
+        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
         try:
-            self._handle: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            self._handle: int | None = os.open(path, flags, 0o666)
         except OSError as error:
+            if path.is_symlink():
+                raise _is_link(path) from error
             raise cannot_write(error, path) from error
+        if os.fstat(self._handle).st_nlink > 1:
+            self.release()
+            raise _is_link(path)
         try:
             # The system releases the lock with the process, even if it is killed.
             _lock(self._handle)
@@ -105,6 +112,14 @@ def _lock(handle: int) -> None:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
     else:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _is_link(path: Path) -> InputError:
+    return InputError(
+        tr("This file is a link to another file, which would be overwritten"),
+        where=str(path),
+        advice=tr("Remove the link, or choose a new folder"),
+    )
 
 
 def _name() -> str:

@@ -13,6 +13,8 @@ import os
 import re
 import stat
 import tomllib
+import zipfile
+from collections.abc import Collection
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -30,6 +32,10 @@ NAME_LIMIT = 200
 # Highest plausible version number; anything above it means a damaged file.
 NEWEST = 1_000_000
 LINES = "\n\t"
+# Limit for the declared size of all arrays: fixed for a small file, this multiple of the packed
+# size for a larger one.
+DECLARED_LIMIT = 64_000_000
+DECLARED_TIMES = 100
 
 
 def open_file(path: Path) -> BufferedReader:
@@ -80,6 +86,36 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
             where=str(path),
             advice=tr("Choose another file"),
         )
+    return data
+
+
+def refuse_bomb(members: Collection[zipfile.ZipInfo]) -> None:
+    """Refuse members that declare far more than an archive of their packed size can contain.
+
+    Raises
+    ------
+    ValueError
+        If they do, or if one is compressed in a way that this program does not use.
+    """
+    for info in members:
+        # Other compression methods declare the memory that they need.
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{brief(info.filename)} uses an unknown compression method")
+    declared = sum(info.file_size for info in members)
+    if declared > max(DECLARED_LIMIT, DECLARED_TIMES * sum(i.compress_size for i in members)):
+        raise ValueError(f"its arrays declare {declared} bytes")
+
+
+def read_member(archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
+    """Read a member whose declared size is within its limit, before memory is allocated."""
+    info = archive.getinfo(name)
+    if info.file_size > limit:
+        raise ValueError(f"{name} declares {info.file_size} bytes")
+    refuse_bomb((info,))
+    with archive.open(info) as stream:
+        data = stream.read(limit + 1)
+    if len(data) != info.file_size:
+        raise ValueError(f"{name} is truncated")
     return data
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.manifest import UNREADABLE, read_member
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.npy import array_of
-from gelpolight_core.io.reading import open_file
+from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.session.session import SensorData
 from gelpolight_core.translation import tr
 
 PLATEAU = 0.98
-# 64 megapixels of 8 bytes.
-MOST_BYTES = 512_000_000 + 4096
 KEYS = ("depth_mm", "x0_mm", "y0_mm", "pitch_mm")
 EDGE_MM = 1.0
 """Width of the edge of the working circle in which no depth is compared."""
@@ -156,18 +151,15 @@ def read_true_depth(path: Path) -> TrueDepth:
         If the file is missing, is not such a file, or lacks one of these.
     """
     try:
-        with open_file(path) as stream, zipfile.ZipFile(stream) as archive:
-            depth, x0, y0, pitch = (
-                array_of(read_member(archive, f"{key}.npy", MOST_BYTES)).astype(np.float64)
-                for key in KEYS
-            )
+        arrays = read_arrays(path, KEYS)
+        depth, x0, y0, pitch = (arrays[key].astype(np.float64) for key in KEYS)
     except FileNotFoundError as error:
         raise InputError(
             tr("The file does not exist"),
             where=str(path),
             advice=tr("Use a session that contains the true depth of its presses"),
         ) from error
-    except UNREADABLE as error:
+    except (ValueError, KeyError) as error:
         raise _not_a_truth(path) from error
     if not x0.size == y0.size == pitch.size == 1:
         raise _not_a_truth(path)

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import tempfile
+import tracemalloc
+import zipfile
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import MESH_FORMATS, write_heightmap
@@ -33,13 +41,97 @@ def test_a_mesh_has_its_size_in_mm(name: str, tmp_path: Path) -> None:
     assert bounds == pytest.approx((*x, *y, -deepest, 0.0), abs=1e-3)
 
 
-def test_a_height_map_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_height_rampis_read_as_it_was_written(tmp_path: Path) -> None:
     heightmap = _ramp()
     (path,) = write_heightmap(heightmap, tmp_path, formats=("npz",))
     again = read_npz(path)
     for name in ("depth_mm", "x_mm", "y_mm", "flags"):
         np.testing.assert_array_equal(getattr(again, name), getattr(heightmap, name))
     assert (again.pitch_mm, again.calibration_id) == (heightmap.pitch_mm, "T-1")
+
+
+def _written(heightmap: HeightMap, folder: Path, **changed: np.ndarray) -> Path:
+    """Write the map, with some of its arrays replaced, in NumPy's own way."""
+    (path,) = write_heightmap(heightmap, folder, formats=("npz",))
+    with np.load(path, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    np.savez_compressed(path, **(arrays | changed))
+    return path
+
+
+def test_a_file_that_another_program_compressed_is_read(tmp_path: Path) -> None:
+    heightmap = _ramp()
+    again = read_npz(_written(heightmap, tmp_path))
+    np.testing.assert_array_equal(again.depth_mm, heightmap.depth_mm)
+
+
+def test_numbers_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+    heightmap = _ramp()
+    contradictions = {
+        "pitch_mm": np.float64(2.0 * heightmap.pitch_mm),
+        "x_mm": heightmap.x_mm[::-1],
+        "y_mm": np.full_like(heightmap.y_mm, np.nan),
+        "depth_mm": 1e3 * heightmap.depth_mm,  # in micrometres
+        "flags": heightmap.flags[1:],
+        "flag_names": np.array(["dark=2"]),
+        "depth_sd_mm": np.full_like(heightmap.depth_mm, -1.0),
+        "model": np.array([object()]).astype("S8"),
+    }
+    for name, values in contradictions.items():
+        path = _written(heightmap, tmp_path, **{name: values})
+        with pytest.raises(InputError):
+            read_npz(path)
+
+
+@pytest.mark.parametrize("declared", [10**9, 10**11])
+def test_a_small_file_cannot_ask_for_large_memory(declared: int, tmp_path: Path) -> None:
+    path = _written(_ramp(), tmp_path)
+    header = str({"descr": "<f4", "fortran_order": False, "shape": (declared // 4,)})
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    members["depth_mm.npy"] = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little")
+    members["depth_mm.npy"] += header.encode()
+    zeros = zipfile.ZipInfo("normals.npy")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+        with archive.open(zeros, "w", force_zip64=True) as stream:
+            stream.write(bytes(200_000_000))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError):
+            read_npz(path)
+        assert tracemalloc.get_traced_memory()[1] < 100e6
+    finally:
+        tracemalloc.stop()
+
+
+@given(data=st.data())
+@settings(max_examples=100, deadline=None)
+def test_a_damaged_file_is_read_or_refused(data: st.DataObject) -> None:
+    content = bytearray(_npz_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    content = content[: data.draw(st.integers(0, len(content)))]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "damaged.npz"
+        path.write_bytes(content)
+        with contextlib.suppress(InputError):
+            read_npz(path)
+
+
+@cache
+def _npz_bytes() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        ramp = _ramp()
+        small = replace(
+            ramp,
+            depth_mm=ramp.depth_mm[:20, :30],
+            flags=ramp.flags[:20, :30],
+            x_mm=ramp.x_mm[:30],
+            y_mm=ramp.y_mm[:20],
+        )
+        return _written(small, Path(folder)).read_bytes()
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"\x93NUMPY"])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import getpass
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.lock import RunLock
+from gelpolight_core.io.lock import FILE, RunLock
 
 
 def test_a_second_program_gets_the_name_of_the_first(tmp_path: Path) -> None:
@@ -23,6 +24,19 @@ def test_a_run_that_was_left_can_be_written_by_another(tmp_path: Path) -> None:
     first.release()
     first.release()
     RunLock(tmp_path).release()
+
+
+@pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
+def test_a_link_in_place_of_the_lock_destroys_nothing(
+    link: Callable[[Path, Path], None], tmp_path: Path
+) -> None:
+    """Somebody else may write to the folder, too."""
+    theirs = tmp_path / "thesis.tex"
+    theirs.write_text("years of work")
+    link(tmp_path / FILE, theirs)
+    with pytest.raises(InputError, match="link"):
+        RunLock(tmp_path)
+    assert theirs.read_text() == "years of work"
 
 
 def test_a_system_that_knows_no_users_has_runs_too(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import sys
 import time
 from collections.abc import Iterator
@@ -26,12 +27,12 @@ def publisher() -> Iterator[Publisher]:
 @pytest.fixture
 def subscriber(publisher: Publisher) -> Iterator[Any]:
     context = zmq.Context()
-    socket = context.socket(zmq.SUB)
-    socket.setsockopt(zmq.LINGER, 0)
-    socket.subscribe("depth")
-    socket.connect(publisher.address)
-    yield socket
-    socket.close()
+    receiver = context.socket(zmq.SUB)
+    receiver.setsockopt(zmq.LINGER, 0)
+    receiver.subscribe("depth")
+    receiver.connect(publisher.address)
+    yield receiver
+    receiver.close()
     context.term()
 
 
@@ -74,3 +75,38 @@ def test_without_the_package_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "zmq", None)
     with pytest.raises(InputError, match="pip install"):
         Publisher(port=0)
+
+
+def test_a_slow_receiver_works_on_new_frames(publisher: Publisher) -> None:
+    """As the client of docs/streaming.md: it keeps one message, the sender one more."""
+    context = zmq.Context()
+    receiver = context.socket(zmq.SUB)
+    receiver.setsockopt(zmq.LINGER, 0)
+    receiver.setsockopt(zmq.RCVHWM, 1)
+    receiver.subscribe("depth")
+    receiver.connect(publisher.address)
+    try:
+        frame = bytes(9_000_000)  # more than the system's buffers hold
+        _received(publisher, receiver, [b"depth", b"first", frame])
+        for number in range(100):
+            publisher.send([b"depth", str(number).encode(), frame])
+        waiting = 0
+        while receiver.poll(500):
+            receiver.recv_multipart()
+            waiting += 1
+        assert waiting < 10
+    finally:
+        receiver.close()
+        context.term()
+
+
+def test_a_receiver_cannot_fill_the_memory_of_the_program(publisher: Publisher) -> None:
+    """A peer that speaks the protocol (ZMTP 3.0) declares a subscription of 1.5 GB."""
+    port = int(publisher.address.rpartition(":")[2])
+    greeting = b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32)
+    ready = b"\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB"
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as peer:
+        peer.sendall(greeting + b"\x04" + bytes([len(ready)]) + ready)
+        peer.sendall(b"\x02" + (1_500_000_000).to_bytes(8, "big") + b"\x01depth")
+        while peer.recv(4096):
+            pass  # the publisher closes the connection: otherwise this ends with a time-out
