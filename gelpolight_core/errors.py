@@ -41,7 +41,7 @@ class InputError(Exception):
 
     @property
     def text(self) -> str:
-        """Where, what and advice, as a text that can be translated later."""
+        """Where, what and advice, also in English."""
         where, found, advice = map(_printable, (self.where, self.found, self.advice))
         return pattern("{where}: {found}. {advice}.", where=where, found=found, advice=advice)
 

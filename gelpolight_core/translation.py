@@ -56,35 +56,38 @@ def current_language() -> str:
 
 
 class Text(str):
-    """A text in the user's language that remembers where it comes from.
-
-    Files store its template and its values (:mod:`gelpolight_core.io.texts`), so that it can be
-    shown in another language later.
+    """A text in the user's language that also knows its English, which files hold.
 
     Attributes
     ----------
-    template : str
-        The English text of the source, with its placeholders.
-    values : dict
-        What the placeholders stand for; empty until :meth:`format`.
+    english : str
+        The same text in English.
     """
 
-    template: str
-    values: dict[str, Any]
+    english: str
 
-    def __new__(cls, shown: str, template: str, values: dict[str, Any] | None = None) -> Text:
+    def __new__(cls, shown: str, english: str) -> Text:
         """Return a text that is shown as `shown`."""
         text = super().__new__(cls, shown)
-        text.template, text.values = template, values or {}
+        text.english = english
         return text
 
     def format(self, *args: object, **values: Any) -> Text:
         """Return the text with its placeholders filled; they have names."""
-        return Text(super().format(*args, **values), self.template, values)
+        in_english = {
+            name: english(value) if isinstance(value, str) else value
+            for name, value in values.items()
+        }
+        return Text(super().format(*args, **values), self.english.format(*args, **in_english))
 
-    def __reduce__(self) -> tuple[type[Text], tuple[str, str, dict[str, Any]]]:
+    def __reduce__(self) -> tuple[type[Text], tuple[str, str]]:
         """Return what a copy is made from."""
-        return Text, (str(self), self.template, self.values)
+        return Text, (str(self), self.english)
+
+
+def english(text: str) -> str:
+    """Return a text in English; one that is not from the program, such as a note, as it is."""
+    return text.english if isinstance(text, Text) else text
 
 
 def tr(text: str) -> str:
@@ -99,8 +102,8 @@ def pattern(template: str, **values: Any) -> str:
 
 def joined(separator: str, parts: Iterable[str]) -> str:
     """Return texts with a separator between them."""
-    values = {f"part{n}": part for n, part in enumerate(parts)}
-    return pattern(separator.join(f"{{{name}}}" for name in values), **values)
+    texts = list(parts)
+    return Text(separator.join(texts), separator.join(map(english, texts)))
 
 
 def marked(text: str) -> str:

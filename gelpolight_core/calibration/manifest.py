@@ -26,9 +26,9 @@ from gelpolight_core.io.reading import (
     refuse_bomb,
     written_text,
 )
-from gelpolight_core.io.texts import restored, stored
+from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.quality import Figure, QualityTable, Verdict
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import english, tr
 
 FORMAT = "gelpolight-calibration"
 # Version 1 has no membrane curves, standard deviations, manual edits or camera response.
@@ -182,9 +182,9 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
 
 
 def quality_rows(table: QualityTable) -> list[dict[str, Any]]:
-    """Return a quality table as it is stored: with texts that can be translated later."""
+    """Return a quality table as it is stored: with English texts."""
     return [
-        row | {key: stored(getattr(figure, key)) for key in _TEXTS}
+        row | {key: english(getattr(figure, key)) for key in _TEXTS}
         for row, figure in zip(table.as_rows(), table.figures, strict=True)
     ]
 
@@ -196,7 +196,7 @@ def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
 
 def _figure(row: dict[str, Any]) -> Figure:
     texts = {key: written_text(row[key]) for key in ("key", "unit")}
-    texts |= {key: restored(row[key]) for key in _TEXTS}
+    texts |= {key: text_of_file(row[key]) for key in _TEXTS}
     limits = {key: None if row[key] is None else _number(row[key]) for key in _LIMITS}
     return Figure(**{
         **row, **texts, **limits, "value": _number(row["value"]), "verdict": Verdict(row["verdict"])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import brief
-from gelpolight_core.io.texts import as_line, from_line
+from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
     SD_MAPS,
@@ -24,7 +24,7 @@ from gelpolight_core.reconstruction.height_map import (
     Flag,
     HeightMap,
 )
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import english, tr
 
 GREY_LEVELS = 65_535
 """Largest 16-bit value, as one value is reserved for unknown depths."""
@@ -86,8 +86,8 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         "calibration_id": np.array(heightmap.calibration_id),
         "model": np.array(heightmap.model),
         "source": np.array(heightmap.source),
-        "notes": np.array(heightmap.notes, dtype=np.str_),
-        "faults": np.array([as_line(fault) for fault in heightmap.faults], dtype=np.str_),
+        "notes": np.array([english(note) for note in heightmap.notes], dtype=np.str_),
+        "faults": np.array([english(fault) for fault in heightmap.faults], dtype=np.str_),
         "lateral_per_mm": np.float64(heightmap.lateral_per_mm),
     }
     if heightmap.normals is not None:
@@ -129,8 +129,8 @@ def read_npz(path: Path) -> HeightMap:
             x_mm=stored["x_mm"].astype(np.float64),
             y_mm=stored["y_mm"].astype(np.float64),
             flags=stored["flags"].astype(np.uint8, casting="safe"),
-            notes=tuple(texts.pop("notes", ())),
-            faults=tuple(from_line(text) for text in faults),
+            notes=tuple(map(text_of_file, texts.pop("notes", ()))),
+            faults=tuple(map(text_of_file, faults)),
             **values,
             **texts,
         )

@@ -18,9 +18,9 @@ import numpy as np
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.appending import append_durably
 from gelpolight_core.io.reading import parse_json, plain_text, read_file
-from gelpolight_core.io.texts import restored, stored
+from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import english, tr
 
 SIZE_LIMIT = 100_000_000
 PAIRS = ("side_mm", "centre_mm")
@@ -83,7 +83,7 @@ class Ledger:
         self._known[key] = outcome
         if self._path is None:
             return
-        plain = stored(outcome) if isinstance(outcome, str) else _as_json(outcome)
+        plain = english(outcome) if isinstance(outcome, str) else _as_json(outcome)
         line = json.dumps({"key": key, "outcome": plain}, separators=(",", ":")) + "\n"
         append_durably(self._path, line.encode())
 
@@ -100,7 +100,7 @@ class Ledger:
 
 def _failure(outcome: Any) -> str:
     """Return the sentence why an image has no measurement."""
-    text = restored(outcome)
+    text = text_of_file(outcome)
     plain_text(str(text))
     return text
 
@@ -117,7 +117,7 @@ def _as_json(measurement: Measurement) -> dict[str, Any]:
     """Return all fields; JSON writes numbers so that they are read back exactly."""
     plain = asdict(measurement)
     plain["outline_mm"] = measurement.outline_mm.tolist()
-    plain["reason"] = stored(measurement.reason)
+    plain["reason"] = english(measurement.reason)
     return plain
 
 
@@ -127,7 +127,7 @@ def _measurement(content: dict[str, Any]) -> Measurement:
     }
     for part in SPREADS:
         values[part] = _spread(content[part])
-    values["reason"] = restored(content["reason"])
+    values["reason"] = text_of_file(content["reason"])
     values["outline_mm"] = np.array(content["outline_mm"], np.float64)
     return Measurement(**values)
 

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from gelpolight_core.io.reading import parse_json, written_text
-from gelpolight_core.io.texts import as_line, from_line
+from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.translation import english
 
 # The size limit of one value of the database.
 MOST_TEXT = 10_000_000
@@ -28,7 +29,7 @@ def row_of(record: MeasurementRecord) -> tuple[str | None, ...]:
         record.calibration_id or None,
         record.shape,
         record.verdict,
-        as_line(record.reason),
+        english(record.reason),
         json.dumps(dict(record.settings), allow_nan=False),
         json.dumps(dict(record.details), allow_nan=False),
         record.operator,
@@ -76,7 +77,7 @@ def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRe
     texts = {name: written_text(row[name], MOST_TEXT) for name in _TEXTS}
     return MeasurementRecord(
         **texts,
-        reason=from_line(written_text(row["reason"], MOST_TEXT)),
+        reason=text_of_file(written_text(row["reason"], MOST_TEXT)),
         calibration_id=written_text(row["calibration_id"] or ""),
         quantities=quantities,
         settings=settings,

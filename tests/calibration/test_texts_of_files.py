@@ -27,7 +27,7 @@ def _same_language() -> Iterator[None]:
 def test_every_text_of_a_calibration_file_can_be_translated(
     small_calibration: Calibration, tmp_path: Path
 ) -> None:
-    """Also the advice that the technician needs when a figure fails."""
+    """Also the advice that the technician needs when a figure fails; with values it is English."""
     quality = small_calibration.quality
     for table in quality.values():
         for figure in table.figures:
@@ -46,7 +46,8 @@ def test_every_text_of_a_calibration_file_can_be_translated(
     german = read_calibration(path).quality["lens"]
     for one, other in zip(english.figures, german.figures, strict=True):
         assert (one.key, one.value) == (other.key, other.value)
-        assert one.label != other.label and (one.advice != other.advice or not one.advice)
+        assert one.label != other.label
+        assert one.advice != other.advice or not one.advice or one.key == "views_left_out"
 
 
 def test_plain_texts_of_older_files_are_read(small_calibration: Calibration) -> None:

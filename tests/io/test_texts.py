@@ -1,4 +1,4 @@
-"""Texts in files are read in the language of the reader, not in that of the writer."""
+"""Texts in files are English; the reader sees them in their language where they are whole."""
 
 from __future__ import annotations
 
@@ -10,8 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.texts import as_line, from_line, restored, stored
-from gelpolight_core.translation import Text, current_language, joined, pattern, tr, use_language
+from gelpolight_core.io.texts import text_of_file
+from gelpolight_core.translation import (
+    Text,
+    current_language,
+    english,
+    joined,
+    pattern,
+    tr,
+    use_language,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -31,28 +39,39 @@ def left_out() -> str:
 
 
 def test_a_text_is_shown_in_the_language_of_the_reader() -> None:
-    plain = json.loads(json.dumps(stored(tr("Views left out"))))
-    filled = json.loads(json.dumps(stored(tr("Reprojection error"))))
+    kept = english(tr("Views left out"))
     use_language("de")
-    assert restored(plain) == tr("Views left out") != "Views left out"
-    assert restored(filled) == tr("Reprojection error")
+    assert text_of_file(kept) == tr("Views left out") != "Views left out"
 
 
-def test_values_and_the_texts_among_them_are_translated_too() -> None:
-    kept = json.loads(json.dumps(stored(left_out())))
-    assert restored(kept) == left_out()
+def test_the_language_of_the_writer_leaves_no_trace() -> None:
+    """Neither in the text, nor in the texts among its values."""
+    kept = english(left_out())
+    assert kept == left_out()
     use_language("de")
     german = left_out()
-    assert restored(kept) == german and german != str(restored(kept["text"]))
-    assert json.loads(json.dumps(stored(german))) == kept  # the writer's language leaves no trace
+    assert german != kept == english(german) == text_of_file(kept)
 
 
-def test_a_line_of_a_table_holds_text_with_and_without_values() -> None:
-    assert as_line("typed by a person") == "typed by a person"
-    assert from_line(as_line(left_out())) == left_out()
-    assert from_line('{"a note": 1}') == '{"a note": 1}'
-    with pytest.raises(ValueError):
-        from_line('{"text": 1}')
+def test_a_text_of_the_catalogue_that_is_read_and_written_stays_english() -> None:
+    kept = english(tr("Views left out"))
+    use_language("de")
+    assert english(text_of_file(kept)) == kept
+
+
+def test_texts_of_older_files_are_filled() -> None:
+    """They hold a template with its values, in tables as JSON."""
+    names = {
+        "text": "{part0}; {part1}",
+        "values": {
+            f"part{k}": {"text": "{name} ({reason})", "values": {"name": n, "reason": "Too dark"}}
+            for k, n in enumerate(("a.png", "b"))
+        },
+    }
+    old = {"text": "Left out: {names}, {share:.0%}", "values": {"names": names, "share": 0.256}}
+    for value in (old, json.dumps(old, separators=(",", ":"))):
+        assert text_of_file(value) == "Left out: a.png (Too dark); b (Too dark), 26%"
+    assert text_of_file('{"a note": 1}') == '{"a note": 1}'
 
 
 @pytest.mark.parametrize(
@@ -60,18 +79,18 @@ def test_a_line_of_a_table_holds_text_with_and_without_values() -> None:
     ["{a:>999999999}", "{a.__class__}", "{a[0]}", "{b}", "{", "{a:.99f}", "{a!r}", "{a:{a}}"],
 )
 def test_a_forged_template_can_neither_fill_the_memory_nor_read_anything(template: str) -> None:
-    shown = restored({"text": template, "values": {"a": 1.5}})
+    shown = text_of_file({"text": template, "values": {"a": 1.5}})
     assert len(shown) < 120 and "class '" not in shown
 
 
 @pytest.mark.parametrize(
     "value",
-    [1, None, [], {"text": "a"}, {"text": "a", "values": []}, {"text": "a", "values": {"b": True}},
-     {"text": "a", "values": {"b": None}}, {"text": "a", "values": {}, "more": 1}],
+    [1, None, [], {"text": "a"}, {"text": "a", "values": []}, {"text": 1, "values": {}},
+     {"text": "a", "values": {}, "more": 1}, '{"text":1}', '{"text":'],
 )  # fmt: skip
 def test_what_is_no_text_is_refused(value: object) -> None:
     with pytest.raises(ValueError):
-        restored(value)
+        text_of_file(value)
 
 
 json_values = st.recursive(
@@ -84,15 +103,14 @@ json_values = st.recursive(
 @given(json_values)
 def test_any_value_of_a_file_gives_a_text_or_a_value_error(value: object) -> None:
     try:
-        shown = restored(value)
+        shown = text_of_file(value)
     except (ValueError, UnicodeEncodeError):
         return
     assert isinstance(shown, Text)
 
 
-def test_an_error_can_be_shown_in_another_language_later() -> None:
-    error = InputError(tr("Too dark"), where="balls/a.png", advice=tr("Use a shorter exposure"))
-    kept = stored(error.text)
-    assert restored(kept) == str(error)
+def test_an_error_has_its_english_sentence() -> None:
     use_language("de")
-    assert tr("Use a shorter exposure") in restored(kept)
+    error = InputError(tr("Too dark"), where="balls/a.png", advice=tr("Use a shorter exposure"))
+    assert english(error.text) == "balls/a.png: Too dark. Use a shorter exposure."
+    assert tr("Use a shorter exposure") in str(error)
