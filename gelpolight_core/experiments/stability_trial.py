@@ -217,7 +217,7 @@ def own_share(heightmap: HeightMap) -> float:
 
 def warnings_of(found: HeightMap) -> tuple[str, ...]:
     """Return the notes of a map that report an unreliable depth."""
-    harmless = {free_boundary_note()}
+    harmless = {free_boundary_note().text}
     if found.health is not None:
         harmless |= {finding.line for finding in found.health.findings if finding.corrected}
     return tuple(note for note in found.notes if note not in harmless)

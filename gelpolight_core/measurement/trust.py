@@ -18,7 +18,7 @@ WALLED = ("cylinder", "cuboid")
 
 
 def judged(result: Result, height_map: HeightMap) -> Result:
-    """Return a measurement judged together with the calibration and the image behind it.
+    """Return a measurement that is never better than the height map behind it.
 
     Every measurement goes through this function: in the public interface, on the command line, on
     the Measure page, in an evaluation, in a protocol and in a batch.
@@ -33,8 +33,8 @@ def judged(result: Result, height_map: HeightMap) -> Result:
     Returns
     -------
     Measurement or ToolResult
-        Doubtful, with the reason, if the calibration's verdict is "fail", the image has a fault, or
-        a shape with walls was measured with an in-place calibration; unchanged otherwise.
+        Doubtful, with the reason, if the height map has faults, or a shape with walls was measured
+        with an in-place calibration; unchanged otherwise.
     """
     faults: list[str] = list(height_map.faults)
     if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:

@@ -95,20 +95,41 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     return limited
 
 
-def free_boundary_note() -> str:
+class Note(NamedTuple):
+    """A note on a map for the user.
+
+    Attributes
+    ----------
+    text : str
+        A sentence.
+    doubtful : bool
+        Whether what is measured on the map may be wrong by more than it states.
+    """
+
+    text: str
+    doubtful: bool = True
+
+
+Notes = tuple[Note, ...]
+
+
+def free_boundary_note() -> Note:
     """Return the note on a map whose boundary a contact crosses; its depth is still accurate."""
-    return tr("a contact crosses the boundary of the field: the boundary is free there")
+    text = tr("a contact crosses the boundary of the field: the boundary is free there")
+    return Note(text, doubtful=False)
 
 
-def fixed_boundary_note() -> str:
+def fixed_boundary_note() -> Note:
     """Return the note on a map of the paper's model whose boundary a contact crosses."""
-    return tr(
-        "a contact crosses the boundary of the field, where the paper's model holds depth 0: "
-        "depths are too small; use the full model, or press nearer to the middle"
+    return Note(
+        tr(
+            "a contact crosses the boundary of the field, where the paper's model holds depth 0: "
+            "depths are too small; use the full model, or press nearer to the middle"
+        )
     )
 
 
-def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float) -> tuple[str, ...]:
+def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float) -> Notes:
     """Return the notes on a map that violates the assumptions of the paper's model.
 
     It assumes three lights, with the directions at the undeformed surface.
@@ -128,77 +149,83 @@ def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float)
     share = int(np.count_nonzero(dark)) / max(int(np.count_nonzero(pressed)), 1)
     notes = []
     if share > ONE_DARK_SHARE:
-        notes.append(
-            tr(
-                "{percent:.0f} % of the contact lies in the shadow of an LED, which the "
-                "paper's model ignores: heights on steep walls may be too low; use the "
-                "full model"
-            ).format(percent=100.0 * share)
+        text = tr(
+            "{percent:.0f} % of the contact lies in the shadow of an LED, which the "
+            "paper's model ignores: heights on steep walls may be too low; use the "
+            "full model"
         )
+        notes.append(Note(text.format(percent=100.0 * share)))
     if deepest > FROZEN_SHARE * least_height_mm:
-        notes.append(
-            tr(
-                "the press is deep for its lights, and the paper's model uses the light "
-                "of the undeformed surface: depths may be wrong by 5 % or more; use the "
-                "full model"
-            )
+        text = tr(
+            "the press is deep for its lights, and the paper's model uses the light "
+            "of the undeformed surface: depths may be wrong by 5 % or more; use the "
+            "full model"
         )
+        notes.append(Note(text))
     return tuple(notes)
 
 
-def condition_note(calibration: Calibration, leds_mm: NDArray[np.float64]) -> str:
-    """Return the note on light directions that are nearly coplanar somewhere; otherwise empty."""
+def condition_notes(calibration: Calibration, leds_mm: NDArray[np.float64]) -> Notes:
+    """Return the note on light directions that are nearly coplanar somewhere, if they are."""
     table = calibration.table
     points = table.grid.points_mm()[table.valid]
     if not points.size:
-        return ""
+        return ()
     condition = direction_condition(leds_mm, points[:: max(len(points) // CONDITION_POINTS, 1)])
     if condition <= MOST_CONDITION:
-        return ""
-    return tr(
+        return ()
+    text = tr(
         "the light directions lie nearly in one plane in part of the field (condition number "
         "{c:.0f}): depths scatter more than stated; place the LEDs wider apart"
-    ).format(c=condition)
+    )
+    return (Note(text.format(c=condition)),)
 
 
-def unanchored_note() -> str:
-    """Return the note on a map without an anchor, which may be wrong by a constant."""
-    return tr(
+def unanchored_note() -> Note:
+    """Return the note on a map without an anchor, which may be wrong by a constant.
+
+    Not doubtful: depth differences are valid, and the flag makes the others doubtful.
+    """
+    text = tr(
         "nearly all of the boundary is pressed: depth differences within the map "
         "are valid, but all depths may be wrong by one constant; press so that "
         "more of the boundary stays free"
     )
+    return Note(text, doubtful=False)
 
 
-def unsolved_note(share: float) -> str:
-    """Return the note on nodes that the light alone does not determine; empty if there are few."""
+def unsolved_notes(share: float) -> Notes:
+    """Return the note on nodes that the light alone does not determine, if there are many."""
     if share <= UNSOLVED_SHARE:
-        return ""
-    return tr(
+        return ()
+    text = tr(
         "{percent:.1f} % of the membrane is lit by less than two LEDs or faces "
         "away from the camera, as on steep walls: heights there may be too low"
-    ).format(percent=100.0 * share)
+    )
+    return (Note(text.format(percent=100.0 * share)),)
 
 
-def small_image_note(pitch_mm: float, decay_mm: float) -> str:
-    """Return the note on a map whose nodes do not resolve the drape; empty where they do."""
+def small_image_notes(pitch_mm: float, decay_mm: float) -> Notes:
+    """Return the note on a map whose nodes do not resolve the drape, if they do not."""
     if pitch_mm <= MOST_PITCH * decay_mm:
-        return ""
-    return tr(
+        return ()
+    text = tr(
         "the image is too small for this membrane: one pixel covers {p:.2f} mm, "
         "and the decay length of the drape is {d:.2f} mm; heights may be too low "
         "by several percent; use larger images"
-    ).format(p=pitch_mm, d=decay_mm)
+    )
+    return (Note(text.format(p=pitch_mm, d=decay_mm)),)
 
 
-def visible_depth_note(visible_mm: float) -> str:
-    """Return the note on a map without a contact, of a sensor that hides deep ones; else empty."""
+def visible_depth_notes(visible_mm: float) -> Notes:
+    """Return the note on a map without a contact, of a sensor that hides deep ones."""
     if visible_mm <= MOST_HIDDEN_MM:
-        return ""
-    return tr(
+        return ()
+    text = tr(
         "no contact was found, but this calibration's noise hides faces of less than {um:.0f} um: "
         "calibrate again with more light or less gain"
-    ).format(um=1e3 * visible_mm)
+    )
+    return (Note(text.format(um=1e3 * visible_mm)),)
 
 
 def refuse_coplanar_lights(calibration: Calibration, leds_mm: NDArray[np.float64]) -> None:

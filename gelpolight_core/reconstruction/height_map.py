@@ -106,8 +106,9 @@ class HeightMap:
     trace : Trace or None
         Which steps were done, and why the others were left out.
     faults : tuple of str
-        Why no measurement of this map is reliable: the fault of a calibration that failed, and the
-        faults of the image. Empty if there are none.
+        Why no measurement of this map is reliable: the fault of a calibration that failed, the
+        notes that say that depths may be wrong, and the faults of the image. Empty if there are
+        none.
     health : Health or None
         The faults of its frame.
     lateral_per_mm : float

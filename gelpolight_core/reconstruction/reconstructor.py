@@ -15,15 +15,17 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.finding import KEYS, Health, LightGain
 from gelpolight_core.reconstruction.checks import (
+    Note,
+    Notes,
     accepted,
-    condition_note,
+    condition_notes,
     free_boundary_note,
     refuse_coplanar_lights,
     refuse_dark_membrane,
-    small_image_note,
+    small_image_notes,
     unanchored_note,
-    unsolved_note,
-    visible_depth_note,
+    unsolved_notes,
+    visible_depth_notes,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
@@ -44,7 +46,6 @@ from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.stated_lengths import stated_sd
 from gelpolight_core.translation import tr
 
-Notes = tuple[str, ...]
 LIGHT = tr("light of the image")
 
 
@@ -115,7 +116,7 @@ class Reconstructor:
         leds_mm = calibration.led_positions_mm if used is None else used.led_positions_mm
         refuse_coplanar_lights(calibration, leds_mm)
         refuse_dark_membrane(calibration, model=self.model)
-        self._notes = tuple(filter(None, (condition_note(calibration, leds_mm),)))
+        self._notes = condition_notes(calibration, leds_mm)
 
     @property
     def _open(self) -> Calibration:
@@ -266,15 +267,18 @@ class Reconstructor:
         if self.model == IN_PLACE:
             return self._in_place_depth(frame, name, normals, uncertainty)
         health = self.health_check.check(frame) if health is None else health
-        notes = (*self._notes, *(finding.line for finding in health.findings))
         if self.model == "full":
-            found = self._near_light_depth(frame, name, normals, uncertainty, notes, health.light)
+            found = self._near_light_depth(frame, name, normals, uncertainty, health.light)
         else:
-            found = self._paper_depth(frame, name, normals, notes, health.light)
+            found = self._paper_depth(frame, name, normals, health.light)
         assert found.trace is not None
-        trace = replace(found.trace, steps=(_light_step(health.light), *found.trace.steps))
-        faults = (*found.faults, *(finding.cause for finding in health.faults))
-        return replace(found, health=health, faults=faults, trace=trace)
+        return replace(
+            found,
+            health=health,
+            notes=(*(finding.line for finding in health.findings), *found.notes),
+            faults=(*found.faults, *(finding.cause for finding in health.faults)),
+            trace=replace(found.trace, steps=(_light_step(health.light), *found.trace.steps)),
+        )
 
     def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
         """Return the faults of a frame, each with cause and remedy.
@@ -302,12 +306,11 @@ class Reconstructor:
         frame: NDArray[Any],
         name: str,
         normals: bool,
-        notes: Notes,
         light: LightGain | None,
     ) -> HeightMap:
         gain = None if light is None else light.share
         found = self.paper.depth(frame, normals=normals, gain=gain)
-        notes += found.notes
+        notes = (*self._notes, *found.notes)
         heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
         return replace(
             heightmap,
@@ -321,7 +324,6 @@ class Reconstructor:
         name: str,
         normals: bool,
         uncertainty: bool,
-        notes: Notes,
         light: LightGain | None,
     ) -> HeightMap:
         full = self._open.full
@@ -340,8 +342,8 @@ class Reconstructor:
             light=light,
         )
         pitch_mm = self.calibration.table.grid.pitch_mm
-        small = small_image_note(pitch_mm, full.decay_mm) if found.rounds is not None else ""
-        notes += (*_notes(found), *filter(None, (small,)))
+        small = small_image_notes(pitch_mm, full.decay_mm) if found.rounds is not None else ()
+        notes = (*self._notes, *_notes(found), *small)
         heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
         scale, noise, stated = full.scale_sd, found.noise, stated_sd(self._open.stack)
         return replace(
@@ -402,8 +404,11 @@ class Reconstructor:
             calibration_id=self.calibration.identity,
             model=self.model,
             source=name,
-            notes=notes,
-            faults=tuple(filter(None, (self.calibration.fault,))),
+            notes=tuple(note.text for note in notes),
+            faults=(
+                *filter(None, (self.calibration.fault,)),
+                *(note.text for note in notes if note.doubtful),
+            ),
         )
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
@@ -441,16 +446,18 @@ def _notes(found: NearLightDepth) -> Notes:
     """Return the notes on a reconstruction for the user, in sentences."""
     stopped = "" if found.rounds is None else found.rounds.stopped
     note_of = {
-        "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
-        "unsettled": tr("the near-light rounds did not converge: damping did not help"),
-        "grows": tr("the near-light rounds did not converge: the last round was undone"),
+        "damped": Note(
+            tr("the press is deep for its lights: the near-light rounds were damped"),
+            doubtful=False,
+        ),
+        "unsettled": Note(tr("the near-light rounds did not converge: damping did not help")),
+        "grows": Note(tr("the near-light rounds did not converge: the last round was undone")),
     }
     notes = [] if found.boundary.free is None else [free_boundary_note()]
     notes += [unanchored_note()] if found.boundary.level_sd_mm > 0.0 else []
     notes += [note_of[stopped]] if stopped in note_of else []
-    sensor = visible_depth_note(found.visible_mm) if found.rounds is None else ""
-    notes += [note for note in (unsolved_note(found.unsolved), sensor) if note]
-    return tuple(notes)
+    hidden = visible_depth_notes(found.visible_mm) if found.rounds is None else ()
+    return (*notes, *unsolved_notes(found.unsolved), *hidden)
 
 
 def _light_step(light: LightGain | None) -> TraceStep:

@@ -9,7 +9,9 @@ import pytest
 
 from app.command_line.main import main
 from app.measure.measuring import apply_tool
+from gelpolight_core import measure, read_height_map, write_height_map
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
 from gelpolight_core.measurement.indenter_tools import Cylinder
 from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.tools import ToolResult
@@ -17,6 +19,8 @@ from gelpolight_core.quality import QualityTable, Verdict, judge
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
+from gelpolight_core.simulation import indenters
+from gelpolight_core.simulation.virtual_sensor import PressedMembrane
 
 PRESS = "cylinder_s5_d100.png"
 
@@ -66,3 +70,19 @@ def test_the_command_names_the_figure_that_failed(
         (verdict,) = [x for x in capsys.readouterr().out.splitlines() if "verdict" in x]
         assert "doubtful" in verdict
         assert "Depth off the ball: 41.7 %" in verdict
+
+
+def test_a_measurement_is_never_better_than_its_height_map(tmp_path: Path) -> None:
+    """Walls too steep for the lights: heights were off by more than 3 sd and called ok."""
+    known = known_sensor(matt_design(0.5))
+    for decay_mm, doubtful in ((0.18, True), (0.7, False)):
+        surface = indenters.press(indenters.Cylinder(5.0, 1.0), x_mm=0.4, decay_mm=decay_mm)
+        frame = known.sensor.frame(PressedMembrane(surface), stream="press")
+        for model in ("full", "paper"):
+            height_map = Reconstructor(known.calibration, model=model).depth(frame)
+            (path,) = write_height_map(height_map, tmp_path / f"{model} {decay_mm}")
+            found = measure(height_map, shape="cylinder")
+            assert (abs(found.height_mm - 1.0) > 3.0 * found.sd["height_mm"]) is doubtful
+            for result in (found, measure(read_height_map(path), shape="cylinder")):
+                assert (result.verdict == "doubtful") is doubtful
+                assert (result.reason in height_map.notes) is doubtful

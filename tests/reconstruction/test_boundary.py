@@ -91,7 +91,7 @@ def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str)
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
     # A straight wall across the whole field gives its own error to all that lies behind it.
     assert error_um(found, press) < (30.0 if name in ("edge 0.5", "half plane") else 15.0)
-    assert free_boundary_note() in found.notes
+    assert free_boundary_note().text in found.notes
     assert not (found.flags & int(Flag.UNANCHORED)).any()
 
 
@@ -133,7 +133,7 @@ def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_ancho
     press = scene("ring 8")
     found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
     assert error_um(found, press) < 10.0
-    assert unanchored_note() in found.notes
+    assert unanchored_note().text in found.notes
     inside = (found.flags & int(Flag.OUTSIDE)) == 0
     assert (found.flags[inside] & int(Flag.UNANCHORED)).all()
     assert found.depth_model_sd_mm is not None
@@ -153,7 +153,7 @@ def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
     press = scene("cylinder 12 at 10.5")
     paper = Reconstructor(sensor().calibration, model="paper")
     found = paper.depth(press.frame)
-    assert fixed_boundary_note() in found.notes
+    assert fixed_boundary_note().text in found.notes
     measured = measure_object(
         found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=found.flags
     )

@@ -16,7 +16,7 @@ from gelpolight_core.experiments.known_sensor import (
 )
 from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.reconstruction.checks import small_image_note, visible_depth_note
+from gelpolight_core.reconstruction.checks import small_image_notes, visible_depth_notes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
@@ -135,8 +135,9 @@ def test_a_calibration_whose_noise_hides_presses_says_so() -> None:
         reconstruct = Reconstructor(deaf, effort=effort)
         found = reconstruct.depth(press.frame)
         assert reconstruct.visible_depth_mm is not None
-        assert visible_depth_note(reconstruct.visible_depth_mm) in found.notes
-    assert not visible_depth_note(Reconstructor(known.calibration).visible_depth_mm or 1.0)
+        (note,) = visible_depth_notes(reconstruct.visible_depth_mm)
+        assert note.text in found.notes
+    assert not visible_depth_notes(Reconstructor(known.calibration).visible_depth_mm or 1.0)
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
@@ -151,8 +152,8 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort: str)
     assert found.trace is not None
     assert found.trace.effort == "best"
     assert (f"effort {effort}" in found.trace.left_out) == (effort != "best")
-    note = small_image_note(found.pitch_mm, 0.7)
-    assert note and note in found.notes
+    (note,) = small_image_notes(found.pitch_mm, 0.7)
+    assert note.text in found.notes
 
 
 @pytest.mark.parametrize("effort", EFFORTS)

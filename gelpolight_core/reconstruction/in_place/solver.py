@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.checks import free_boundary_note
+from gelpolight_core.reconstruction.checks import Note, Notes, free_boundary_note
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.in_place.depth import depth_of, normals
 from gelpolight_core.reconstruction.in_place.model import InPlaceModel
@@ -43,7 +43,7 @@ class InPlaceDepth:
         Unit normals.
     flags : (rows, columns) uint8
         Sums of :class:`Flag`.
-    notes : tuple of str
+    notes : tuple of Note
         For the user.
     trace : Trace
         What was done.
@@ -58,7 +58,7 @@ class InPlaceDepth:
     depth_mm: Map
     normals: Map | None
     flags: NDArray[np.uint8]
-    notes: tuple[str, ...]
+    notes: Notes
     trace: Trace
     slope_sd: Map | None = None
     depth_sd_mm: Map | None = None
@@ -131,8 +131,7 @@ class InPlaceSolver:
         flags[beyond] |= np.uint8(Flag.EXTRAPOLATED.value)
         flags[seen.saturated] |= np.uint8(Flag.SATURATED.value)
         flags[~seen.usable & ~seen.saturated] |= np.uint8(Flag.INVALID.value)
-        notes = [free_boundary_note()] if crossed else []
-        notes += [self._difference_note(seen.change)]
+        crossed_notes = (free_boundary_note(),) if crossed else ()
         if not with_normals:
             record.left_out(tr("normals"), tr("not requested"))
         if not uncertainty:
@@ -141,18 +140,9 @@ class InPlaceSolver:
             depth,
             normals(depth, model.grid.pitch_mm) if with_normals else None,
             flags,
-            tuple(note for note in notes if note),
+            (*crossed_notes, *_difference_notes(seen.change)),
             Trace(effort, tuple(record.steps)),
             **(self._deviations(linear, depth, slope_x, slope_y) if uncertainty else {}),
-        )
-
-    def _difference_note(self, change: Map) -> str:
-        thin = change[::4, ::4]
-        if float(np.median(np.abs(thin).max(axis=2))) <= DIFFERENT:
-            return ""
-        return tr(
-            "most of the image does not look like this sensor's membrane: another "
-            "exposure, crop, gel or sensor; the depth is not reliable"
         )
 
     def _deviations(self, frame: Map, depth_mm: Map, slope_x: Map, slope_y: Map) -> dict[str, Map]:
@@ -186,3 +176,14 @@ class InPlaceSolver:
             "depth_model_sd_mm": np.asarray(depth_model, np.float32),
             "noise_mm": np.asarray(blocks.mean(axis=(2, 4)), np.float32),
         }
+
+
+def _difference_notes(change: Map) -> Notes:
+    thin = change[::4, ::4]
+    if float(np.median(np.abs(thin).max(axis=2))) <= DIFFERENT:
+        return ()
+    text = tr(
+        "most of the image does not look like this sensor's membrane: another "
+        "exposure, crop, gel or sensor; the depth is not reliable"
+    )
+    return (Note(text),)

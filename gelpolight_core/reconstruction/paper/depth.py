@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.masks import usable
 from gelpolight_core.reconstruction.checks import (
     NearBoundary,
+    Notes,
     fixed_boundary_note,
     nodes_near_boundary,
     paper_notes,
@@ -48,7 +49,7 @@ class PaperDepth(NamedTuple):
         Unit normals, z < 0; None where they were not requested.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
-    notes : tuple of str
+    notes : tuple of Note
         Notes for the user.
     steps : tuple of TraceStep
         What was done.
@@ -57,7 +58,7 @@ class PaperDepth(NamedTuple):
     depth_mm: Map
     normals: Map | None
     flags: NDArray[np.uint8]
-    notes: tuple[str, ...]
+    notes: Notes
     steps: tuple[TraceStep, ...]
 
 
