@@ -73,6 +73,8 @@ class Provenance:
         recorded.
     elastomer : str
         Name or serial number of the elastomer. Empty if not stated.
+    accepted : str
+        Why this calibration is used although it failed. Empty if nobody said so.
     """
 
     created: str
@@ -84,6 +86,7 @@ class Provenance:
     edits: tuple[HandEdit, ...] = ()
     inputs: str = ""
     elastomer: str = ""
+    accepted: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,8 @@ It has no refraction to speak of and no noise unless asked; the virtual sensor i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gelpolight_core.lights.positions import light_directions
@@ -57,6 +59,12 @@ def calibration() -> Calibration:
         quality={"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))},
         provenance=Provenance("2026-01-02T03:04:05+00:00", "someone", "0.1.0", "s", {"a": "b"}),
     )
+
+
+def failed(cal: Calibration) -> Calibration:
+    """Return a calibration with a figure that failed: half a pixel where 0.3 is the limit."""
+    figure = judge("rms", "Half a pixel", 0.5, "px", fail=0.3)
+    return replace(cal, quality={**cal.quality, "lens": QualityTable((figure,))})
 
 
 def raw_image(slopes: np.ndarray, cal: Calibration) -> np.ndarray:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QWidget
 
 from app.calibrate.model import WizardModel
 from app.calibrate.setup.form_page import FormPage
 from app.context.context import AppContext
 from app.context.source_button import show_settings_of_source
 from app.sources.camera.applying import is_locked
+from app.widgets.question import Question, ask
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
@@ -84,16 +88,21 @@ class SessionCamera(QObject):
         Model of the wizard.
     context : AppContext
         Context with the cameras and the selected source.
+    window : QWidget
+        In front of it the user is asked whether a camera is the same.
     """
 
-    def __init__(self, model: WizardModel, *, context: AppContext) -> None:
+    def __init__(self, model: WizardModel, *, context: AppContext, window: QWidget) -> None:
         super().__init__(model)
-        self._model, self._context = model, context
+        self._model, self._context, self._window = model, context, window
         model.photographed.connect(self._on_photographed)
         model.camera_fault = self.fault
 
     def fault(self) -> str:
-        """Return why the present camera cannot be used: the session belongs to another camera."""
+        """Return why the present camera cannot be used: the session belongs to another camera.
+
+        If both are of one model, the user is asked whether it is the same one at another port.
+        """
         session, now = self._model.project.session, self._present()
         stored = session.camera_settings
         if not any(session.found(folder) for folder in FOLDERS.values()):
@@ -105,9 +114,10 @@ class SessionCamera(QObject):
                 "the camera of the sensor, or start a new session for the other sensor."
             )
             return text.format(one=session.serial, other=serial)
-        if now is None or stored is None or stored.identity == now.identity:
+        cameras = self._context.cameras
+        if now is None or stored is None or cameras.is_same(stored.identity, now.identity):
             return ""
-        return tr(
+        text = tr(
             "This session was captured with the camera {one} ({one_id}), but {other} ({other_id}) "
             "is connected. Connect the first camera, or start a new session for the other sensor."
         ).format(
@@ -116,13 +126,18 @@ class SessionCamera(QObject):
             other=now.name,
             other_id=now.identity,
         )
+        if stored.model and stored.model == now.model and not self._window.findChild(Question):
+            accept = partial(cameras.accept_same, stored.identity, now.identity)
+            ask(self._window, tr("Another camera"), text, (tr("It is the same camera"), accept))
+        return text
 
     def _present(self) -> CameraSettings | None:
         """Return which camera is selected, the virtual one included; None for recorded images."""
         source = self._context.source
         camera = self._context.cameras.of(source.info)
         if camera is not None:
-            return CameraSettings(camera.device.name, camera.device.identity)
+            device = camera.device
+            return CameraSettings(device.name, device.identity, device.model)
         if source.info is None or source.info.kind != "virtual" or source.bench is None:
             return None
         serial = source.bench.design.serial

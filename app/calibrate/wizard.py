@@ -74,7 +74,7 @@ class Wizard(QMainWindow):
         self._running: object = None
         self._build_docks()
         self._build_keys()
-        self.session_camera = SessionCamera(self.model, context=context)
+        self.session_camera = SessionCamera(self.model, context=context, window=self)
         self.moving_on = MovingOn(self.model, self.panel, self.presenters, go_to=self.go_to)
         self._connect()
         self.refresh()

@@ -17,10 +17,12 @@ from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.camera_state import CameraState
 from app.sources.camera.driver import (
+    PORT,
     CameraDriver,
     Device,
     Format,
     compression_warning,
+    without_port,
 )
 from app.sources.source import SourceInfo
 from gelpolight_core.errors import InputError
@@ -66,6 +68,12 @@ class CameraManager(QObject):
         self._kept: dict[str, CameraSettings] = {}
         self._shown: dict[str, tuple[str, ...]] = {}
         self._reference: tuple[str, CameraSettings] | None = None
+        # Identities without port of cameras that were connected together, and pairs of identities
+        # of one camera, as the user said.
+        self._shared, self._same = (
+            set(settings.camera_notes("shared")),
+            set(settings.camera_notes("same")),
+        )
         # Sent from the cameras' threads to this thread; it carries no data.
         self._woken.connect(self._update)
 
@@ -94,15 +102,39 @@ class CameraManager(QObject):
             return ()
         self._devices |= {device.identity: device for device in devices}
         names = [device.name for device in devices]
+        alone = [without_port(device.identity) for device in devices]
+        for identity in {one for one in alone if alone.count(one) > 1} - self._shared:
+            self._shared.add(identity)
+            self._settings.keep_camera_note("shared", identity)
         return tuple(
             SourceInfo(
                 "camera",
-                d.name if names.count(d.name) == 1 else f"{d.name} ({d.address})",
+                d.name if names.count(d.name) == 1 else f"{d.name} ({_place(d)})",
                 d.identity,
                 partial(self._source, d.identity),
             )
             for d in devices
         )
+
+    def key(self, identity: str) -> str:
+        """Return what identifies a camera: with its port only if others have the same serial."""
+        alone = without_port(identity)
+        return identity if alone in self._shared else alone
+
+    def is_same(self, stored: str, present: str) -> bool:
+        """Return whether two identities are those of one camera."""
+        return self.key(stored) == self.key(present) or f"{stored} = {present}" in self._same
+
+    def accept_same(self, stored: str, present: str) -> None:
+        """Remember that two identities are those of one camera, because the user says so."""
+        self._same.add(f"{stored} = {present}")
+        self._settings.keep_camera_note("same", f"{stored} = {present}")
+        self._update()
+
+    def is_other(self, stored: str, info: SourceInfo | None) -> bool:
+        """Return whether a source is another camera than a stored one, as far as both are known."""
+        known = bool(stored) and info is not None and info.kind == "camera" and bool(info.detail)
+        return known and not self.is_same(stored, info.detail)
 
     def of(self, info: SourceInfo | None) -> Camera | None:
         """Return the camera of a source; None if it is not a camera."""
@@ -113,7 +145,7 @@ class CameraManager(QObject):
     def _camera(self, identity: str) -> Camera:
         if identity not in self._cameras:
             device = self._devices[identity]
-            camera = Camera(self.driver, device, on_change=self._woken.emit)
+            camera = Camera(self.driver, device, is_same=self.is_same, on_change=self._woken.emit)
             camera.want(self._stored_for(device))
             self._cameras[identity] = camera
         return self._cameras[identity]
@@ -124,9 +156,9 @@ class CameraManager(QObject):
     def _stored_for(self, device: Device) -> CameraSettings | None:
         """Return the settings for a camera: as for the calibration, or as it was last used."""
         reference = None if self._reference is None else self._reference[1]
-        if reference is not None and reference.is_of(device.identity, device.model):
+        if reference is not None and self.is_same(reference.identity, device.identity):
             return reference
-        return settings_of_texts(self._settings.camera(device.identity))
+        return settings_of_texts(self._settings.camera(self.key(device.identity)))
 
     # Changing settings
 
@@ -146,7 +178,7 @@ class CameraManager(QObject):
         self._reference = reference
         if stored is not None:
             for camera in self._cameras.values():
-                if stored.is_of(camera.device.identity, camera.device.model):
+                if self.is_same(stored.identity, camera.device.identity):
                     camera.want(stored)
         self._update()
 
@@ -188,7 +220,7 @@ class CameraManager(QObject):
         wanted, identity = camera.wanted, camera.device.identity
         if wanted is not None and wanted != self._kept.get(identity):
             self._kept[identity] = wanted
-            self._settings.keep_camera(identity, wanted.as_texts())
+            self._settings.keep_camera(self.key(identity), wanted.as_texts())
 
     def differs(self, camera: Camera) -> tuple[str, tuple[str, ...]]:
         """Return the reference of a camera, and a clause for every difference from it."""
@@ -199,14 +231,14 @@ class CameraManager(QObject):
         if state.phase != "live":
             return what, ()
         if not self.can_restore(camera):
-            return what, (tr("it is another camera than {name}").format(name=stored.name),)
+            name = f"{stored.name} ({stored.identity})"
+            return what, (tr("it is another camera than {name}").format(name=name),)
         return what, differences(stored, state.format, state.controls)
 
     def can_restore(self, camera: Camera) -> bool:
-        """Return whether a camera is the one of the calibration or session, or the same model."""
-        if self._reference is None:
-            return False
-        return self._reference[1].is_of(camera.device.identity, camera.device.model)
+        """Return whether a camera is the one of the calibration or session."""
+        stored = None if self._reference is None else self._reference[1]
+        return stored is not None and self.is_same(stored.identity, camera.device.identity)
 
     # Messages
 
@@ -251,3 +283,8 @@ class CameraManager(QObject):
             if sentence not in self._shown.get(identity, ()):
                 self._toasts.show(sentence, "warn")
         self._shown[identity] = sentences
+
+
+def _place(device: Device) -> str:
+    """Return where one of several cameras of the same name is connected."""
+    return device.identity.partition(PORT)[2] or device.address

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.command_line.common import StageProgress, quality_lines, refuse_overwriting, write_json
-from app.command_line.reconstructing import add_model
+from app.command_line.reconstructing import add_model, report_failure
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
 from gelpolight_core.calibration.any_session import calibrate_any
@@ -51,6 +51,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(content, options.json)
     say("\n".join([*lines, *quality_lines(result.calibration.quality)]))
+    report_failure(result.calibration, options.output)
     say(
         tr("Calibration {id} saved to {path}: {verdict}").format(
             id=result.calibration.identity,

@@ -15,6 +15,7 @@ from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN, InPlace
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.report.labels import label
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 
@@ -67,55 +68,62 @@ def _table(rows: list[tuple[str, str]]) -> str:
     return "\n".join(f"{harmless(label):<18} {harmless(value)}" for label, value in rows)
 
 
-def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
-    """Return the content of a closed sensor's calibration."""
-    grid, model = c.in_place.grid, c.in_place
-    return [
-        (tr("calibration"), c.identity),
-        (tr("sensor"), c.sensor.serial),
-        (tr("elastomer"), c.provenance.elastomer or tr("not stated")),
-        (tr("model"), tr("{model} (closed sensor)").format(model=c.model)),
-        (tr("verdict"), c.verdict.value),
-        (tr("made"), f"{c.provenance.created} {c.provenance.operator}".strip()),
-        (tr("program"), c.provenance.program_version),
-        (tr("session"), f"{c.provenance.session} ({len(c.provenance.sources)} files)"),
-        (tr("image"), f"{c.camera.width}x{c.camera.height} px"),
-        (tr("camera response"), response_text(c.response)),
-        (tr("scale"), tr("{s:.5f} mm per px, sd {sd:.2g} %").format(
-            s=grid.mm_per_px, sd=100.0 * model.scale_sd)),
-        (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
-        (tr("balls"), tr("{n}, slopes up to {deg:.1f} deg").format(
-            n=len(c.balls), deg=np.degrees(np.arctan(model.steepest)))),
-        (tr("not known"), ", ".join(UNKNOWN)),
-        *((tr("edited by hand"), f"{label(e.part)} {e.made} {e.operator}".strip())
-          for e in c.provenance.edits),
-    ]  # fmt: skip
-
-
 def _print_calibration(path: Path) -> None:
     """Print provenance, geometry and quality table."""
     c = read_calibration(path)
-    if isinstance(c, InPlaceCalibration):
-        say(_table(_in_place_rows(c)))
-        say("\n".join(quality_lines(c.quality)))
-        return
-    grid = c.table.grid
+    p, grid = c.provenance, c.table.grid
+    closed = isinstance(c, InPlaceCalibration)
+    channels = tr("{part} ({channels}) {made} {operator}")
     rows = [
         (tr("calibration"), c.identity),
         (tr("sensor"), c.sensor.serial),
-        (tr("elastomer"), c.provenance.elastomer or tr("not stated")),
-        (tr("model"), c.model),
+        (tr("elastomer"), p.elastomer or tr("not stated")),
+        (tr("model"), tr("{model} (closed sensor)").format(model=c.model) if closed else c.model),
         (tr("verdict"), c.verdict.value),
-        (tr("created"), f"{c.provenance.created} {c.provenance.operator}".strip()),
-        (tr("program"), c.provenance.program_version),
-        (tr("session"), f"{c.provenance.session} ({len(c.provenance.sources)} files)"),
+        *([(tr("used although it failed"), p.accepted)] if p.accepted else []),
+        (tr("created"), f"{p.created} {p.operator}".strip()),
+        (tr("program"), p.program_version),
+        (tr("session"), f"{p.session} ({len(p.sources)} files)"),
         (tr("image"), f"{c.camera.width}x{c.camera.height} px"),
         (tr("camera response"), response_text(c.response)),
+        (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
+        *(_in_place_rows(c) if isinstance(c, InPlaceCalibration) else _open_rows(c)),
+        *(
+            (
+                tr("edited by hand"),
+                channels.format(
+                    part=label(edit.part),
+                    channels=", ".join(label(name) for name in edit.channels),
+                    made=edit.made,
+                    operator=edit.operator,
+                ).strip(),
+            )
+            for edit in p.edits
+        ),
+    ]
+    say(_table(rows))
+    say("\n".join(quality_lines(c.quality)))
+
+
+def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
+    """Return the scale and the balls of a closed sensor's calibration."""
+    model = c.in_place
+    return [
+        (tr("scale"), tr("{s:.5f} mm per px, sd {sd:.2g} %").format(
+            s=model.grid.mm_per_px, sd=100.0 * model.scale_sd)),
+        (tr("balls"), tr("{n}, slopes up to {deg:.1f} deg").format(
+            n=len(c.balls), deg=np.degrees(np.arctan(model.steepest)))),
+        (tr("not known"), ", ".join(UNKNOWN)),
+    ]  # fmt: skip
+
+
+def _open_rows(c: Calibration) -> list[tuple[str, str]]:
+    """Return the geometry and the membrane of an open sensor's calibration."""
+    rows = [
         (tr("focal length"), f"{c.camera.fx:.2f}, {c.camera.fy:.2f} px"),
         (tr("principal point"), f"{c.camera.cx:.2f}, {c.camera.cy:.2f} px"),
         (tr("top surface"), f"{c.plane.distance_mm:.3f} mm"),
         (tr("tilt"), f"{np.degrees(np.arccos(c.plane.normal_camera[2])):.3f} deg"),
-        (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
     ]
     names = tr("red LED"), tr("green LED"), tr("blue LED")
     for name, led in zip(names, c.led_positions_mm, strict=True):
@@ -128,28 +136,11 @@ def _print_calibration(path: Path) -> None:
         shown = tr(
             "{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, "
             "interreflection {interreflection:.2f}"
+        ).format(
+            kept=label(c.full.membrane_kept),
+            gloss=m.gloss,
+            roughness=m.roughness,
+            interreflection=m.interreflection,
         )
-        rows.append(
-            (
-                tr("membrane"),
-                shown.format(
-                    kept=label(c.full.membrane_kept),
-                    gloss=m.gloss,
-                    roughness=m.roughness,
-                    interreflection=m.interreflection,
-                ),
-            )
-        )
-    for edit in c.provenance.edits:
-        channels = ", ".join(label(name) for name in edit.channels)
-        text = tr("{part} ({channels}) {made} {operator}")
-        rows.append(
-            (
-                tr("edited by hand"),
-                text.format(
-                    part=label(edit.part), channels=channels, made=edit.made, operator=edit.operator
-                ).strip(),
-            )
-        )
-    say(_table(rows))
-    say("\n".join(quality_lines(c.quality)))
+        rows.append((tr("membrane"), shown))
+    return rows

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import FORMATS
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
 from gelpolight_core.sensor_calibration import MODELS
@@ -86,7 +89,16 @@ def load_reconstructor(
     path: Path, *, model: str | None = None, effort: str = EFFORTS[-1]
 ) -> Reconstructor:
     """Read a calibration and prepare its reconstructor, for its own model or another one."""
-    return Reconstructor(read_calibration(path), model=model, effort=effort)
+    calibration = read_calibration(path)
+    report_failure(calibration, path)
+    return Reconstructor(calibration, model=model, effort=effort)
+
+
+def report_failure(calibration: AnyCalibration, path: Path) -> None:
+    """Warn of a calibration that failed."""
+    if calibration.fault:
+        text = tr("{path}: FAIL: {fault}. Everything measured with it is doubtful.")
+        say(f"gelpolight: {text.format(path=path, fault=calibration.fault)}", file=sys.stderr)
 
 
 def read_frame(path: Path, reconstructor: Reconstructor) -> NDArray[np.float32]:

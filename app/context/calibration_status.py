@@ -1,21 +1,102 @@
-"""The calibration in use, in the status bar."""
+"""The calibration in use: in the status of every page, and put into use from any of them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QWidget
+
 from app.context.context import AppContext
+from app.widgets.question import Question
 from app.workspace.entries import read_entry
+from gelpolight_core.calibration.manifest import REMARK_LENGTH
+from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
 def show_in_use(context: AppContext) -> None:
-    """Show the calibration in use in the status bar."""
+    """Show the calibration in use in the status bar, and warn on every page if it failed."""
     path = context.workspace.in_use
     if path is None:
-        context.status.update(calibration=None, calibration_note="")
+        context.status.update(calibration=None, calibration_note="", calibration_role="")
         return
     used = read_entry(path, in_use=True)
-    note = tr("validated") if used.validated else tr("not validated")
+    note, role = used.state
+    advice = not_validated() if role == "warn" else ""
+    if used.summary is not None and used.failed:
+        advice = tr(
+            "The calibration in use is not reliable: {fault}. Calibrate again, or use another "
+            "calibration on the Sensors page."
+        ).format(fault=used.summary.fault)
     context.status.update(
         calibration=used.name,
-        calibration_note=tr("broken") if used.broken else note,
+        calibration_note=note,
+        calibration_role=role,
+        calibration_advice=advice,
     )
+
+
+def not_validated() -> str:
+    """Return what it means that a calibration is not validated."""
+    return tr(
+        "This calibration is not validated. A wrong length in its session scales every result. "
+        "Press an object of known size to validate it."
+    )
+
+
+def put_into_use(
+    path: Path | None,
+    parent: QWidget,
+    *,
+    context: AppContext,
+    use: Callable[[], bool] | None = None,
+) -> None:
+    """Use a calibration, or none, from now on. One that failed asks for a reason first.
+
+    Parameters
+    ----------
+    path : Path or None
+        The calibration.
+    parent : QWidget
+        In front of it the question appears.
+    context : AppContext
+        Holds the workspace.
+    use : callable, optional
+        Puts it into use, and returns whether it worked.
+    """
+    entry = None if path is None else read_entry(path)
+
+    def act() -> None:
+        try:
+            done = context.workspace.use(path) is None if use is None else use()
+        except InputError as error:
+            done = False
+            context.toasts.show(str(error), "fail")
+        context.requests.calibrations_changed.emit()
+        if done and entry is not None and entry.state[1] == "warn":
+            context.toasts.show(not_validated(), "warn")
+
+    def accept() -> None:
+        from gelpolight_core.calibration.remarks import write_remark  # slow import
+
+        assert path is not None
+        try:
+            write_remark(path, "accepted", line.text())
+        except InputError as error:
+            context.toasts.show(str(error), "fail")
+        else:
+            act()
+
+    if entry is None or entry.summary is None or not entry.failed or entry.summary.accepted:
+        act()
+        return
+    text = tr(
+        "{name} is not reliable: {fault}. Measurements with it are marked as doubtful. Enter the "
+        "reason why you use it all the same: it is kept in the calibration file and in its report."
+    ).format(name=entry.name, fault=entry.summary.fault)
+    question = Question(
+        parent, tr("Use a failed calibration"), text, ((tr("Use it all the same"), accept),)
+    )
+    line = question.require_text(tr("Reason"), REMARK_LENGTH)
+    question.open()

@@ -98,7 +98,7 @@ class SourceChoice(QObject):
             self.choose_recording(Path(place))
         elif kind == "camera":
             for camera in cameras.infos():
-                if camera.detail == place:
+                if cameras.is_same(place, camera.detail):
                     self.choose(camera)
 
 

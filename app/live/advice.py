@@ -38,6 +38,8 @@ class LiveState:
         Image size. None before the first image.
     used : Known or None
         The calibration in use.
+    other_camera : str
+        That it was made with another camera than that of the images. Empty if not.
     calibrations : tuple of Known
         All calibrations.
     trouble : str
@@ -52,6 +54,7 @@ class LiveState:
     serial: str = ""
     size: Size | None = None
     used: Known | None = None
+    other_camera: str = ""
     calibrations: tuple[Known, ...] = ()
     trouble: str = ""
     fault: Finding | None = None
@@ -107,6 +110,9 @@ def advise(now: LiveState) -> Advice:
             "The images are {a} pixels, but the calibration in use is for {b} pixels."
         ).format(a="x".join(map(str, now.size)), b="x".join(map(str, now.used.size)))
         return Advice(text, *_remedy(now), role="fail", usable=False)
+    if now.other_camera:
+        remedy = _remedy(now) if _fits(now) else ("same_camera", tr("It is the same camera"))
+        return Advice(now.other_camera, *remedy, role="fail", usable=False)
     if now.trouble:
         return Advice(now.trouble, "reopen", tr("Reconnect"), role="fail")
     if now.fault is not None:
@@ -122,8 +128,13 @@ def preparing() -> Advice:
 
 def _remedy(now: LiveState) -> tuple[str, str]:
     """Return how to get a calibration that fits."""
-    if any(known.fits(now.serial, now.size) for known in now.calibrations):
+    if _fits(now):
         return "fitting", tr("Use a matching calibration")
     if now.kind == "virtual":
         return "calibrate", tr("Calibrate the virtual sensor now")
     return "sensors", tr("Choose or calibrate a sensor")
+
+
+def _fits(now: LiveState) -> bool:
+    """Return whether there is a calibration that fits the images and the camera."""
+    return any(known.fits(now.serial, now.size) for known in now.calibrations)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QComboBox, QWidget
 
+from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.live.advice import Known
 from app.services.jobs import Job, Jobs
@@ -124,25 +125,34 @@ class CalibrationChoice(QObject):
         self._context.cameras.refer(tr("the calibration"), settings_of_texts(texts))
 
     def use_what_fits(self, serial: str, size: tuple[int, int] | None) -> None:
-        """Put the newest calibration that fits such images into use. Empty and None fit all."""
-        for entry in self.entries:
-            summary = entry.summary
-            if summary is not None and Known(summary.serial, summary.image_size).fits(serial, size):
-                self._use(entry.path)
-                return
+        """Put the newest validated calibration for such images into use. Empty and None fit all.
+
+        If none is validated, it is the newest one that did not fail.
+        """
+        fitting = [e for e, known in self.candidates() if known.fits(serial, size)]
+        for entry in sorted(fitting, key=lambda entry: not entry.validated)[:1]:
+            self._use(entry.path)
+
+    def candidates(self) -> list[tuple[Entry, Known]]:
+        """Return the calibrations that did not fail and are not those of another camera."""
+        info, is_other = self._context.source.info, self._context.cameras.is_other
+        return [
+            (entry, Known(entry.summary.serial, entry.summary.image_size))
+            for entry in self.entries
+            if entry.summary is not None
+            and not entry.failed
+            and not is_other(entry.summary.camera, info)
+        ]
 
     def _on_chosen(self, index: int) -> None:
         path = self._box.itemData(index)
         self._use(None if path is None else Path(path))
 
     def _use(self, path: Path | None) -> None:
-        try:
-            self._context.workspace.use(path)
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
         if self._reading_failed:
             self._state = ()  # a repeated request reads it again
-        self._context.requests.calibrations_changed.emit()
+        put_into_use(path, self._box, context=self._context)
+        self._box.show_entries(self.entries)  # until a question is answered, the one before
 
     def _read(self, path: Path) -> None:
         def work(progress: Callable[[float], None]) -> object:

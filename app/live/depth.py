@@ -134,6 +134,9 @@ class LiveDepth(QObject):
                 self._context.requests.page.emit("sensors")
             case "fitting":
                 self.calibrations.use_what_fits(self.live.serial, self._size)
+            case "same_camera" if (info := self._context.source.info) is not None:
+                self._context.cameras.accept_same(self._camera_used, info.detail)
+                self.update()
             case "reopen":
                 self.live.open()
 
@@ -150,19 +153,32 @@ class LiveDepth(QObject):
         return self._maker.live
 
     @property
+    def _camera_used(self) -> str:
+        """Identity of the camera of the calibration in use. Empty if unknown."""
+        chosen = self._chosen[0]
+        texts = {} if chosen is None else chosen.calibration.provenance.camera_settings
+        return texts.get("identity", "")
+
+    @property
     def state(self) -> LiveState:
         """What is known about the images and the calibrations."""
         info, chosen, used = self._context.source.info, self._chosen[0], None
         if chosen is not None:
             camera = chosen.calibration.camera
             used = Known(chosen.calibration.sensor.serial, (camera.width, camera.height))
-        summaries = (entry.summary for entry in self.calibrations.entries)
+        other, camera_used = "", self._camera_used
+        if info is not None and self._context.cameras.is_other(camera_used, info):
+            other = tr(
+                "The calibration in use was made with the camera {one}, but the images come from "
+                "{other}. Connect the first camera, or use another calibration."
+            ).format(one=camera_used, other=info.detail)
         return LiveState(
             kind="" if info is None else info.kind,
             serial=self.live.serial,
             size=self._size,
             used=used,
-            calibrations=tuple(Known(s.serial, s.image_size) for s in summaries if s is not None),
+            other_camera=other,
+            calibrations=tuple(known for _entry, known in self.calibrations.candidates()),
             trouble=self._lost or self._failure,
             fault=self._fault,
             reading=self.calibrations.is_reading,

@@ -203,11 +203,7 @@ class PressViewFrame(QMainWindow):
     def show_validated(self) -> None:
         """Show whether the calibration in use was validated on an object of known size."""
         entry = next((e for e in self.depth.calibrations.entries if e.in_use), None)
-        text, role = "", "muted"
-        if entry is not None:
-            text, role = (
-                (tr("validated"), "pass") if entry.validated else (tr("not validated"), "warn")
-            )
+        text, role = ("", "muted") if entry is None else entry.state
         self.validated.setText(f"  {text}  ")
         show_meaning(self.validated, role)
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QWidget
 
+from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.sensors.commands import LibraryCommand, RemoveCommand, RestoreCommand, UseCommand
 from app.services.jobs import Job, Jobs
@@ -74,19 +76,12 @@ class CalibrationActions:
 
     def use(self, entry: Entry) -> None:
         """Use this calibration from now on."""
-        if not self._push(UseCommand(entry.path, context=self._context)) or entry.validated:
-            return
-        self._context.toasts.show(
-            tr(
-                "This calibration is not validated. A wrong length in its session "
-                "scales every result. Press an object of known size to validate it."
-            ),
-            "warn",
-        )
+        use = partial(self._push, UseCommand(entry.path, context=self._context))
+        put_into_use(entry.path, self._page, context=self._context, use=use)
 
     def name_elastomer(self, entry: Entry, name: str) -> None:
         """State the name of the elastomer in a calibration file."""
-        from gelpolight_core.calibration.elastomer import name_elastomer  # slow import
+        from gelpolight_core.calibration.remarks import write_remark  # slow import
 
         changed = self._context.requests.calibrations_changed
 
@@ -97,7 +92,7 @@ class CalibrationActions:
         self.jobs.submit(
             Job(
                 tr("Naming the elastomer"),
-                lambda _progress: name_elastomer(entry.path, name),
+                lambda _progress: write_remark(entry.path, "elastomer", name),
                 lambda _: changed.emit(),
                 failed,
                 must=True,

@@ -148,8 +148,10 @@ def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
             session=summary.session,
             version=summary.program_version,
         ),
+        uses,
+        summary.accepted and tr("Used although it failed: {why}").format(why=summary.accepted),
     ]
-    return "\n".join((*lines, *filter(None, (uses,)), *trial_lines(entry)))
+    return "\n".join((*filter(None, lines), *trial_lines(entry)))
 
 
 def trial_lines(entry: Entry) -> list[str]:

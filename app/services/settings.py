@@ -263,6 +263,15 @@ class Settings:
         kept = [*others.items(), (identity, dict(texts))][-CAMERAS:]
         self._store.setValue("cameras", json.dumps(dict(kept)))
 
+    def camera_notes(self, kind: str) -> tuple[str, ...]:
+        """Return what is known about identities of cameras: those ``shared``, or the ``same``."""
+        return tuple(filter(None, self._text(f"cameras_{kind}").split("\n")))
+
+    def keep_camera_note(self, kind: str, text: str) -> None:
+        """Remember it. The oldest notes are dropped."""
+        notes = dict.fromkeys((*self.camera_notes(kind), text))
+        self._store.setValue(f"cameras_{kind}", "\n".join(list(notes)[-CAMERAS:]))
+
     def window_state(self) -> tuple[QByteArray, QByteArray]:
         """Return geometry and state of the main window. Empty at first."""
         none = QByteArray()

@@ -10,7 +10,8 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QStatusBar
 
-from app.widgets.label import PlainLabel
+from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -41,6 +42,10 @@ class Status:
         Name of the calibration in use.
     calibration_note : str
         A note next to it, such as "not validated".
+    calibration_role : str
+        Colour role of both.
+    calibration_advice : str
+        Why it is not reliable and what to do. Empty if it is.
     """
 
     camera: str | None = None
@@ -50,6 +55,8 @@ class Status:
     skipped_hz: float = 0.0
     calibration: str | None = None
     calibration_note: str = ""
+    calibration_role: str = ""
+    calibration_advice: str = ""
     camera_note: str = ""
 
 
@@ -127,13 +134,36 @@ class StatusLine(QStatusBar):
         self._show()
 
     def _show(self) -> None:
-        for key, text in status_texts(self._model.value).items():
+        status = self._model.value
+        show_meaning(self._labels["calibration"], status.calibration_role)
+        self._labels["calibration"].setToolTip(plain_tip(status.calibration_advice))
+        for key, text in status_texts(status).items():
             label = self._labels[key]
             label.setText(text)
             label.setVisible(bool(text))
             if key in NUMBERS:
                 # Reserves the width of the longest number, so that its neighbours do not move.
                 label.setMinimumWidth(max(label.minimumWidth(), label.sizeHint().width()))
+
+
+class FailedLine(PlainLabel):
+    """Warns above every page while the calibration in use is one that failed."""
+
+    def __init__(self, model: StatusModel) -> None:
+        super().__init__()
+        self._model = model
+        named(self, "main.failed", tr("Warning about the calibration in use"))
+        self.setWordWrap(True)
+        self.setContentsMargins(10, 4, 10, 4)
+        make_bold(self)
+        show_meaning(self, "fail")
+        model.changed.connect(self._show)
+        self._show()
+
+    def _show(self) -> None:
+        status = self._model.value
+        self.setVisible(status.calibration_role == "fail")
+        self.setText(status.calibration_advice)
 
 
 def skipped_text(rate_hz: float) -> str:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QMenu
 
+from app.context.calibration_status import put_into_use
 from app.services.dropping import DESCRIPTION, is_session
 from app.services.settings import RECENT_KINDS
 from app.widgets.actions import make_action
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
-from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -115,12 +115,7 @@ class FileMenu(QMenu):
         if kind == "recordings":
             self._window.open_dropped((path,))
         else:
-            try:
-                self._context.workspace.use(path)
-            except InputError as error:
-                self._context.toasts.show(str(error), "fail")
-                return
-            self._context.requests.calibrations_changed.emit()
+            put_into_use(path, self._window, context=self._context)
         self._window.show_page("inspect")
 
     # Export

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QStackedWidget,
     QToolBar,
+    QVBoxLayout,
     QWidget,
 )
 
@@ -32,7 +33,7 @@ from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import PageEntry, all_pages
 from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
-from app.services.status import StatusLine
+from app.services.status import FailedLine, StatusLine
 from app.shell.about import AboutDialog
 from app.shell.documentation import find_documentation
 from app.shell.loader import Loader
@@ -94,7 +95,13 @@ class MainWindow(QMainWindow):
         self._tools: dict[str, QDialog] = {}
         self._guide: GuideWindow | None = None
         self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
-        self.setCentralWidget(self._stack)
+        centre = QWidget()
+        column = QVBoxLayout(centre)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(FailedLine(context.status))
+        column.addWidget(self._stack, 1)
+        self.setCentralWidget(centre)
         self._loading = LoadingView()
         self._stack.addWidget(self._loading)
         self.page_actions = self._build_navigation()

@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QImageReader, QPixmap
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.start.card import IMAGE, Card
 from app.widgets.label import PlainLabel
@@ -123,20 +124,16 @@ class StartPage(QWidget):
         if entry is None:
             return
         if not entry.in_use:
-            try:
-                self._context.workspace.use(entry.path)
-            except InputError as error:
-                self._context.toasts.show(str(error), "fail")
-                return
-            self._context.requests.calibrations_changed.emit()
+            put_into_use(entry.path, self, context=self._context)
         self._context.requests.page.emit("inspect")
 
 
 def last_calibration(entries: Sequence[Entry]) -> Entry | None:
-    """Return the calibration in use, otherwise the newest one that can be read."""
+    """Return the calibration in use, otherwise the newest one that did not fail."""
     good = [entry for entry in entries if entry.summary is not None and entry.created is not None]
     used = [entry for entry in good if entry.in_use]
-    return max(used or good, key=lambda entry: entry.created or datetime.min, default=None)
+    sound = [entry for entry in good if not entry.failed]
+    return max(used or sound, key=lambda entry: entry.created or datetime.min, default=None)
 
 
 def session_text(session: SessionEntry) -> str:
@@ -153,11 +150,10 @@ def session_text(session: SessionEntry) -> str:
 def calibration_text(entry: Entry) -> str:
     """Return the name, age and state of a calibration."""
     assert entry.summary is not None and entry.created is not None
-    state = tr("validated") if entry.validated else tr("not validated")
     return tr("Sensor {serial}, {verdict}, {state}\n{name}, made {when}").format(
         serial=entry.serial,
         verdict=verdict_word(entry.summary.verdict).lower(),
-        state=state,
+        state=entry.state[0],
         name=entry.name,
         when=_when(entry.created),
     )

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QRegularExpression, Qt
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
@@ -52,9 +59,21 @@ class Question(QDialog):
         named(
             buttons.button(QDialogButtonBox.StandardButton.Cancel), "question.cancel", tr("Cancel")
         )
-        column = QVBoxLayout(self)
-        column.addWidget(label)
-        column.addWidget(buttons)
+        self._column = QVBoxLayout(self)
+        self._column.addWidget(label)
+        self._column.addWidget(buttons)
+
+    def require_text(self, hint: str, most: int) -> QLineEdit:
+        """Add a line of text without which no answer can be chosen. Return it."""
+        line = named(QLineEdit(self), "question.line", hint)
+        line.setPlaceholderText(hint)
+        line.setMaxLength(most)
+        self._column.insertWidget(1, line)
+        for button in self.findChildren(QPushButton, QRegularExpression("question.answer")):
+            button.setEnabled(False)
+            line.textChanged.connect(lambda text, b=button: b.setEnabled(bool(text.strip())))
+        line.setFocus()
+        return line
 
 
 def ask(

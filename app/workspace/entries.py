@@ -9,6 +9,7 @@ from pathlib import Path
 from app.workspace.validation import Validation, read_validation
 from gelpolight_core.calibration.manifest import CalibrationSummary, read_summary
 from gelpolight_core.errors import InputError
+from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
 
 
@@ -58,6 +59,18 @@ class Entry:
             and self.validation.identity == self.summary.identity
             and self.validation.passed
         )
+
+    @property
+    def failed(self) -> bool:
+        """Whether a quality figure of this calibration failed: it is only a draft."""
+        return self.summary is not None and self.summary.verdict is Verdict.FAIL
+
+    @property
+    def state(self) -> tuple[str, str]:
+        """How far it can be trusted: in a word or two, and as a colour role."""
+        if self.broken or self.failed:
+            return (tr("broken") if self.broken else tr("failed")), "fail"
+        return (tr("validated"), "pass") if self.validated else (tr("not validated"), "warn")
 
     @property
     def created(self) -> datetime | None:

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 ENDING = ".gplcal"
 STATE = "workspace.json"
+DRAFT = "-draft"
 NAME_BYTES = 160
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{n}{k}" for n in ("COM", "LPT") for k in range(10))}
 
@@ -164,7 +165,8 @@ class Workspace:
     def keep_calibration(self, calibration: Calibration, name: str) -> Path:
         """Write a new calibration into the library, completely or not at all. Return its path.
 
-        Another program that uses the workspace may take the same name at this moment.
+        One that failed is named a draft. Another program that uses the workspace may take the
+        same name at this moment.
 
         Raises
         ------
@@ -173,6 +175,8 @@ class Workspace:
         """
         from gelpolight_core.calibration.file import write_calibration
 
+        if calibration.fault:
+            name += DRAFT
         while True:
             path = self.calibration_path(calibration.sensor.serial, name)
             try:
@@ -237,11 +241,18 @@ class Workspace:
         Raises
         ------
         InputError
-            If the file is broken or outside the workspace, or the selection cannot be saved.
+            If the file is broken or outside the workspace, if it failed and nobody accepted that,
+            or if the selection cannot be saved.
         """
         if path is not None:
-            read_summary(path)
+            summary = read_summary(path)
             self._refuse_outside(path)
+            if summary.fault and not summary.accepted:
+                raise InputError(
+                    summary.fault,
+                    where=str(path),
+                    advice=tr("Calibrate again, or use it on the Sensors page with a reason"),
+                )
         text = json.dumps({"in_use": path and path.relative_to(self.folder).as_posix()}) + "\n"
         make_folder(self.folder)
         write_bytes(self.folder / STATE, text.encode())

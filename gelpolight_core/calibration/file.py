@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.calibration.file_full import full_arrays, full_entry, read_full
 from gelpolight_core.calibration.manifest import (
-    ELASTOMER,
     FORMAT,
     HEAD_LIMIT,
     MANIFEST,
+    REMARKS,
     UNREADABLE,
     VERSION,
     check_arrays,
@@ -197,7 +197,7 @@ def _arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
 
 def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
     provenance = asdict(c.provenance)
-    elastomer = provenance.pop(ELASTOMER)
+    remarks = {key: text for key in REMARKS if (text := provenance.pop(key))}
     manifest = {
         "format": FORMAT,
         "version": VERSION,
@@ -207,9 +207,8 @@ def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
         "grid": _grid_entry(c.table.grid),
         "quality": {stage: quality_rows(table) for stage, table in c.quality.items()},
         "provenance": provenance,
+        **remarks,
     }
-    if elastomer:
-        manifest[ELASTOMER] = elastomer
     if isinstance(c, InPlaceCalibration):
         return manifest | in_place_entry(c)
     manifest |= {
@@ -352,8 +351,8 @@ def _read_bad_pixels(pixels: NDArray[Any] | None, height: int, width: int) -> Ba
 def _read_provenance(manifest: dict[str, Any]) -> Provenance:
     entry = manifest["provenance"]
     edits = tuple(_read_edit(edit) for edit in entry.get("edits", ()))
-    elastomer = written_text(manifest.get(ELASTOMER, ""))
-    provenance = Provenance(**{**entry, "edits": edits, ELASTOMER: elastomer})
+    remarks = {key: written_text(manifest.get(key, "")) for key in REMARKS}
+    provenance = Provenance(**{**entry, "edits": edits, **remarks})
     for name in ("created", "operator", "program_version", "session"):
         written_text(getattr(provenance, name))
     for table in (provenance.sources, provenance.camera_settings):

@@ -27,7 +27,7 @@ from gelpolight_core.io.reading import (
     written_text,
 )
 from gelpolight_core.io.texts import text_of_file
-from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.quality import Figure, QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.translation import english, tr
 
 FORMAT = "gelpolight-calibration"
@@ -35,8 +35,9 @@ FORMAT = "gelpolight-calibration"
 # Version 3 adds closed sensors; version 4 stores texts with templates and values.
 VERSION = 4
 MANIFEST = "manifest.json"
-ELASTOMER = "elastomer"
+REMARKS = ("elastomer", "accepted")
 """Beside the provenance, because older programs refuse unknown keys there."""
+REMARK_LENGTH = 200
 MANIFEST_LIMIT = 4_000_000
 MOST_ARRAYS = 64
 MOST_DIMENSIONS = 4
@@ -73,8 +74,10 @@ class CalibrationSummary:
         Width and height of the camera images, px.
     quality : mapping
         Quality table of every stage, in order.
-    elastomer : str
+    elastomer, accepted : str
         As in its provenance.
+    camera : str
+        Identity of the camera. Empty if unknown.
     """
 
     identity: str
@@ -88,11 +91,18 @@ class CalibrationSummary:
     image_size: tuple[int, int]
     quality: Mapping[str, QualityTable]
     elastomer: str = ""
+    accepted: str = ""
+    camera: str = ""
 
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of all stages."""
-        return QualityTable(tuple(f for t in self.quality.values() for f in t.figures)).verdict
+        return worst_verdict(self.quality)
+
+    @property
+    def fault(self) -> str:
+        """Which figures failed, as a clause; empty if none did."""
+        return failure(self.quality)
 
 
 def read_summary(path: Path) -> CalibrationSummary:
@@ -149,7 +159,8 @@ def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
         "model": manifest["model"],
         **{k: provenance[k] for k in ("created", "operator", "program_version", "session")},
         "inputs": provenance.get("inputs", ""),
-        ELASTOMER: manifest.get(ELASTOMER, ""),
+        "camera": provenance.get("camera_settings", {}).get("identity", ""),
+        **{key: manifest.get(key, "") for key in REMARKS},
     }
     return CalibrationSummary(
         **{key: written_text(text) for key, text in texts.items()},

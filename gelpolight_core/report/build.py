@@ -252,6 +252,8 @@ def _head_facts(c: AnyCalibration) -> tuple[tuple[str, str], ...]:
         )
         for edit in p.edits
     ]
+    if p.accepted:
+        rows.append((tr("Used although it failed"), p.accepted))
     rows += [(key, value) for key, value in sorted(p.camera_settings.items())]
     return tuple(rows)
 

@@ -24,7 +24,7 @@ class CameraSettings:
     name : str
         Display name.
     identity : str
-        Identifies this camera, whichever port it is plugged into.
+        Vendor and product; the serial number, if the camera has one; the port it is plugged into.
     model : str
         Vendor and product id, such as ``046d:081b``; empty if unknown.
     pixel_format : str
@@ -44,10 +44,6 @@ class CameraSettings:
     size: tuple[int, int] = (0, 0)
     rate_hz: float = 0.0
     controls: Mapping[str, float] = field(default_factory=dict)
-
-    def is_of(self, identity: str, model: str) -> bool:
-        """Whether these settings belong to this camera, or to another one of the same model."""
-        return self.identity == identity or (bool(self.model) and self.model == model)
 
     def as_table(self) -> dict[str, Any]:
         """Return the settings as tables of ``session.toml``."""

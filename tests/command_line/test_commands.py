@@ -5,16 +5,22 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
+import scene
 from one_line import refusal
 
+import gelpolight_core as gp
+from app.command_line import calibrate
 from app.command_line.calibrate import run_as_json
 from app.command_line.main import main
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.calibration.remarks import write_remark
+from gelpolight_core.quality import Verdict
 from gelpolight_core.sensor_calibration import Calibration
 
 
@@ -85,6 +91,39 @@ def test_a_press_is_measured_against_its_truth(
     assert m["calibration_sd"] is None
     assert m["diameter_mm"] == pytest.approx(5.0, rel=0.06)
     assert m["height_mm"] == pytest.approx(1.0, rel=0.06)
+
+
+def test_a_calibration_that_failed_is_reported_by_every_command(
+    session: Path, calibration: Path, press: Path, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    failed = scene.failed(read_calibration(calibration))
+    file, result = tmp_path / "failed.gplcal", tmp_path / "m.json"
+    write_calibration(failed, file)
+    write_remark(file, "accepted", "for teaching")
+    commands = (
+        ["measure", str(file), str(press), "--shape", "cylinder", "--json", str(result)],
+        ["reconstruct", str(file), str(press), "-o", str(tmp_path)],
+    )
+    for command in commands:
+        assert main(command) == 0
+        assert "FAIL: the calibration failed its quality check" in capsys.readouterr().err
+    m = json.loads(result.read_text())
+    assert m["verdict"] == "doubtful"
+    assert m["reason"].startswith("the calibration failed its quality check (Half a pixel")
+    height_map = gp.read_height_map(tmp_path / f"{press.stem}.npz")
+    assert gp.measure(height_map, shape="cylinder").reason == m["reason"]
+    assert main(["inspect", str(file)]) == 0
+    assert "for teaching" in capsys.readouterr().out
+
+    run = SimpleNamespace(calibration=failed, response=SimpleNamespace(summary=""))
+    monkeypatch.setattr(calibrate, "calibrate_any", lambda *_given, **_named: run)
+    monkeypatch.setattr(calibrate, "run_as_json", lambda run: {"verdict": run.calibration.verdict})
+    out = ["-o", str(tmp_path / "again.gplcal"), "--json", str(result)]
+    assert main(["calibrate", str(session), *out]) == 0
+    assert "FAIL: the calibration failed" in capsys.readouterr().err
+    assert json.loads(result.read_text())["verdict"] == "fail"
+    assert read_calibration(tmp_path / "again.gplcal").verdict is Verdict.FAIL
 
 
 def test_the_full_model_gives_its_uncertainty(

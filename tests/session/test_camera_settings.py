@@ -70,10 +70,3 @@ def test_whatever_a_strangers_calibration_says_does_no_harm(texts: dict[str, str
     found = settings_of_texts({"name": "camera", "identity": "x", "width": "nan", **texts})
     if found is not None:
         assert all(abs(value) <= 1e9 for value in found.controls.values())
-
-
-def test_settings_are_of_a_camera_or_of_another_one_of_its_make() -> None:
-    assert SETTINGS.is_of("046d:081b@SN1", "")
-    assert SETTINGS.is_of("046d:081b@1-2:1.0", "046d:081b")
-    assert not SETTINGS.is_of("1234:5678@x", "1234:5678")
-    assert not replace(SETTINGS, model="").is_of("x", "")

@@ -38,20 +38,23 @@ class Saving(QObject):
         view.report_wanted.connect(self.report)
 
     def save(self) -> None:
-        """Write the calibration into the library and use it from now on."""
+        """Write the calibration into the library, and use it from now on unless it failed."""
         project, workspace = self._model.project, self._context.workspace
 
-        def work(_progress: object) -> Path:
+        def work(_progress: object) -> tuple[Path, str]:
             calibration = project.finish().calibration
             name = f"{calibration.sensor.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
             path = workspace.keep_calibration(calibration, name)
-            workspace.use(path)
-            return path
+            if not calibration.fault:
+                workspace.use(path)
+            return path, calibration.fault
 
-        def done(path: Path) -> None:
-            self._view.show_saved(
-                tr("Saved as {path} and now in use. Validate it next.").format(path=path)
-            )
+        def done(saved: tuple[Path, str]) -> None:
+            path, fault = saved
+            text = tr("Saved as {path} and now in use. Validate it next.")
+            if fault:
+                text = tr("Saved as a draft, {path}, and not in use: {fault}.")
+            self._view.show_saved(text.format(path=path, fault=fault), "fail" if fault else "pass")
             self._context.requests.calibrations_changed.emit()
             self._model.saved_as.emit(str(path))
 

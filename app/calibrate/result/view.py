@@ -29,6 +29,8 @@ from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.missing import OPEN_STAGES
 from gelpolight_core.translation import tr
 
+FAIL = StageState.FAIL
+
 
 class ResultView(QWidget):
     """Shows all stages and the buttons to save the calibration and its report.
@@ -117,9 +119,9 @@ class ResultView(QWidget):
         for stage, row in self._rows.items():
             row.show_state(*states[row.step.key], statuses[stage].quality)
         done = all(is_done(statuses[stage].state.value) for stage in self._rows)
+        failed = [row.step.title for s, row in self._rows.items() if statuses[s].state is FAIL]
         made = all(
-            is_done(statuses[stage].state.value) or statuses[stage].state is StageState.FAIL
-            for stage in self._rows
+            is_done(statuses[s].state.value) or statuses[s].state is FAIL for s in self._rows
         )
         open_steps = [s for s in statuses.values() if not is_done(s.state.value)]
         if done:
@@ -141,6 +143,12 @@ class ResultView(QWidget):
             ).format(name=saved)
         elif busy:
             text = tr("Computing. Please wait.")
+        elif made:
+            text = tr(
+                "Failed: {titles}. Correct this. Until then the calibration can be saved only as a "
+                "draft, which is not used for measuring."
+            )
+            text = text.format(titles=", ".join(failed))
         else:
             text = self._missing_sentence(statuses)
             if any(s.state is StageState.STALE for s in open_steps):
@@ -150,6 +158,8 @@ class ResultView(QWidget):
                 )
             text = text.format(n=len(open_steps))
         self.headline.setText(text)
+        show_meaning(self.headline, "fail" if failed else "")
+        self.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
         running = any(states[row.step.key][0] == RUNNING for row in self._rows.values())
         self.save.setEnabled(done or (made and not running))
         self.save.setStyleSheet("font-weight: bold;" if done else "")

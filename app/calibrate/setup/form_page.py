@@ -20,7 +20,7 @@ from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
-from gelpolight_core.calibration.elastomer import ELASTOMER_LENGTH
+from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.translation import tr
 
 FORM_WIDTH, LEAST_WIDTH = 640, 320
@@ -72,7 +72,7 @@ class FormPage(QScrollArea):
             QLineEdit(), "setup.elastomer", tr("Name or serial number of the elastomer"),
             tr("Tells elastomers apart: the presses are counted for each. May be empty"),
         )  # fmt: skip
-        self.elastomer.setMaxLength(ELASTOMER_LENGTH)
+        self.elastomer.setMaxLength(REMARK_LENGTH)
         self.elastomer.setPlaceholderText(tr("for example gel 7"))
         for group in self.groups():
             column.addWidget(group)

@@ -16,6 +16,7 @@ from app.calibrate.maps import depth_panel
 from app.calibrate.model import WizardModel
 from app.calibrate.validation.panel import ValidationPanel
 from app.calibrate.validation.trial import KnownObject, Trial, run_trial
+from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
 from app.workspace.entries import read_entry
@@ -240,12 +241,7 @@ class Validating(QObject):
 
     def put_into_use(self) -> None:
         """Use the validated calibration on the other pages from now on."""
-        try:
-            self._context.workspace.use(self._path)
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-            return
-        self._context.requests.calibrations_changed.emit()
+        put_into_use(self._path, self._panel, context=self._context)
 
     def _recorded(self) -> Validation | None:
         if self._path is None:

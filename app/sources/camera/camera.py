@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import operator
 import socket
 import threading
 import time
@@ -64,7 +65,9 @@ class Camera:
     driver : CameraDriver
         Opens it.
     device : Device
-        The camera; its identity finds it again after it was plugged into another port.
+        The camera.
+    is_same : callable, optional
+        Whether two identities are those of one camera, to find it again at another port.
     on_change : callable, optional
         Called without argument, in the camera's thread, when :attr:`state` has changed.
     pause_s : float, optional
@@ -80,13 +83,14 @@ class Camera:
         driver: CameraDriver,
         device: Device,
         *,
+        is_same: Callable[[str, str], bool] = operator.eq,
         on_change: Callable[[], object] = lambda: None,
         pause_s: float = FIRST_PAUSE_S,
         silence_s: float = SILENCE_S,
         check_s: float = CHECK_S,
     ) -> None:
         self.device = device
-        self._driver, self._on_change = driver, on_change
+        self._driver, self._is_same, self._on_change = driver, is_same, on_change
         self._pause_s, self._silence_s, self._check_s = pause_s, silence_s, check_s
         self._lock = threading.Lock()
         self._state = CameraState()
@@ -256,12 +260,12 @@ class Camera:
             self._since_s = time.monotonic()
         self._reopen.clear()
         wanted = self.wanted
-        device = find_device(self._driver.devices(), self.device.identity, self.device.model)
+        device = find_device(self._driver.devices(), self.device.identity, self._is_same)
         if device is None:
             raise CameraGone(
                 tr("the camera is not plugged in"),
                 where=self.device.name,
-                advice=tr("Plug it in; it then continues automatically"),
+                advice=tr("Plug it in at the same port; it then continues automatically"),
             )
         offered = self._driver.formats(device)
         asked = format_of(wanted) or best_format(offered)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +15,7 @@ from gelpolight_core.translation import tr
 UNCOMPRESSED = ("RGB3", "BGR3", "YUYV", "UYVY", "NV12", "NV21", "YU12", "YV12")
 """In order of preference: full colour, colour at half width, colour at half width and height."""
 COMPRESSED = ("MJPG", "JPEG")
+PORT = " at "
 
 
 class CameraGone(SourceLost):
@@ -28,7 +30,8 @@ class Device:
     ----------
     identity : str
         Identifies the camera independently of the order of connection: vendor and product, and
-        its serial number or port if the system reports them.
+        its serial number and port if the system reports them. The port follows :data:`PORT`, where
+        there is a serial number.
     name : str
         Name shown to the user.
     model : str
@@ -126,13 +129,18 @@ class CameraDriver(Protocol):
         """
 
 
-def find_device(devices: tuple[Device, ...], identity: str, model: str) -> Device | None:
-    """Return the given camera; if it was moved, the only connected one of the same model."""
-    for device in devices:
-        if device.identity == identity:
-            return device
-    alike = [device for device in devices if model and device.model == model]
-    return alike[0] if len(alike) == 1 else None
+def without_port(identity: str) -> str:
+    """Return the part of an identity that stays when a camera is plugged into another port."""
+    return identity.partition(PORT)[0]
+
+
+def find_device(
+    devices: tuple[Device, ...], identity: str, is_same: Callable[[str, str], bool]
+) -> Device | None:
+    """Return the given camera; if it was moved, the only connected one that is the same."""
+    alike = [device for device in devices if is_same(identity, device.identity)]
+    exact = [device for device in alike if device.identity == identity]
+    return exact[0] if exact else alike[0] if len(alike) == 1 else None
 
 
 def best_format(formats: tuple[Format, ...], size: tuple[int, int] | None = None) -> Format | None:

@@ -13,7 +13,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sources.camera.driver import COMPRESSED, UNCOMPRESSED, CameraGone, Device, Format
+from app.sources.camera.driver import (
+    COMPRESSED,
+    PORT,
+    UNCOMPRESSED,
+    CameraGone,
+    Device,
+    Format,
+)
 from app.sources.camera.properties import Properties
 from app.sources.camera.v4l2 import V4l2
 from app.sources.source import Setting
@@ -177,12 +184,13 @@ def _device(found: Any) -> Device:
 
 
 def _linux_port(path: str, folder: Path = Path("/sys/class/video4linux")) -> str:
-    """Return the serial number of the camera, or else the port that it is plugged into."""
+    """Return the serial number of the camera, if it has one, and the port it is plugged into."""
     try:
         interface = (folder / Path(path).name / "device").resolve(strict=True)
         serial = interface.parent / "serial"
         if serial.is_file() and re.search(r"[1-9A-Za-z]", text := serial.read_text().strip()):
-            return f"{text}/{interface.name.rpartition(':')[2]}"
+            port, _, part = interface.name.rpartition(":")
+            return f"{text}/{part}{PORT}{port}"
     except OSError:  # no such folder in a container: use the device's own name
         return path
     return interface.name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,12 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from technician import ScriptedCamera, Technician, read_rgb
 
+from app.context.context import AppContext
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.quality import QualityTable, Verdict, judge
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 
@@ -237,6 +241,29 @@ def test_the_saved_calibration_equals_that_of_the_command_line(
         (made.full.background, theirs.full.background),
     ):
         np.testing.assert_array_equal(ours, others)
+
+
+def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
+    technician: Technician, computed_project: Made, context: AppContext
+) -> None:
+    technician.begin(computed_project(), "result")
+    technician.click("result.save")
+    technician.rest()
+    used = context.workspace.in_use
+    assert used is not None
+    project, view = technician.wizard.project, technician.wizard.at("result").view
+    results = project._results
+    failed = QualityTable((judge("k", "Half a pixel", 0.5, "px", fail=0.3),))
+    project._results = replace(results, top_pose=replace(results.top_pose, quality=failed))
+    technician.wizard.refresh()
+    assert "Failed" in view.headline.text() and view.headline.property("meaning") == "fail"
+    assert view.save.text() == "&Save as a draft"
+    technician.click("result.save")
+    technician.rest()
+    (draft,) = context.workspace.sensors_folder.rglob("*-draft.gplcal")
+    assert context.workspace.in_use == used
+    assert read_summary(draft).verdict is Verdict.FAIL
+    assert "not in use" in view.saved.text() and view.saved.property("meaning") == "fail"
 
 
 def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_again(

@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.cameras import panel as panel_module
 from app.cameras.dialog import CameraDialog
+from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
@@ -82,6 +83,45 @@ def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
     button.list_cameras()
     (none,) = [action for action in button.menu().actions() if ".camera." in action.objectName()]
     assert (none.text(), none.isEnabled()) == ("No camera connected", False)
+
+
+def test_two_cameras_with_one_serial_number_are_two_cameras(
+    context: AppContext, host: QWidget
+) -> None:
+    """Also after one of them is unplugged, and after a restart."""
+    one, two = (
+        FakeCamera(device=replace(C310, identity=f"046d:081b@200901010001/1.0 at 1-{port}"))
+        for port in (2, 3)
+    )
+    cameras, identities = context.cameras, (one.device.identity, two.device.identity)
+    cameras.driver = FakeDriver(one)
+    assert cameras.is_same(*identities)  # as far as is known: one camera at another port
+    assert cameras.is_same("046d:081b@200901010001/1.0", identities[0])  # of an older file
+    cameras.driver = FakeDriver(one, two)
+    infos = cameras.infos()
+    assert [info.name for info in infos] == [f"{C310.name} (1-2)", f"{C310.name} (1-3)"]
+    assert cameras.of(infos[0]) is not cameras.of(infos[1])
+    cameras.driver = FakeDriver(two)
+    cameras.infos()
+    again = CameraManager(settings=context.settings, status=context.status, toasts=context.toasts)
+    for manager in (cameras, again):
+        assert not manager.is_same(*identities)
+        assert not manager.is_same("046d:081b@200901010001/1.0", identities[0])
+    again.accept_same("046d:081b@200901010001/1.0", identities[0])
+    later = CameraManager(settings=context.settings, status=context.status, toasts=context.toasts)
+    assert later.is_same("046d:081b@200901010001/1.0", identities[0])
+    context.source.choose_again("camera", identities[0], cameras)
+    assert context.source.info is None  # only the other one is connected
+
+
+def test_settings_of_one_camera_are_not_those_of_another_of_its_model(
+    context: AppContext, panel: CameraPanel, qtbot: QtBot
+) -> None:
+    controls = {"exposure_auto": 0.0, "exposure_ms": 12.0}
+    twin = CameraSettings(C310.name, "046d:081b@SN2", C310.model, "YUYV", (128, 96), 7.5, controls)
+    context.cameras.refer("the calibration", twin)
+    qtbot.waitUntil(lambda: "another camera than" in panel.state.text(), timeout=WAIT_MS)
+    assert values(panel.camera)["exposure_ms"] == 33.3
 
 
 def test_the_dialog_opens_once_and_releases_the_camera(

@@ -6,13 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import scene
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.live.calibration_choice import CalibrationBox, CalibrationChoice
 from app.services.jobs import Job
+from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.sensor_calibration import Calibration
 
 
@@ -75,6 +78,36 @@ def test_a_replaced_file_is_read_again(
     assert reported == []
     second.done((path, "live 2", "best 2"))
     assert reported == [("live 2", "best 2")]
+
+
+def test_matching_is_the_newest_validated_one_and_never_one_that_failed(
+    context: AppContext, qtbot: QtBot
+) -> None:
+    box, workspace = CalibrationBox(), context.workspace
+    qtbot.addWidget(box)
+    choice = CalibrationChoice(Waiting(), box, context=context)  # type: ignore[arg-type]
+    plain = scene.calibration()
+
+    def kept(day: int, calibration: Calibration) -> Path:
+        provenance = replace(plain.provenance, created=f"2026-01-{day:02}T00:00:00+00:00")
+        made = replace(calibration, factors=day * plain.factors, provenance=provenance)
+        return workspace.keep_calibration(made, f"day {day}")
+
+    kept(4, scene.failed(plain))
+    choice.refresh()
+    choice.use_what_fits("T-1", None)
+    assert workspace.in_use is None
+    days = {day: kept(day, plain) for day in (1, 2, 3)}
+    choice.refresh()
+    choice.use_what_fits("T-1", None)
+    assert workspace.in_use == days[3]
+    for day in (1, 2):
+        trial = (Comparison("height", 1.0, 1.0, 8.0),)
+        identity = read_summary(days[day]).identity
+        write_validation(Validation(identity, "2026", "Ada", "cylinder", trial), days[day])
+    choice.refresh()
+    choice.use_what_fits("T-1", None)
+    assert workspace.in_use == days[2]
 
 
 def test_a_calibration_is_listed_by_its_name_with_its_sensor_in_the_tooltip(qtbot: QtBot) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from fake_camera import C310, FakeCamera, FakeDriver
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
+from app.live.advice import advise
 from app.live.calibration_choice import CalibrationBox
 from app.live.depth import LiveDepth
 from app.live.session import LiveSession
@@ -75,3 +78,27 @@ def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: Liv
     depth.live.processed.emit(Failure(0, large, "Another size."))
     assert depth.live_reconstructor is None
     assert switched == [reconstructor, None]
+
+
+def test_a_calibration_of_another_camera_is_used_only_if_the_user_says_that_it_is_the_same(
+    depth: LiveDepth,
+) -> None:
+    """Two cameras of one model with different identities; only the second is connected."""
+    context = depth._context
+    there = replace(C310, identity="046d:081b@1-3:1.0")
+    context.cameras.driver = FakeDriver(FakeCamera(device=there))
+    context.source.choose(context.cameras.infos()[0])
+    calibration = SimpleNamespace(
+        camera=SimpleNamespace(width=6, height=4), sensor=SimpleNamespace(serial="A")
+    )
+    texts = {"name": C310.name, "identity": "046d:081b@1-2:1.0", "model": C310.model}
+    calibration.provenance = SimpleNamespace(camera_settings=texts)
+    reconstructor: Any = SimpleNamespace(calibration=calibration)
+    depth.choose(reconstructor, reconstructor)
+    advice = advise(depth.state)
+    assert depth.live_reconstructor is None
+    assert advice.role == "fail" and advice.act == "same_camera"
+    assert "046d:081b@1-2:1.0" in advice.text and there.identity in advice.text
+    depth.act(advice.act)
+    assert depth.live_reconstructor is reconstructor
+    assert advise(depth.state).act != "same_camera"

@@ -13,6 +13,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFileDialog,
     QLabel,
+    QLineEdit,
     QProgressBar,
     QPushButton,
     QTableView,
@@ -121,6 +122,29 @@ def test_using_one_that_is_not_validated_warns(
     assert not chosen.validated
     assert context.toasts.shown()[-1].kind == "warn"
     assert not page.use.isEnabled()
+
+
+def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
+    page: SensorsPage, context: AppContext, tmp_path: Path, qtbot: QtBot
+) -> None:
+    path = context.workspace.keep_calibration(scene.failed(scene.calibration()), "made")
+    page.refresh()
+    page.use.trigger()
+    (question,) = page.findChildren(Question)
+    answer = question.findChild(QPushButton, "question.answer0")
+    reason = question.findChild(QLineEdit, "question.line")
+    assert "Half a pixel" in question.findChild(QLabel, "question.text").text()
+    qtbot.keyClicks(reason, "  ")
+    assert not answer.isEnabled()
+    assert context.workspace.in_use is None
+    qtbot.keyClicks(reason, "for teaching")
+    answer.click()
+    assert context.workspace.in_use == path
+    assert "Used although it failed: for teaching" in words(page)
+    write_entry_report(read_entry(path), tmp_path / "report.html")
+    assert "for teaching" in (tmp_path / "report.html").read_text("utf-8")
+    page._library.undo.undo()
+    assert context.workspace.in_use is None
 
 
 def test_a_validated_calibration_is_marked(

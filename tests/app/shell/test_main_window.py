@@ -44,6 +44,7 @@ from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
 from app.widgets.units import length_unit
+from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.errors import InputError
 
 
@@ -540,6 +541,27 @@ def test_the_status_line_names_the_calibration_in_use_whatever_page_is_open(
         context.requests.calibrations_changed.emit()
         value = context.status.value
         assert (value.calibration, value.calibration_note) == expected
+        assert (value.calibration_role == "warn") is (used is not None)
+
+
+def test_a_failed_calibration_in_use_is_red_above_every_page(window: MainWindow) -> None:
+    context = window.context
+    line = window.findChild(QLabel, "main.failed")
+    assert not line.isVisible()
+    path = context.workspace.keep_calibration(scene.failed(scene.calibration()), "made")
+    write_remark(path, "accepted", "for teaching")
+    context.workspace.use(path)
+    context.requests.calibrations_changed.emit()
+    for name in window.entries:
+        window.show_page(name)
+        assert line.isVisible()
+    assert "Half a pixel" in line.text() and "Calibrate again" in line.text()
+    assert line.property("meaning") == "fail"
+    label = window.findChild(QLabel, "main.status.calibration")
+    assert (label.text(), label.property("meaning")) == ("made-draft (failed)", "fail")
+    context.workspace.use(None)
+    context.requests.calibrations_changed.emit()
+    assert not line.isVisible()
 
 
 @pytest.mark.parametrize("shows", [True, False], ids=["with a viewer", "without"])

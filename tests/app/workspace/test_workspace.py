@@ -25,6 +25,7 @@ from app.workspace.validation import (
 from app.workspace.workspace import Workspace, folder_name
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
@@ -49,6 +50,21 @@ def trial(path: Path, *comparisons: Comparison) -> Validation:
     return Validation(
         read_summary(path).identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", comparisons
     )
+
+
+def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(
+    workspace: Workspace,
+) -> None:
+    path = workspace.keep_calibration(scene.failed(scene.calibration()), "monday")
+    (entry,) = workspace.entries()
+    assert (entry.name, entry.state) == ("monday-draft", ("failed", "fail"))
+    with pytest.raises(InputError, match="Half a pixel") as refusal:
+        workspace.use(path)
+    assert "reason" in refusal.value.advice
+    assert workspace.in_use is None
+    write_remark(path, "accepted", "only to look at the image")
+    workspace.use(path)
+    assert workspace.in_use == path
 
 
 def test_an_imported_calibration_is_kept_with_its_sensor(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import product
 
-from fake_camera import C310, FORMATS
+from fake_camera import FORMATS
 
 from app.sources.camera.driver import (
     UNCOMPRESSED,
@@ -13,6 +13,7 @@ from app.sources.camera.driver import (
     best_format,
     compression_warning,
     find_device,
+    without_port,
 )
 
 
@@ -45,11 +46,16 @@ ALL = [
 ]
 
 
-def test_a_camera_is_found_at_another_port_if_it_is_the_only_one_of_its_model() -> None:
-    moved = Device("046d:081b@1-4:1.0", C310.name, C310.model, "/dev/video2")
-    twin = Device("046d:081b@1-5:1.0", C310.name, C310.model, "/dev/video4")
-    other = Device("1234:5678@x", "Other", "1234:5678", "/dev/video6")
-    assert find_device((other, C310), C310.identity, C310.model) == C310
-    assert find_device((other, moved), C310.identity, C310.model) == moved
-    assert find_device((moved, twin), C310.identity, C310.model) is None
-    assert find_device((other,), "a", "") is None
+def test_a_camera_is_found_at_another_port_by_its_serial_number() -> None:
+    def same(one: str, other: str) -> bool:
+        return without_port(one) == without_port(other)
+
+    def device(identity: str) -> Device:
+        return Device(identity, "Camera", "046d:081b", "/dev/video0")
+
+    here, there, third = (device(f"046d:081b@SN1/1.0 at 1-{port}") for port in (2, 3, 4))
+    other = device("046d:081b@1-5:1.0")
+    assert find_device((other, there, here), here.identity, same) == here
+    assert find_device((other, there), here.identity, same) == there
+    assert find_device((there, third), here.identity, same) is None
+    assert find_device((device("046d:081b@1-6:1.0"),), other.identity, same) is None

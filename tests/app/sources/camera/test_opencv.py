@@ -166,7 +166,7 @@ def test_cameras_are_identified_by_their_identity_not_their_number(
     (tmp_path / "video3" / "device").symlink_to(port)
     assert opencv._linux_port("/dev/video3", tmp_path) == "1-2:1.0"
     (port.parent / "serial").write_text("5A1F33B0\n")
-    assert opencv._linux_port("/dev/video3", tmp_path) == "5A1F33B0/1.0"
+    assert opencv._linux_port("/dev/video3", tmp_path) == "5A1F33B0/1.0 at 1-2"
     (port.parent / "serial").write_text("00000000\n")  # common to all cheap cameras
     assert opencv._linux_port("/dev/video3", tmp_path) == "1-2:1.0"
     assert opencv._linux_port("/dev/video9", tmp_path) == "/dev/video9"

@@ -1,4 +1,4 @@
-"""The elastomer of a calibration: stated in the session or later, and optional."""
+"""Remarks in a calibration file: its elastomer, and why a failed one is used."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 import scene
 
-from gelpolight_core.calibration.elastomer import name_elastomer
 from gelpolight_core.calibration.file import MANIFEST, read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.provenance import provenance_of
+from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.closed import ClosedSession, read_any_session
@@ -28,23 +28,24 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_it_is_named_later_without_changing_the_calibration(file: Path) -> None:
+@pytest.mark.parametrize("key", ["elastomer", "accepted"])
+def test_it_is_written_later_without_changing_the_calibration(file: Path, key: str) -> None:
     before = read_calibration(file)
     with zipfile.ZipFile(file) as archive:
-        assert "elastomer" not in json.loads(archive.read(MANIFEST))
-    name_elastomer(file, " gel 7 ")
+        assert key not in json.loads(archive.read(MANIFEST))
+    write_remark(file, key, " gel 7 ")
     after = read_calibration(file)
-    assert after.provenance == replace(before.provenance, elastomer="gel 7")
+    assert after.provenance == replace(before.provenance, **{key: "gel 7"})
     assert after.identity == before.identity
-    assert read_summary(file).elastomer == "gel 7"
-    name_elastomer(file, "")
-    assert read_summary(file).elastomer == ""
+    assert getattr(read_summary(file), key) == "gel 7"
+    write_remark(file, key, "")
+    assert getattr(read_summary(file), key) == ""
 
 
-@pytest.mark.parametrize("name", ["x" * 81, "gel\x00"])
-def test_a_name_that_cannot_be_shown_is_refused(file: Path, name: str) -> None:
-    with pytest.raises(InputError, match="elastomer"):
-        name_elastomer(file, name)
+@pytest.mark.parametrize("name", ["x" * 201, "gel\x00"])
+def test_a_text_that_cannot_be_shown_is_refused(file: Path, name: str) -> None:
+    with pytest.raises(InputError, match="plain text"):
+        write_remark(file, "elastomer", name)
     assert read_summary(file).elastomer == ""
 
 

@@ -1,0 +1,47 @@
+"""Remarks that a calibration file gets after it was made; its identity does not change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.manifest import REMARK_LENGTH
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import plain_text
+from gelpolight_core.translation import tr
+
+
+def write_remark(path: Path, key: str, text: str) -> None:
+    """Write a remark into a calibration file. Empty: none.
+
+    The calibration keeps its identity: its validation and its measurements stay valid.
+
+    Parameters
+    ----------
+    path : Path
+        The calibration file.
+    key : str
+        ``elastomer``, its name or serial number, or ``accepted``, why a calibration that failed is
+        used.
+    text : str
+        At most `REMARK_LENGTH` characters.
+
+    Raises
+    ------
+    InputError
+        If the text cannot be used, or the file cannot be read or written.
+    """
+    try:
+        plain_text(text, REMARK_LENGTH)
+    except ValueError as error:
+        raise InputError(
+            tr("The text is not plain text of at most {n} characters").format(n=REMARK_LENGTH),
+            where=str(path),
+            advice=tr("Enter a shorter text without special characters"),
+        ) from error
+    calibration = read_calibration(path)
+    stated = replace(calibration.provenance, **{key: text.strip()})
+    changed = replace(calibration, provenance=stated)
+    vars(changed)["identity"] = calibration.identity
+    write_calibration(changed, path)
