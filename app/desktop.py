@@ -67,7 +67,7 @@ def run(arguments: Sequence[str] = ()) -> int:
     faults = Faults(context.toasts)
     faults.install()
     try:
-        theme.apply(application, context.settings.theme)
+        theme.apply(application, context.settings.preferences.theme)
         window = MainWindow(context=context)
         window.show_page(context.settings.first_page)
         window.show()
@@ -204,7 +204,7 @@ def make_context(
         Used instead of the user's own folders.
     """
     settings = Settings(settings_file)
-    use_length_unit(settings.length_unit)
+    use_length_unit(settings.preferences.length_unit)
     status, toasts = StatusModel(), Toasts()
     return AppContext(
         settings=settings,

@@ -128,7 +128,7 @@ class Wizard(QMainWindow):
         self._connect_open_step()
         panel, area, model = self.panel, self.area, self.model
         panel.next_wanted.connect(self._next)
-        panel.automatic.setChecked(self.context.settings.captures_automatically)
+        panel.automatic.setChecked(self.context.settings.preferences.captures_automatically)
         panel.automatic.toggled.connect(self._set_automatic)
         panel.cancel_wanted.connect(model.jobs.cancel)
         guide = self.context.requests.guide
@@ -245,7 +245,7 @@ class Wizard(QMainWindow):
             self._go_by(1)
 
     def _set_automatic(self, on: bool) -> None:
-        self.context.settings.captures_automatically = on
+        self.context.settings.prefer(captures_automatically=on)
 
     def _go_by(self, steps: int) -> None:
         row = self.presenters.index(self.open) + steps

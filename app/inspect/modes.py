@@ -109,8 +109,7 @@ class ModeChoice(QObject):
     @property
     def mode(self) -> Mode:
         """The mode in the settings, or the default if that one is not available."""
-        kept = Mode(*self._context.settings.reconstruction)
-        return kept if kept in MODES else Mode()
+        return self._context.settings.preferences.mode
 
     def offer(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Offer the modes of a calibration, and continue with the mode selected before."""
@@ -145,7 +144,7 @@ class ModeChoice(QObject):
 
     def _on_chosen(self, index: int) -> None:
         mode = self.box.itemData(index)
-        self._context.settings.reconstruction = (mode.model, mode.effort)
+        self._context.settings.prefer(reconstruction=f"{mode.model}/{mode.effort}")
         self._choose()
 
     def _follow_settings(self) -> None:

@@ -127,7 +127,7 @@ class RecordControl(QObject):
         room = room_for(
             figures,
             free_bytes=free_bytes(self._recorder.path),
-            limit_bytes=1e9 * self._context.settings.recording_limit_gb,
+            limit_bytes=1e9 * self._context.settings.preferences.recording_limit_gb,
         )
         self.action.setText(
             tr("{time}, {left}").format(time=time_text(figures.seconds), left=left_text(room))

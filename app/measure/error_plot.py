@@ -7,7 +7,7 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.measure.judging import DEPTH_FIGURES
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from app.theme import theme
 from app.widgets.naming import named
 from app.widgets.plots import without_menus

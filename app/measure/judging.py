@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult

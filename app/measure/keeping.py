@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from app.measure.judging import Judged, Stated
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
 
-from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QDoubleSpinBox,
-    QFormLayout,
-    QVBoxLayout,
-    QWidget,
-)
-
-from app.services.settings import Limits
-from app.widgets.inputs import DoubleSpinBox
+from app.services.preferences import Limits
+from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 
 class LimitsDialog(QDialog):
-    """Asks for the two limits. A button restores those of the paper."""
+    """Asks for the limits. A button restores those of the paper."""
 
     def __init__(self, limits: Limits, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         named(self, "measure.limits", tr("Error limits"))
         self.setWindowTitle(tr("Error limits"))
-        self._limits = limits
         words = PlainLabel(
             tr(
                 "A measurement passes if its errors are within these limits. The paper "
@@ -35,39 +25,15 @@ class LimitsDialog(QDialog):
             )
         )
         words.setWordWrap(True)
-        self.size = _percent("measure.limits.size", tr("Maximum error in the plane"))
-        self.height = _percent("measure.limits.height", tr("Maximum error in depth"))
-        self._show(limits)
-        form = QFormLayout()
-        form.addRow(tr("In the plane"), self.size)
-        form.addRow(tr("In depth"), self.height)
+        self.form = Form(limits, "measure.limits")
+        self.form.rows.setRowVisible(self.form.inputs["age_days"], False)
         kinds = QDialogButtonBox.StandardButton
         buttons = QDialogButtonBox(kinds.Ok | kinds.Cancel | kinds.RestoreDefaults)
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
         restore = buttons.button(kinds.RestoreDefaults)
         restore.setText(tr("Paper values"))
-        restore.clicked.connect(lambda: self._show(Limits()))
+        restore.clicked.connect(lambda: self.form.show_value(Limits(age_days=limits.age_days)))
         column = QVBoxLayout(self)
-        column.addWidget(words)
-        column.addLayout(form)
-        column.addWidget(buttons)
-
-    @property
-    def limits(self) -> Limits:
-        """The limits as set."""
-        return replace(
-            self._limits, size_percent=self.size.value(), height_percent=self.height.value()
-        )
-
-    def _show(self, limits: Limits) -> None:
-        self.size.setValue(limits.size_percent)
-        self.height.setValue(limits.height_percent)
-
-
-def _percent(name: str, accessible: str) -> QDoubleSpinBox:
-    box = named(DoubleSpinBox(), name, accessible)
-    box.setDecimals(1)
-    box.setRange(0.1, 100.0)
-    box.setSuffix(tr(" %"))
-    return box
+        for part in (words, self.form, buttons):
+            column.addWidget(part)

@@ -19,7 +19,7 @@ from app.measure.record_table import quantity_text, shape_label
 from app.measure.results_view import ResultsView
 from app.services.dropping import dropped_paths
 from app.services.jobs import Jobs
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from app.widgets.naming import named
 from app.workspace.indenters import FILE as INDENTERS
 from app.workspace.indenters import Indenter, read_indenters, write_indenters
@@ -220,7 +220,7 @@ class MeasurePage(QWidget):
         """Edit the maximum errors to pass."""
         dialog = LimitsDialog(self.context.settings.limits, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.accepted.connect(lambda: self._keep_limits(dialog.limits))
+        dialog.accepted.connect(lambda: self._keep_limits(dialog.form.value))
         dialog.open()
 
     def _keep_limits(self, limits: Limits) -> None:

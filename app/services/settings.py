@@ -6,8 +6,9 @@ import json
 import logging
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import Field, asdict, fields
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import platformdirs
 from PySide6.QtCore import QByteArray, QSettings
@@ -16,34 +17,16 @@ from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import cannot_write
 from gelpolight_core.io.reading import read_file
-from gelpolight_core.translation import LANGUAGES
+
+if TYPE_CHECKING:
+    from app.services.preferences import Limits, Preferences
 
 APPLICATION = "gelpolight"
-THEMES = ("system", "light", "dark")
 RECENT = 8
 RECENT_KINDS = ("sessions", "calibrations", "recordings")
-# About ten minutes of a fast camera.
-RECORDING_LIMIT_GB = 20.0
 CAMERAS = 16
+Kept = TypeVar("Kept")
 _LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits for warnings.
-
-    Attributes
-    ----------
-    age_days : float
-        An older calibration is marked: gel yellows and hardens within months.
-    height_percent, size_percent : float
-        Maximum error of an object of known size to pass validation. The defaults are the errors
-        that the paper reports for its own sensor: 8 % in depth and 5 % in the plane.
-    """
-
-    age_days: float = 90.0
-    height_percent: float = 8.0
-    size_percent: float = 5.0
 
 
 # Each kind of file dialog remembers a folder of its own.
@@ -87,34 +70,51 @@ class Settings:
         return str(self._store.value(key, default))
 
     @property
-    def theme(self) -> str:
-        """One of THEMES."""
-        theme = self._text("theme", "system")
-        return theme if theme in THEMES else "system"
-
-    @theme.setter
-    def theme(self, theme: str) -> None:
-        self._store.setValue("theme", theme)
+    def language(self) -> str:
+        """The preferred language, which is needed before modules with texts are loaded."""
+        return self._text("language")
 
     @property
-    def language(self) -> str:
-        """A key of LANGUAGES. Empty: the language of the system."""
-        language = self._text("language")
-        return language if language in LANGUAGES else ""
+    def preferences(self) -> Preferences:
+        """What the user prefers."""
+        from app.services.preferences import Preferences  # has texts
 
-    @language.setter
-    def language(self, language: str) -> None:
-        self._store.setValue("language", language)
+        return self._read(Preferences, "")
+
+    def prefer(self, **values: str | float) -> None:
+        """Change some of the preferences."""
+        self._keep(values, "")
+
+    @property
+    def limits(self) -> Limits:
+        """Limits for warnings."""
+        from app.services.preferences import Limits  # has texts
+
+        return self._read(Limits, "limits/")
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        self._keep(asdict(limits), "limits/")
+
+    def _read(self, kind: type[Kept], group: str) -> Kept:
+        """Return kept values. One that is missing or not possible gets its default."""
+        values = {}
+        for f in fields(kind):  # type: ignore[arg-type]
+            value = _value(self._text(group + f.name), f)
+            if value is not None:
+                values[f.name] = value
+        return kind(**values)
+
+    def _keep(self, values: Mapping[str, str | float], group: str) -> None:
+        for name, value in values.items():
+            text = {True: "yes", False: "no"}[value] if isinstance(value, bool) else value
+            self._store.setValue(group + name, text)
 
     @property
     def workspace_folder(self) -> Path:
         """Folder that contains the sensors."""
-        chosen = self._text("workspace")
+        chosen = self.preferences.workspace
         return Path(chosen) if chosen else default_folder()
-
-    @workspace_folder.setter
-    def workspace_folder(self, folder: Path) -> None:
-        self._store.setValue("workspace", str(folder))
 
     def folder(self, kind: str) -> Path:
         """Return the folder in which file dialogs of a kind start.
@@ -132,27 +132,10 @@ class Settings:
         self._store.setValue(_folder_key(kind), str(folder))
 
     @property
-    def last_page(self) -> str:
-        """Name of the page that was shown last."""
-        return self._text("last_page")
-
-    @last_page.setter
-    def last_page(self, name: str) -> None:
-        self._store.setValue("last_page", name)
-
-    @property
     def first_page(self) -> str:
         """Name of the page that is shown first: the Start page, or the last one if preferred."""
-        return self.last_page if self.starts_where_it_ended else "start"
-
-    @property
-    def starts_where_it_ended(self) -> bool:
-        """Whether the program starts with the page that was shown last."""
-        return self._text("first_page") == "last"
-
-    @starts_where_it_ended.setter
-    def starts_where_it_ended(self, last: bool) -> None:
-        self._store.setValue("first_page", "last" if last else "start")
+        preferences = self.preferences
+        return preferences.last_page if preferences.first_page == "last" else "start"
 
     def recent(self, kind: str) -> tuple[Path, ...]:
         """Return the files of a kind that were used last, newest first.
@@ -184,66 +167,6 @@ class Settings:
     def source(self, chosen: tuple[str, str]) -> None:
         for key, value in zip(("kind", "file"), chosen, strict=True):
             self._store.setValue(f"source/{key}", value)
-
-    @property
-    def limits(self) -> Limits:
-        """Limits for warnings. A value that is not a number is ignored."""
-        default = Limits()
-        values = {}
-        for field in fields(Limits):
-            standard = getattr(default, field.name)
-            try:
-                value = float(self._text(f"limits/{field.name}", str(standard)))
-            except ValueError:
-                value = standard
-            values[field.name] = value if 0.0 < value < 1e6 else standard
-        return Limits(**values)
-
-    @limits.setter
-    def limits(self, limits: Limits) -> None:
-        for field in fields(Limits):
-            self._store.setValue(f"limits/{field.name}", getattr(limits, field.name))
-
-    @property
-    def recording_limit_gb(self) -> float:
-        """Largest size of a recording, in 10^9 bytes. A value that is not a number is ignored."""
-        try:
-            value = float(self._text("recording_limit_gb", str(RECORDING_LIMIT_GB)))
-        except ValueError:
-            return RECORDING_LIMIT_GB
-        return value if 0.0 < value < 1e6 else RECORDING_LIMIT_GB
-
-    @recording_limit_gb.setter
-    def recording_limit_gb(self, limit_gb: float) -> None:
-        self._store.setValue("recording_limit_gb", limit_gb)
-
-    @property
-    def captures_automatically(self) -> bool:
-        """Whether the wizard captures good images by itself, and goes on by itself."""
-        return self._text("captures_automatically") != "no"
-
-    @captures_automatically.setter
-    def captures_automatically(self, on: bool) -> None:
-        self._store.setValue("captures_automatically", "yes" if on else "no")
-
-    @property
-    def reconstruction(self) -> tuple[str, str]:
-        """Model and effort of the live depth. The caller checks that they exist."""
-        model, _, effort = self._text("reconstruction", "full/fast").partition("/")
-        return model, effort
-
-    @reconstruction.setter
-    def reconstruction(self, mode: tuple[str, str]) -> None:
-        self._store.setValue("reconstruction", "/".join(mode))
-
-    @property
-    def length_unit(self) -> str:
-        """Unit in which measured lengths are shown: ``mm`` or ``um``."""
-        return "um" if self._text("length_unit") == "um" else "mm"
-
-    @length_unit.setter
-    def length_unit(self, unit: str) -> None:
-        self._store.setValue("length_unit", unit)
 
     def _cameras(self) -> dict[str, dict[str, str]]:
         try:
@@ -307,6 +230,19 @@ class Settings:
     def save(self) -> None:
         """Write the file now."""
         self._store.sync()
+
+
+def _value(text: str, f: Field[Any]) -> str | float | None:
+    """Return a kept value of a field, or None if it is not possible."""
+    if isinstance(f.default, bool):
+        return {"yes": True, "no": False}.get(text)
+    if isinstance(f.default, float):
+        try:
+            number = float(text)
+        except ValueError:
+            return None
+        return number if 0.0 < number < 1e6 else None
+    return text if text in f.metadata.get("choices", (text,)) else None
 
 
 def _folder_key(kind: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,6 +49,7 @@ from app.theme import theme
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
+from app.widgets.units import use_length_unit
 from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
@@ -202,7 +204,7 @@ class MainWindow(QMainWindow):
             if self._asked_for == name:
                 page = self.page(name)
                 self._switch_to(page)
-                self.context.settings.last_page = name
+                self.context.settings.prefer(last_page=name)
                 act(page)
 
         if name not in self._made:
@@ -367,12 +369,31 @@ class MainWindow(QMainWindow):
 
     def show_preferences(self) -> None:
         """Show the preferences."""
-        dialog = PreferencesDialog(self.context.settings, self)
-        dialog.theme_changed.connect(self.set_theme)
-        dialog.workspace_changed.connect(self._set_workspace)
-        dialog.changed.connect(self.context.requests.preferences_changed)
-        dialog.limits_changed.connect(self.context.requests.calibrations_changed)
-        _show(dialog)
+        settings = self.context.settings
+        shown = replace(settings.preferences, workspace=str(settings.workspace_folder))
+        _show(PreferencesDialog(shown, self._prefer, settings.limits, self._limit, self))
+
+    def _prefer(self, name: str, value: str | float) -> None:
+        settings, requests = self.context.settings, self.context.requests
+        settings.prefer(**{name: value})
+        match name:
+            case "theme":
+                self.set_theme(str(value))
+            case "language":
+                self.context.toasts.show(tr("Restart the program to change the language."))
+            case "workspace":
+                self.context.workspace.folder = settings.workspace_folder
+                requests.calibrations_changed.emit()
+            case "length_unit":
+                use_length_unit(str(value))
+                requests.preferences_changed.emit()
+            case "reconstruction":
+                requests.preferences_changed.emit()
+
+    def _limit(self, name: str, value: float) -> None:
+        settings = self.context.settings
+        settings.limits = replace(settings.limits, **{name: value})
+        self.context.requests.calibrations_changed.emit()
 
     def show_shortcuts(self) -> None:
         """Show all shortcuts."""
@@ -445,19 +466,15 @@ class MainWindow(QMainWindow):
 
     def set_theme(self, choice: str) -> None:
         """Apply a theme and remember it."""
-        self.context.settings.theme = choice
+        self.context.settings.prefer(theme=choice)
         self.menus.themes[choice].setChecked(True)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         theme.apply(application, choice)
 
     def _follow_desktop(self) -> None:
-        if self.context.settings.theme == "system":
+        if self.context.settings.preferences.theme == "system":
             self.set_theme("system")
-
-    def _set_workspace(self, folder: str) -> None:
-        self.context.workspace.folder = Path(folder)
-        self.context.requests.calibrations_changed.emit()
 
     def toggle_full_screen(self) -> None:
         """Switch full screen on or off."""

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtGui import QAction, QActionGroup
 
+from app.services.preferences import THEMES
 from app.shell.edit_menu import EditMenu
 from app.shell.file_menu import FileMenu
-from app.shell.preferences import THEME_NAMES
 from app.widgets.actions import make_action
 from gelpolight_core.translation import tr
 
@@ -108,12 +108,12 @@ class Menus:
     def _build_themes(self) -> dict[str, QAction]:
         group = QActionGroup(self._window)
         actions = {}
-        for key, label in THEME_NAMES.items():
+        for key, label in THEMES.items():
             action = make_action(
                 self._window, f"theme.{key}", label, lambda key=key: self._window.set_theme(key)
             )
             action.setCheckable(True)
-            action.setChecked(key == self._window.context.settings.theme)
+            action.setChecked(key == self._window.context.settings.preferences.theme)
             group.addAction(action)
             actions[key] = action
         return actions

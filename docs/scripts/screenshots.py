@@ -49,8 +49,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         home = Path(scratch)
         context = make_context(settings_file=home / "desktop.ini", log_folder=home / "log")
-        context.settings.theme = "light"
-        context.settings.captures_automatically = False
+        context.settings.prefer(theme="light")
+        context.settings.prefer(captures_automatically=False)
         context.workspace.folder = home / "GelPoLight"
         context.source.bench = Bench(SensorDesign().scaled(chosen.scale))
         window = MainWindow(context=context)

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.services.settings import Limits, Settings
+from app.services.preferences import Limits
+from app.services.settings import Settings
 from app.workspace.indenters import read_indenters
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.closed_project import open_project
@@ -17,6 +18,7 @@ from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
@@ -182,10 +184,10 @@ def test_settings_of_the_window_are_kept(folder: str, tmp_path: Path) -> None:
     file = Path(shutil.copy(DATA / folder / "desktop.ini", tmp_path))
     settings = Settings(file)
 
-    assert settings.theme == "dark"
-    assert settings.last_page == "measure"
+    assert settings.preferences.theme == "dark"
+    assert settings.preferences.last_page == "measure"
     assert settings.limits == Limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
-    assert settings.reconstruction == ("paper", "fast")
+    assert settings.preferences.mode == Mode()  # the one that was kept is not offered any more
     assert settings.camera("usb-1") == {"gain": "2.5"}
     assert settings.recent("sessions") == (Path("/lab/session"),)
     assert bytes(settings.window_state()[0].data()) == b"geometry"

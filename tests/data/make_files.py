@@ -129,11 +129,9 @@ def write_settings(path: Path) -> None:
     from PySide6.QtCore import QByteArray
 
     settings = named("app.services.settings:Settings", "app.shell.settings:Settings")(path)
-    limits = named("app.services.settings:Limits", "app.shell.settings:Limits")
-    settings.theme = "dark"
-    settings.last_page = "measure"
+    limits = named("app.services.preferences:Limits", "app.services.settings:Limits")
+    settings.prefer(theme="dark", last_page="measure", reconstruction="full/best")
     settings.limits = limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
-    settings.reconstruction = ("paper", "fast")
     settings.keep_camera("usb-1", {"gain": "2.5"})
     settings.keep_window_state(QByteArray(b"geometry"), QByteArray(b"state"))
     for add in ("add_recent", "add_recent_session"):

@@ -291,5 +291,5 @@ def _use_settings(path: Path) -> None:
     other = Path(tempfile.mkdtemp(dir=path.parent)) / path.name
     path.rename(other)
     settings = Settings(other)
-    _ = settings.theme, settings.workspace_folder, settings.folder("session"), settings.limits
+    _ = settings.preferences, settings.workspace_folder, settings.folder("session"), settings.limits
     _ = settings.recent("sessions"), settings.window_state(), settings.layout("a")

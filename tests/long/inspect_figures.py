@@ -202,7 +202,7 @@ def main() -> None:
         )
         context.workspace.folder = Path(folder) / "workspace"
         # As a person would have chosen it.
-        context.settings.reconstruction = (options.model or "full", options.effort)
+        context.settings.prefer(reconstruction=f"{options.model or 'full'}/{options.effort}")
         measurement = Measurement(options, context)
         measurement.start()
         QTimer.singleShot(int(1e3 * options.warm_up), measurement.begin)

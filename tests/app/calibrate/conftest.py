@@ -32,7 +32,7 @@ def camera(context: AppContext) -> ScriptedCamera:
 @pytest.fixture
 def technician(context: AppContext, qtbot: QtBot) -> Iterator[Technician]:
     """Return a technician with a window of a laptop's size, who captures by hand."""
-    context.settings.captures_automatically = False
+    context.settings.prefer(captures_automatically=False)
     page = CalibratePage(context=context)
     page.resize(*LAPTOP)
     page.show()

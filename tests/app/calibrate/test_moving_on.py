@@ -23,17 +23,17 @@ Made = Callable[[], CalibrationProject]
 def automatic(context: AppContext, technician: Technician, monkeypatch: pytest.MonkeyPatch) -> None:
     """Switch automatic captures on, and go on without a pause."""
     monkeypatch.setattr(moving_on, "LOOK_MS", 10)
-    context.settings.captures_automatically = True
+    context.settings.prefer(captures_automatically=True)
 
 
 def test_it_is_on_for_a_new_user_and_remembers_a_change(
     technician: Technician, context: AppContext, computed_project: Made, tmp_path: Path
 ) -> None:
-    assert Settings(tmp_path / "new.ini").captures_automatically
+    assert Settings(tmp_path / "new.ini").preferences.captures_automatically
     technician.begin(computed_project(), "lights")
     assert not technician.wizard.panel.automatic.isChecked()
     technician.wizard.panel.automatic.click()
-    assert context.settings.captures_automatically
+    assert context.settings.preferences.captures_automatically
 
 
 def test_a_completed_step_leads_to_the_next_one_that_needs_the_user_and_back(

@@ -262,7 +262,7 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     _wait_for_depth(page, qtbot)
     page.recorder.start()
     qtbot.waitUntil(lambda: page.recorder.action.text().endswith("left"), timeout=WAIT_MS)
-    context.settings.recording_limit_gb = 1e-6  # it stops by itself
+    context.settings.prefer(recording_limit_gb=1e-6)  # it stops by itself
     qtbot.waitUntil(lambda: not page.recorder.busy, timeout=4 * WAIT_MS)
     assert page.recorder.action.text() == "Record"
     assert any("size limit" in notice.text for notice in context.toasts.history)

@@ -70,7 +70,7 @@ def test_another_effort_is_used_at_once_and_saved(
     with qtbot.waitSignal(choice.chosen) as signal:
         choice.offer(full, full)
     assert signal.args[0].effort == "fast"
-    assert context.settings.reconstruction == ("full", "fast")
+    assert context.settings.preferences.mode == Mode("full", "fast")
 
 
 def test_a_calibration_of_the_papers_model_offers_one_mode(

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.measure.error_plot import ErrorPlot
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from app.theme import theme
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 

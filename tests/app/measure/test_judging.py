@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from app.measure.judging import Stated, judge
 from app.measure.keeping import Kept, record_of
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult

@@ -23,7 +23,7 @@ from app.context.context import AppContext
 from app.measure.grips import grips_of
 from app.measure.judging import Stated
 from app.measure.page import MeasurePage
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.measurement.tools import ProfileWidth, tool_from_dict
 from gelpolight_core.recording.recording import RecordingHeader

@@ -18,7 +18,7 @@ from app.context.context import AppContext
 from app.measure.press_check import TOLERANCE_MM, ImageMap, PressCheck, make_target
 from app.measure.protocol_bench import BenchHand
 from app.measure.protocol_view import ProtocolView
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from app.sources.bench import Bench
 from app.sources.source import SourceInfo
 from gelpolight_core.calibration.file import write_calibration

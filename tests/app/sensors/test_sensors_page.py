@@ -28,7 +28,7 @@ from app.sensors.model import cells_of
 from app.sensors.page import SensorsPage
 from app.sensors.report_writer import write_entry_report
 from app.sensors.trash_dialog import TrashDialog
-from app.services.settings import Limits
+from app.services.preferences import Limits
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.question import Question
 from app.workspace.entries import read_entry

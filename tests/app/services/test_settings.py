@@ -22,6 +22,6 @@ def test_settings_with_objects_are_set_aside_and_never_executed(
     made.sync()
     (tmp_path / "desktop.ini").write_bytes((tmp_path / "made.ini").read_bytes())
     settings = Settings(tmp_path / "desktop.ini")
-    assert settings.theme == "system"
+    assert settings.preferences.theme == "system"
     assert not (tmp_path / "harm").exists()
     assert (tmp_path / "desktop.ini.refused").exists()

@@ -20,7 +20,6 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
-    QComboBox,
     QDialog,
     QLabel,
     QPlainTextEdit,
@@ -33,7 +32,8 @@ from pytestqt.qtbot import QtBot
 from app.context.context import AppContext
 from app.context.pages import PageEntry
 from app.desktop import open_files
-from app.services.settings import Limits, Settings
+from app.services.preferences import Limits
+from app.services.settings import Settings
 from app.services.status import (
     Status,
     status_texts,
@@ -46,6 +46,7 @@ from app.shell.shortcuts import ShortcutSheet, shortcuts_of
 from app.widgets.units import length_unit
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.modes import Mode
 
 
 class Page(QWidget):
@@ -177,7 +178,7 @@ def test_size_and_page_are_remembered(
     first.resize(1111, 777)
     first.show_page("calibrate")
     first.close()
-    assert Settings(context.settings.path).last_page == "calibrate"
+    assert Settings(context.settings.path).preferences.last_page == "calibrate"
     assert make_window().size().toTuple() == (1111, 777)
 
 
@@ -236,7 +237,7 @@ def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
         "[window]\ngeometry=7\n"
     )
     settings = Settings(path)
-    assert settings.theme == "system"
+    assert settings.preferences.theme == "system"
     assert settings.limits == Limits()
     assert settings.recent("sessions") == ()
     assert settings.window_state()[0].isEmpty()
@@ -244,14 +245,14 @@ def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
 
 def test_settings_survive(tmp_path: Path) -> None:
     settings = Settings(tmp_path / "desktop.ini")
-    settings.theme = "dark"
+    settings.prefer(theme="dark")
     settings.limits = Limits(age_days=12.0, height_percent=3.0, size_percent=2.0)
-    settings.workspace_folder = tmp_path / "my, sensors; and=more"
+    settings.prefer(workspace=str(tmp_path / "my, sensors; and=more"))
     for number in range(12):
         settings.add_recent("sessions", tmp_path / f"session {number}")
     settings.save()
     again = Settings(tmp_path / "desktop.ini")
-    assert again.theme == "dark"
+    assert again.preferences.theme == "dark"
     assert again.limits == Limits(12.0, 3.0, 2.0)
     assert again.workspace_folder == settings.workspace_folder
     assert again.recent("sessions")[0] == tmp_path / "session 11"
@@ -427,33 +428,34 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     dialog = dialog_of(window, PreferencesDialog)
     asked = []
     window.context.requests.calibrations_changed.connect(lambda: asked.append(1))
-    dialog._limits["age_days"].setValue(7)
+    limits, inputs = dialog.limits.inputs, dialog.preferences.inputs
+    limits["age_days"].setValue(7)
     assert window.context.settings.limits.age_days == 7.0
-    dialog._folder.setText(str(tmp_path / "elsewhere"))
-    dialog._folder.editingFinished.emit()
+    folder = inputs["workspace"]
+    folder.setText(str(tmp_path / "elsewhere"))
+    folder.editingFinished.emit()
     assert window.context.workspace.folder == tmp_path / "elsewhere"
     assert len(asked) == 2
-    dialog.recording.setValue(5.0)
-    assert window.context.settings.recording_limit_gb == 5.0
-    dialog._first.setCurrentIndex(1)
-    assert window.context.settings.first_page == window.context.settings.last_page
-    dialog._first.setCurrentIndex(0)
-    assert window.context.settings.first_page == "start"
+    inputs["recording_limit_gb"].setValue(5.0)
+    assert window.context.settings.preferences.recording_limit_gb == 5.0
+    settings = window.context.settings
+    inputs["first_page"].setCurrentIndex(1)
+    assert settings.first_page == settings.preferences.last_page
+    inputs["first_page"].setCurrentIndex(0)
+    assert settings.first_page == "start"
     changed = []
     window.context.requests.preferences_changed.connect(lambda: changed.append(1))
-    mode = dialog.findChild(QComboBox, "preferences.mode")
-    assert mode is not None
+    mode = inputs["reconstruction"]
     mode.setCurrentIndex(mode.findText("best", Qt.MatchFlag.MatchContains))
-    assert window.context.settings.reconstruction == ("full", "best")
-    unit = dialog.findChild(QComboBox, "preferences.unit")
-    assert unit is not None
-    unit.setCurrentIndex(unit.findData("um"))
-    assert window.context.settings.length_unit == length_unit() == "um"
-    unit.setCurrentIndex(unit.findData("mm"))
+    assert settings.preferences.mode == Mode("full", "best")
+    unit = inputs["length_unit"]
+    unit.setCurrentIndex(1)
+    assert settings.preferences.length_unit == length_unit() == "um"
+    unit.setCurrentIndex(0)
     assert len(changed) == 3
-    dialog._folder.setText("not/absolute")
-    dialog._folder.editingFinished.emit()
-    assert dialog._folder.text() == str(tmp_path / "elsewhere")
+    folder.setText("not/absolute")
+    folder.editingFinished.emit()
+    assert folder.text() == str(tmp_path / "elsewhere")
     dialog.close()
 
 

@@ -1,0 +1,69 @@
+"""What the user prefers: one declaration for the settings file and for the dialog."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.widgets.forms import choice, folder, number
+from gelpolight_core.reconstruction.modes import MODES, Mode
+from gelpolight_core.translation import LANGUAGES, tr
+
+THEMES = {"system": tr("Same as the desktop"), "light": tr("Light"), "dark": tr("Dark")}
+
+
+@dataclass(frozen=True, slots=True)
+class Preferences:
+    """Preferences. Every field has a default, which replaces a value that is not possible."""
+
+    theme: str = choice("system", tr("&Theme"), THEMES)
+    first_page: str = choice(
+        "start", tr("At &start, show"),
+        {"start": tr("Start page"), "last": tr("Page that was shown last")},
+    )  # fmt: skip
+    language: str = choice(
+        "", tr("&Language"), {"": tr("Same as the system"), **LANGUAGES},
+        tr("Applies at the next start of the program"),
+    )  # fmt: skip
+    reconstruction: str = choice(
+        "full/fast", tr("&Live depth"), {f"{m.model}/{m.effort}": m.label for m in MODES},
+        tr("Accuracy or speed of live images, as on the Inspect page. Frozen images always "
+           "have the full accuracy of the model"),
+    )  # fmt: skip
+    length_unit: str = choice(
+        "mm", tr("&Unit of lengths"), {"mm": tr("mm"), "um": tr("um")},
+        tr("Depths and measured lengths are shown in this unit. Positions, inputs, records and "
+           "files keep mm"),
+    )  # fmt: skip
+    workspace: str = folder(
+        "", tr("&Workspace folder"), tr("Folder for sensors, calibrations and sessions")
+    )
+    # About ten minutes of a fast camera.
+    recording_limit_gb: float = number(
+        20.0, tr("Largest recording"), 0.1, 10_000.0, tr(" GB"), 1,
+        tip=tr("A recording stops at this size. Cameras need 2 GB a minute"),
+    )  # fmt: skip
+    captures_automatically: bool = True
+    last_page: str = ""
+
+    @property
+    def mode(self) -> Mode:
+        """Model and effort of the live depth."""
+        return Mode(*self.reconstruction.split("/"))
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits for warnings.
+
+    Attributes
+    ----------
+    age_days : float
+        An older calibration is marked: gel yellows and hardens within months.
+    height_percent, size_percent : float
+        Maximum error of an object of known size to pass validation. The defaults are the errors
+        that the paper reports for its own sensor: 8 % in depth and 5 % in the plane.
+    """
+
+    age_days: float = number(90.0, tr("Mark calibrations older than"), 1.0, 3650.0, " d")
+    height_percent: float = number(8.0, tr("Validation: maximum height error"), 0.1, 100.0, " %", 1)
+    size_percent: float = number(5.0, tr("Validation: maximum width error"), 0.1, 100.0, " %", 1)

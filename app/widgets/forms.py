@@ -1,0 +1,174 @@
+"""A form from a frozen dataclass: the metadata of a field say which input it gets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import Field, field, fields, replace
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QLineEdit, QWidget
+
+from app.theme.icons import icon
+from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+V = TypeVar("V")
+When = Callable[[Any], bool]
+"""Whether the row of a field is shown, from the value of the form."""
+
+
+def choice(default: Any, label: str, choices: Mapping[Any, str], tip: str = "") -> Any:
+    """Return a field with one of several values, each with its text."""
+    return field(default=default, metadata={"label": label, "choices": choices, "tip": tip})
+
+
+def number(
+    default: float, label: str, low: float, high: float, unit: str = "", decimals: int = 0, *,
+    step: float = 1.0, tip: str = "", none: str = "", slider: bool = False,
+    when: When | None = None,
+) -> Any:  # fmt: skip
+    """Return a field with a number. `none` is the text of the lowest value."""
+    span = {"span": (low, high), "unit": unit, "decimals": decimals, "step": step}
+    more = {"label": label, "tip": tip, "none": none, "slider": slider, "when": when}
+    return field(default=default, metadata=span | more)
+
+
+def switch(default: bool, label: str, text: str, tip: str = "", key: str = "") -> Any:
+    """Return a field with yes or no, a check box with a text. The tip names the key."""
+    return field(default=default, metadata={"label": label, "text": text, "tip": tip, "key": key})
+
+
+def folder(default: str, label: str, tip: str = "") -> Any:
+    """Return a field with the absolute path of a folder."""
+    return field(default=default, metadata={"label": label, "tip": tip})
+
+
+class Form(QWidget, Generic[V]):
+    """Shows a value and lets the user change it. Fields without a label are not shown.
+
+    Parameters
+    ----------
+    value : frozen dataclass
+        The first value.
+    name : str
+        Start of the object names of the inputs. The name of the field follows.
+
+    Attributes
+    ----------
+    value : frozen dataclass
+        As shown.
+    inputs : dict of str to QWidget
+        The input of each field.
+    rows : QFormLayout
+        The layout.
+
+    Signals
+    -------
+    changed(str, object)
+        The user has entered a value. The name of its field, and the value.
+    """
+
+    changed = Signal(str, object)
+
+    def __init__(self, value: V, name: str) -> None:
+        super().__init__()
+        self.inputs: dict[str, QWidget] = {}
+        self._show: dict[str, Callable[[Any], object]] = {}
+        self._when: dict[str, When] = {}
+        self.rows = QFormLayout(self)
+        self.rows.setContentsMargins(0, 0, 0, 0)
+        self.rows.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        for f in fields(value):  # type: ignore[arg-type]
+            if "label" in f.metadata:
+                made, meta = self._input(f), f.metadata
+                words = (meta["label"] or meta["text"]).replace("&", "")
+                named(made, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
+                self.inputs[f.name] = made
+                self.rows.addRow(meta["label"], made)
+                if meta.get("when") is not None:
+                    self._when[f.name] = meta["when"]
+        self.show_value(value)
+
+    def show_value(self, value: V) -> None:
+        """Show another value without a signal."""
+        self.value = value
+        for name, show in self._show.items():
+            with QSignalBlocker(self.inputs[name]):
+                show(getattr(value, name))
+        self._follow()
+
+    def change(self, **values: Any) -> None:
+        """Show other values of some fields, as if the user had entered them."""
+        self.show_value(replace(self.value, **values))  # type: ignore[type-var]
+        for name, value in values.items():
+            self.changed.emit(name, value)
+
+    def _follow(self) -> None:
+        for name, when in self._when.items():
+            self.rows.setRowVisible(self.inputs[name], when(self.value))
+
+    def _input(self, f: Field[Any]) -> QWidget:
+        name, meta = f.name, f.metadata
+
+        def change(value: Any) -> None:
+            if value != getattr(self.value, name):
+                self.value = replace(self.value, **{name: value})  # type: ignore[type-var]
+                self._follow()
+                self.changed.emit(name, value)
+
+        if "choices" in meta:
+            keys, box = list(meta["choices"]), ComboBox()
+            box.addItems(list(meta["choices"].values()))
+            box.currentIndexChanged.connect(lambda index: change(keys[index]))
+            self._show[name] = lambda v: box.setCurrentIndex(keys.index(v) if v in keys else 0)
+            return box
+        if "span" in meta:
+            scale = 10 ** meta["decimals"]
+            low, high = meta["span"]
+            if meta["slider"]:
+                bar = Slider(Qt.Orientation.Horizontal)
+                bar.setRange(round(scale * low), round(scale * high))
+                bar.valueChanged.connect(lambda v: change(v / scale))
+                self._show[name] = lambda v: bar.setValue(round(scale * v))
+                return bar
+            spin = SpinBox() if isinstance(f.default, int) else DoubleSpinBox()
+            if isinstance(spin, DoubleSpinBox):
+                spin.setDecimals(meta["decimals"])
+            spin.setRange(low, high)
+            spin.setSingleStep(meta["step"])
+            spin.setSuffix(meta["unit"])
+            spin.setSpecialValueText(meta["none"])
+            spin.setKeyboardTracking(False)
+            spin.valueChanged.connect(change)
+            self._show[name] = spin.setValue
+            return spin
+        if isinstance(f.default, bool):
+            check = QCheckBox(meta["text"])
+            check.toggled.connect(change)
+            self._show[name] = check.setChecked
+            return check
+        return self._folder(name, change)
+
+    def _folder(self, name: str, change: Callable[[str], None]) -> QLineEdit:
+        line = QLineEdit()
+
+        def entered() -> None:
+            path = Path(line.text().strip()).expanduser()
+            line.setText(str(path) if path.is_absolute() else getattr(self.value, name))
+            change(line.text())
+
+        def browse() -> None:
+            chosen = QFileDialog.getExistingDirectory(self, tr("Choose folder"), line.text())
+            if chosen:
+                line.setText(chosen)
+                entered()
+
+        line.editingFinished.connect(entered)
+        button = line.addAction(icon("folder"), QLineEdit.ActionPosition.TrailingPosition)
+        button.setToolTip(tr("Choose folder"))
+        button.triggered.connect(browse)
+        self._show[name] = line.setText
+        return line
