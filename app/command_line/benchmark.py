@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from app.command_line.common import refuse_overwriting, write_json
+from app.command_line.common import refuse_overwriting
 from app.command_line.reconstructing import add_effort, add_model, load_reconstructor, trace_lines
 from app.command_line.terminal import say
 from gelpolight_core.experiments.benchmark import benchmark_frame
-from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.io.atomic import refuse_unwritable, write_json
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
@@ -60,6 +60,7 @@ def run(options: argparse.Namespace) -> int:
     say("\n".join(trace_lines(result.trace)))
     if options.json:
         write_json(
+            options.json,
             {
                 "total_ms": {"median": result.total.median_ms, "p95": result.total.p95_ms},
                 "copy_floor_ms": result.copy_floor_ms,
@@ -71,6 +72,5 @@ def run(options: argparse.Namespace) -> int:
                 "plan": result.trace.as_dicts(),
                 "versions": result.versions,
             },
-            options.json,
         )
     return 0

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import StageProgress, quality_lines, refuse_overwriting, write_json
+from app.command_line.common import StageProgress, quality_lines, refuse_overwriting
 from app.command_line.reconstructing import add_model, report_failure
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
@@ -16,7 +16,7 @@ from gelpolight_core.calibration.any_session import calibrate_any
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.calibration.pipeline import CalibrationRun
-from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.io.atomic import refuse_unwritable, write_json
 from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN
 from gelpolight_core.session.closed import read_any_session
 from gelpolight_core.translation import tr
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
         content = run_as_json(result)
         lines = [tr("camera response: {what}").format(what=result.response.summary)]
     if options.json:
-        write_json(content, options.json)
+        write_json(options.json, content)
     say("\n".join([*lines, *quality_lines(result.calibration.quality)]))
     report_failure(result.calibration, options.output)
     say(

@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import write_json
 from app.command_line.terminal import harmless, say
 from app.sources.camera.applying import is_locked
 from app.sources.camera.driver import CameraDriver, Device, Format, best_format, compression_warning
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import write_json
 from gelpolight_core.translation import tr
 
 
@@ -44,7 +44,7 @@ def report(driver: CameraDriver, json: Path | None) -> int:
             )
         )
     if json is not None:
-        write_json({"cameras": found}, json)
+        write_json(json, {"cameras": found})
     return 0
 
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
 
 from tqdm import tqdm
 
 from app.command_line.terminal import harmless
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
@@ -87,16 +84,6 @@ def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
                 advice=tr("Choose another name or folder for the result"),
             )
         used.add(result)
-
-
-def write_json(content: Mapping[str, Any] | Sequence[Any], path: Path) -> None:
-    """Write a JSON file, completely or not at all."""
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-
-    def write(stream: BinaryIO) -> None:
-        stream.write(text.encode())
-
-    write_atomically(path, write)
 
 
 def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:

@@ -6,11 +6,11 @@ import argparse
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.command_line.common import quality_lines, refuse_overwriting, write_json
+from app.command_line.common import quality_lines, refuse_overwriting
 from app.command_line.reconstructing import load_reconstructor, read_frame
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.io.atomic import refuse_unwritable, write_json
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.translation import tr
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
             "verdict": shift.quality.verdict.value,
             "figures": shift.quality.as_rows(),
         }
-        write_json(content, options.json)
+        write_json(options.json, content)
     if options.zero:
         made = datetime.now(UTC).isoformat(timespec="seconds")
         new = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=made)

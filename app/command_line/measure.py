@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import refuse_overwriting, write_json
+from app.command_line.common import refuse_overwriting
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import (
     add_despite_faults,
@@ -19,7 +19,7 @@ from app.command_line.reconstructing import (
 from app.command_line.terminal import say
 from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.io.atomic import refuse_unwritable, write_json
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         entries.append({"image": image.name} | entry if several else entry)
         say("\n".join([f"{image}:", *(f"  {line}" for line in lines)] if several else lines))
     if options.json:
-        write_json(entries if several else entries[0], options.json)
+        write_json(options.json, entries if several else entries[0])
     return MENDABLE if refused else 0
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 from pathlib import Path
-from typing import BinaryIO
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import NameTakenError, write_atomically
@@ -22,15 +21,6 @@ def free_path(path: Path) -> Path:
         number += 1
         candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
     return candidate
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a small file completely or not at all."""
-
-    def write(stream: BinaryIO) -> None:
-        stream.write(data)
-
-    write_atomically(path, write)
 
 
 def copy_new(source: Path, wanted: Path) -> Path:

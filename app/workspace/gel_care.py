@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from app.workspace.files import write_bytes
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.io.reading import NEWEST, brief, parse_json, plain_text, read_file
+from gelpolight_core.io.atomic import make_folder, write_json
+from gelpolight_core.io.reading import (
+    brief,
+    check_version,
+    parse_json,
+    plain_text,
+    read_file,
+    refusing,
+)
 from gelpolight_core.translation import tr
 
 FILE = "gel-care.json"
@@ -35,15 +39,18 @@ def read_presses(folder: Path) -> dict[str, int]:
     """
     path = folder / FILE
     try:
-        return _parse(parse_json(read_file(path, SIZE_LIMIT)), path)
+        data = read_file(path, SIZE_LIMIT)
     except FileNotFoundError:
         return {}
-    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-        raise InputError(
-            tr("The list of presses cannot be read ({error})").format(error=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Repair the file, or delete it to count from 0"),
-        ) from error
+    with refusing(
+        tr("The list of presses cannot be read ({error})"),
+        path,
+        advice=tr("Repair the file, or delete it to count from 0"),
+    ):
+        content = parse_json(data)
+        check_version(content, FORMAT, VERSION, path)
+        rows = content["calibrations"].items()
+        return {plain_text(identity): _presses(row["presses"]) for identity, row in rows}
 
 
 def write_presses(presses: Mapping[str, int], folder: Path) -> None:
@@ -57,23 +64,7 @@ def write_presses(presses: Mapping[str, int], folder: Path) -> None:
     rows = {identity: {"presses": number} for identity, number in presses.items()}
     content = {"format": FORMAT, "version": VERSION, "calibrations": rows}
     make_folder(folder)
-    write_bytes(folder / FILE, (json.dumps(content, indent=1) + "\n").encode())
-
-
-def _parse(content: Any, path: Path) -> dict[str, int]:
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise ValueError("it is not a list of presses")
-    version = content["version"]
-    if type(version) is int and VERSION < version < NEWEST:
-        raise InputError(
-            tr(
-                "The list of presses has version {v}, but this program supports only version {k}"
-            ).format(v=version, k=VERSION),
-            where=str(path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
-        )
-    rows = content["calibrations"].items()
-    return {plain_text(identity): _presses(row["presses"]) for identity, row in rows}
+    write_json(folder / FILE, content)
 
 
 def _presses(value: Any) -> int:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import make_folder, write_atomically
-from gelpolight_core.io.reading import NAME_LIMIT, NEWEST, brief, parse_json, plain_text, read_file
+from gelpolight_core.io.atomic import make_folder, write_json
+from gelpolight_core.io.reading import (
+    NAME_LIMIT,
+    brief,
+    check_version,
+    parse_json,
+    plain_text,
+    read_file,
+    refusing,
+)
 from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.translation import tr
 
@@ -107,18 +114,26 @@ def read_indenters(folder: Path) -> tuple[Indenter, ...]:
     """
     path = folder / FILE
     try:
-        content = parse_json(read_file(path, SIZE_LIMIT))
-        return _parse(content, path)
+        data = read_file(path, SIZE_LIMIT)
     except FileNotFoundError:
         return first_indenters()
-    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-        raise InputError(
-            tr("The list of indenters cannot be read ({error})").format(
-                error=brief(str(error), 200)
-            ),
-            where=str(path),
-            advice=tr("Repair the file, or delete it to start with the default list"),
-        ) from error
+    with refusing(
+        tr("The list of indenters cannot be read ({error})"),
+        path,
+        advice=tr("Repair the file, or delete it to start with the default list"),
+    ):
+        content = parse_json(data)
+        check_version(content, FORMAT, VERSION, path)
+        return tuple(
+            Indenter(
+                plain_text(row["name"], NAME_LIMIT),
+                plain_text(row["shape"], NAME_LIMIT),
+                _length(row["size_mm"]),
+                None if row.get("second_mm") is None else _length(row["second_mm"]),
+                None if row.get("height_mm") is None else _length(row["height_mm"]),
+            )
+            for row in content["indenters"]
+        )
 
 
 def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
@@ -139,37 +154,8 @@ def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
                 advice=tr("Give each indenter a different name"),
             )
     content = {"format": FORMAT, "version": VERSION, "indenters": [asdict(row) for row in rows]}
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-
-    def write(stream: BinaryIO) -> None:
-        stream.write(text.encode())
-
     make_folder(folder)
-    write_atomically(folder / FILE, write)
-
-
-def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise ValueError("it is not a list of indenters")
-    version = content["version"]
-    if type(version) is int and VERSION < version < NEWEST:
-        raise InputError(
-            tr(
-                "The list of indenters has version {v}, but this program supports only version {k}"
-            ).format(v=version, k=VERSION),
-            where=str(path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
-        )
-    return tuple(
-        Indenter(
-            plain_text(row["name"], NAME_LIMIT),
-            plain_text(row["shape"], NAME_LIMIT),
-            _length(row["size_mm"]),
-            None if row.get("second_mm") is None else _length(row["second_mm"]),
-            None if row.get("height_mm") is None else _length(row["height_mm"]),
-        )
-        for row in content["indenters"]
-    )
+    write_json(folder / FILE, content)
 
 
 def _length(value: Any) -> float:

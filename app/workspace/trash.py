@@ -6,17 +6,16 @@ that they came from, the time, and whether the calibration was in use.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from app.workspace.entries import Entry, parse_time, read_entry
-from app.workspace.files import free_path, move_file, write_bytes
+from app.workspace.files import free_path, move_file
 from app.workspace.sessions import file_time
 from app.workspace.validation import validation_path
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.io.reading import parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
@@ -64,7 +63,7 @@ def put_into_trash(workspace: Path, path: Path, *, was_in_use: bool) -> Removal:
     folder = free_path(workspace / "trash" / f"{now:%Y%m%d-%H%M%S}-{path.parent.name}")
     make_folder(folder)
     note = {"folder": path.parent.name, "when": now.isoformat(), "in_use": was_in_use}
-    write_bytes(folder / NOTE, (json.dumps(note) + "\n").encode())
+    write_json(folder / NOTE, note)
     moved: list[Path] = []
     try:
         for file in (path, validation_path(path)):

@@ -7,15 +7,19 @@ It belongs to one calibration only, given by its identity.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.io.reading import NEWEST, brief, parse_json, plain_text, read_file
+from gelpolight_core.io.atomic import write_json
+from gelpolight_core.io.reading import (
+    brief,
+    check_version,
+    parse_json,
+    plain_text,
+    read_file,
+    refusing,
+)
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
@@ -106,12 +110,7 @@ def write_validation(validation: Validation, calibration: Path) -> Path:
         **asdict(validation),
         "passed": validation.passed,
     }
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-
-    def write(stream: BinaryIO) -> None:
-        stream.write(text.encode())
-
-    write_atomically(path, write)
+    write_json(path, content)
     return path
 
 
@@ -125,32 +124,20 @@ def read_validation(calibration: Path) -> Validation | None:
     """
     path = validation_path(calibration)
     try:
-        content = parse_json(read_file(path, SIZE_LIMIT))
-        return _parse(content, path)
+        data = read_file(path, SIZE_LIMIT)
     except FileNotFoundError:
         return None
-    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-        raise InputError(
-            tr("The validation cannot be read ({error})").format(error=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Validate the calibration again"),
-        ) from error
+    with refusing(
+        tr("The validation cannot be read ({error})"),
+        path,
+        advice=tr("Validate the calibration again"),
+    ):
+        content = parse_json(data)
+        check_version(content, FORMAT, VERSION, path)
+        return _parse(content)
 
 
-def _parse(content: Any, path: Path) -> Validation:
-    if not isinstance(content, Mapping) or content.get("format") != FORMAT:
-        raise ValueError("it is not a validation")
-    version = content["version"]
-    if type(version) is int and VERSION < version < NEWEST:
-        raise InputError(
-            tr("The validation has version {v}, but this program supports only version {k}").format(
-                v=version, k=VERSION
-            ),
-            where=str(path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
-        )
-    if version != VERSION:
-        raise ValueError(f"version {version!r}")
+def _parse(content: Any) -> Validation:
     validation = Validation(
         identity=_text(content["identity"]),
         when=_text(content["when"]),

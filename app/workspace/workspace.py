@@ -14,7 +14,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
@@ -24,13 +23,13 @@ from typing import TYPE_CHECKING
 import platformdirs
 
 from app.workspace.entries import Entry, read_entry
-from app.workspace.files import copy_file, copy_new, free_path, write_bytes
+from app.workspace.files import copy_file, copy_new, free_path
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.trash import Removal, put_into_trash, removals_in, take_from_trash
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import NameTakenError, make_folder
+from gelpolight_core.io.atomic import NameTakenError, make_folder, write_json
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.translation import tr
 
@@ -253,9 +252,9 @@ class Workspace:
                     where=str(path),
                     advice=tr("Calibrate again, or use it on the Sensors page with a reason"),
                 )
-        text = json.dumps({"in_use": path and path.relative_to(self.folder).as_posix()}) + "\n"
         make_folder(self.folder)
-        write_bytes(self.folder / STATE, text.encode())
+        in_use = path and path.relative_to(self.folder).as_posix()
+        write_json(self.folder / STATE, {"in_use": in_use})
         self._in_use = self.folder, path
 
     def import_calibration(self, source: Path) -> Path:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.translation import tr
 
@@ -63,8 +62,7 @@ def begin_or_go_on(settings: BatchSettings, out: Path) -> None:
     if (out / FILE).exists():
         require_same(settings, out)
         return
-    text = json.dumps(settings.as_json(), indent=1) + "\n"
-    write_atomically(out / FILE, lambda stream: stream.write(text.encode()))
+    write_json(out / FILE, settings.as_json())
 
 
 def require_same(settings: BatchSettings, out: Path) -> None:

@@ -18,8 +18,8 @@ from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import (
-    NEWEST,
     brief,
+    check_version,
     open_file,
     parse_json,
     read_member,
@@ -172,20 +172,8 @@ def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
 def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     """Return the manifest of an open file after its format, version and checksum are checked."""
     text = read_member(archive, MANIFEST, MANIFEST_LIMIT)
-    manifest = parse_json(text)
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise ValueError("not a calibration manifest")
-    version = manifest.get("version")
-    if type(version) is int and VERSION < version < NEWEST:
-        raise InputError(
-            tr(
-                "The calibration has version {v}, but this program only reads up to version {k}"
-            ).format(v=version, k=VERSION),
-            where=str(path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
-        )
-    if type(version) is not int or version < 1:
-        raise ValueError(f"version {version!r}")
+    manifest: dict[str, Any] = parse_json(text)
+    check_version(manifest, FORMAT, VERSION, path)
     stated = read_member(archive, f"{MANIFEST}.sha256", 64)
     if hashlib.sha256(text).hexdigest().encode() != stated:
         raise ValueError("the manifest's checksum is wrong")

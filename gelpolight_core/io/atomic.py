@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 import secrets
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -71,6 +72,16 @@ def write_atomically(
         ) from error
     except OSError as error:
         raise cannot_write(error, path) from error
+
+
+def write_text(path: Path, text: str, *, inside: Path | None = None) -> None:
+    """Write a text in UTF-8, as :func:`write_atomically`."""
+    write_atomically(path, lambda file: file.write(text.encode()), inside=inside)
+
+
+def write_json(path: Path, content: Mapping[str, Any] | Sequence[Any]) -> None:
+    """Write a JSON file, as :func:`write_atomically`."""
+    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def refuse_unwritable(path: Path) -> None:

@@ -14,7 +14,8 @@ import re
 import stat
 import tomllib
 import zipfile
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -181,6 +182,79 @@ def parse_json(data: bytes | str) -> Any:
         return json.loads(data, parse_constant=_refused, parse_float=_finite)
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
+
+
+def check_version(content: Any, form: str, newest: int, path: Path) -> None:
+    """Refuse the content of a file that has another format or an unknown version.
+
+    Parameters
+    ----------
+    content : object
+        Its keys ``format`` and ``version`` say what it is.
+    form : str
+        The name of the format.
+    newest : int
+        The newest version that this program reads; it reads all versions from 1.
+    path : Path
+        The file, for the error.
+
+    Raises
+    ------
+    InputError
+        If the version is newer.
+    ValueError
+        If the format is another one, or the version is invalid.
+    """
+    if not isinstance(content, dict) or content.get("format") != form:
+        raise ValueError(f"it is not marked as {form}")
+    version = content.get("version")
+    if type(version) is not int or not 1 <= version < NEWEST:
+        raise ValueError(f"version {brief(version)}")
+    refuse_newer(version, newest, path)
+
+
+def refuse_newer(version: int, newest: int, path: Path) -> None:
+    """Refuse a file of a newer version than this program reads.
+
+    Raises
+    ------
+    InputError
+        If it is newer.
+    """
+    if version > newest:
+        raise InputError(
+            tr("The file has version {v}, but this program only reads up to version {k}").format(
+                v=version, k=newest
+            ),
+            where=str(path),
+            advice=tr("Use a newer version of GelPoLight Studio"),
+        )
+
+
+@contextmanager
+def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
+    """Refuse a file whose content turns out to be invalid.
+
+    Parameters
+    ----------
+    found : str
+        The sentence of the error, with a placeholder ``{error}`` for the reason.
+    path : Path
+        The file.
+    advice : str
+        What to do about it.
+
+    Raises
+    ------
+    InputError
+        If the content raises one of the errors that wrong keys, types and values raise.
+    """
+    try:
+        yield
+    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
+        raise InputError(
+            found.format(error=brief(str(error), 200)), where=str(path), advice=advice
+        ) from error
 
 
 def plain_text(value: Any, most: int = 10_000) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import tomli_w
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.reading import brief, parse_toml, read_file
 from gelpolight_core.measurement.protocol import Protocol, check_protocol
 from gelpolight_core.session.table import Table
@@ -69,10 +69,7 @@ def write_protocol_file(content: ProtocolFile, folder: Path) -> None:
         },
     }
 
-    def write(stream: BinaryIO) -> None:
-        tomli_w.dump(table, stream)
-
-    write_atomically(folder / FILE_NAME, write)
+    write_text(folder / FILE_NAME, tomli_w.dumps(table))
 
 
 def read_protocol_file(folder: Path) -> ProtocolFile:
@@ -103,19 +100,7 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
 
 
 def _parse(top: Table) -> ProtocolFile:
-    if top.text("format") != FORMAT:
-        raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))
-    version = top.whole("version")
-    if version > VERSION:
-        raise InputError(
-            tr("the protocol has version {v} and this program knows version {k}").format(
-                v=version, k=VERSION
-            ),
-            where=str(top.path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
-        )
-    if version != VERSION:
-        raise top.wrong("version", tr("is unknown"))
+    top.check_version(FORMAT, VERSION)
     sensor, objects, places = (top.table(name) for name in ("sensor", "objects", "places"))
     top.no_more("format", "version", "sensor", "objects", "places")
     sensor.no_more("serial", "calibration")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.closing import Closing
-from gelpolight_core.io.reading import open_file, parse_json, unreadable
+from gelpolight_core.io.reading import open_file, parse_json, refuse_newer, unreadable
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.layout import FrameMark
 from gelpolight_core.recording.pixels import strip_rows, unpack_strip
@@ -158,14 +158,7 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
             advice=tr("Choose a recording made with this program"),
         )
     _, version, length, crc = layout.HEAD.unpack_from(head, layout.HEAD_AT)
-    if version > VERSION:
-        raise InputError(
-            tr(
-                "The recording has version {a}, but this program only reads up to version {b}"
-            ).format(a=version, b=VERSION),
-            where=str(path),
-            advice=tr("Open it with a newer version of the program"),
-        )
+    refuse_newer(version, VERSION, path)
     end = layout.DESCRIPTION_AT + length
     if length <= layout.DESCRIPTION_LIMIT and end <= size:
         text = os.pread(file, length, layout.DESCRIPTION_AT)

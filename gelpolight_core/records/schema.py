@@ -6,6 +6,7 @@ import sqlite3
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import refuse_newer
 from gelpolight_core.translation import tr
 
 # "GPLR": distinguishes our databases from those of other programs.
@@ -126,12 +127,5 @@ def _version(connection: sqlite3.Connection, path: Path) -> int:
             where=str(path),
             advice=tr("Move it away, or choose another folder"),
         )
-    if version > len(MIGRATIONS):
-        raise InputError(
-            tr(
-                "The records have version {a}, but this program only reads up to version {b}"
-            ).format(a=version, b=len(MIGRATIONS)),
-            where=str(path),
-            advice=tr("Open them with a newer version of the program"),
-        )
+    refuse_newer(version, len(MIGRATIONS), path)
     return int(version) if tables else 0

@@ -15,8 +15,9 @@ from gelpolight_core.session.images import SessionImages
 from gelpolight_core.session.missing import refuse_undescribed
 from gelpolight_core.session.session import (
     ELASTOMER,
+    FORMAT,
+    VERSION,
     Session,
-    check_version,
     parse_radii,
     parse_response,
     parse_session,
@@ -123,7 +124,7 @@ def parse_closed_session(content: dict[str, Any], path: Path) -> ClosedSession:
         If a key is unknown, missing, of the wrong kind or out of range; `path` is named.
     """
     top = Table(content, "", path)
-    check_version(top)
+    top.check_version(FORMAT, VERSION)
     sensor, scale = top.table("sensor"), top.table(IN_PLACE)
     camera = top.table("camera") if "camera" in content else Table({}, "camera", path)
     declared = parse_response(camera) if "camera" in content else None

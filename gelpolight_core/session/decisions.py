@@ -12,14 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import tomli_w
 
 from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.io.reading import NEWEST, brief, parse_toml, read_file
+from gelpolight_core.io.atomic import write_text
+from gelpolight_core.io.reading import brief, check_version, parse_toml, read_file, refusing
 from gelpolight_core.translation import tr
 
 FILE_NAME = "decisions.toml"
@@ -72,27 +71,17 @@ def read_decisions(folder: Path) -> Decisions:
     """
     path = folder / FILE_NAME
     try:
-        content = parse_toml(read_file(path, SIZE_LIMIT))
-        version = content.get("version")
-        if content.get("format") == FORMAT and type(version) is int and VERSION < version < NEWEST:
-            raise InputError(
-                tr(
-                    "The decisions have version {v}, but this program only reads up to version {k}"
-                ).format(v=version, k=VERSION),
-                where=str(path),
-                advice=tr("Use a newer version of GelPoLight Studio"),
-            )
-        if content.get("format") != FORMAT or version != VERSION:
-            raise ValueError("it is not marked as decisions of version 1")
-        return _parse(content)
+        data = read_file(path, SIZE_LIMIT)
     except FileNotFoundError:
         return Decisions()
-    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-        raise InputError(
-            tr("The decisions cannot be used ({reason})").format(reason=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct the file, or move it away to return to the detected values"),
-        ) from error
+    with refusing(
+        tr("The decisions cannot be used ({error})"),
+        path,
+        advice=tr("Correct the file, or move it away to return to the detected values"),
+    ):
+        content = parse_toml(data)
+        check_version(content, FORMAT, VERSION, path)
+        return _parse(content)
 
 
 def write_decisions(decisions: Decisions, folder: Path) -> None:
@@ -127,10 +116,7 @@ def write_decisions(decisions: Decisions, folder: Path) -> None:
         },
     }
 
-    def write(stream: BinaryIO) -> None:
-        tomli_w.dump(content, stream)
-
-    write_atomically(folder / FILE_NAME, write, inside=folder)
+    write_text(folder / FILE_NAME, tomli_w.dumps(content), inside=folder)
 
 
 def _parse(content: Mapping[str, Any]) -> Decisions:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import tomli_w
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import make_folder, write_atomically
+from gelpolight_core.io.atomic import make_folder, write_text
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.closed import IN_PLACE, ClosedSession
 from gelpolight_core.session.session import ELASTOMER, FORMAT, VERSION, Session
@@ -37,10 +37,7 @@ def write_description(session: Session | ClosedSession) -> None:
     if camera := _camera(session):
         content["camera"] = camera
 
-    def write(stream: BinaryIO) -> None:
-        tomli_w.dump(content, stream)
-
-    write_atomically(session.folder / FILE_NAME, write, inside=session.folder)
+    write_text(session.folder / FILE_NAME, tomli_w.dumps(content), inside=session.folder)
 
 
 def create_session(session: Session | ClosedSession) -> None:

@@ -190,7 +190,7 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         If a key is unknown, missing, of the wrong type or out of range; the message names `path`.
     """
     top = Table(content, "", path)
-    check_version(top)
+    top.check_version(FORMAT, VERSION)
     stated = top.table("sensor")
     sensor = _parse_sensor(stated)
     checkerboard = _parse_board(top.table("checkerboard"))
@@ -217,29 +217,6 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         parse_settings(camera) if "device" in camera.content else None,
         stated.optional_text(ELASTOMER),
     )
-
-
-def check_version(top: Table) -> None:
-    """Refuse a description of another format or version.
-
-    Raises
-    ------
-    InputError
-        If it is one; the message names the file.
-    """
-    if top.text("format") != FORMAT:
-        raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))
-    version = top.whole("version")
-    if version > VERSION:
-        raise InputError(
-            tr("The session has version {v}, but this program only reads up to version {k}").format(
-                v=version, k=VERSION
-            ),
-            where=str(top.path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
-        )
-    if version != VERSION:
-        raise top.wrong("version", tr("is unknown"))
 
 
 def parse_radii(balls: Table) -> tuple[dict[str, float], float | None]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.reading import brief, is_file_name, plain_text
+from gelpolight_core.io.reading import brief, check_version, is_file_name, plain_text
 from gelpolight_core.translation import tr
 
 MOST_WHOLE = 2**53
@@ -57,6 +57,15 @@ class Table:
         if type(value) is not int or abs(value) > MOST_WHOLE:
             raise self.wrong(key, tr("is not a whole number"))
         return value
+
+    def check_version(self, form: str, newest: int) -> None:
+        """Refuse a file of another format or version, as :func:`.io.reading.check_version`."""
+        if self.text("format") != form:
+            raise self.wrong("format", tr('is not "{name}"').format(name=form))
+        try:
+            check_version(self.content, form, newest, self.path)
+        except ValueError as error:
+            raise self.wrong("version", tr("is unknown")) from error
 
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
         """Return a number within a range, or the default if the key is missing."""

@@ -20,7 +20,7 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core.design.parts import BallPress, Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import make_folder, write_atomically
+from gelpolight_core.io.atomic import make_folder, write_atomically, write_text
 from gelpolight_core.simulation.boards import BoardPose, board_views
 from gelpolight_core.simulation.closed import CLOSED_STAGES, closed_session_toml
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -327,7 +327,7 @@ def _write_texts(out: Path, sensor: VirtualSensor, stages: Sequence[str], closed
     description = closed_session_toml(sensor) if closed else session_toml(design)
     texts = (description, json.dumps(truth_table(sensor, stages), indent=1), truth_csv(design))
     for name, text in zip((*_TEXTS, "presses/truth.csv"), texts, strict=True):
-        write_atomically(out / name, lambda stream, text=text: stream.write(text.encode()))  # type: ignore[misc]
+        write_text(out / name, text)
 
 
 def session_toml(design: SensorDesign) -> str:

@@ -151,7 +151,7 @@ def test_newer_records_are_refused_and_left_as_they_are(tmp_path: Path) -> None:
     newer.commit()
     newer.close()
     before = path.read_bytes()
-    with pytest.raises(InputError, match="have version 9, but this program"):
+    with pytest.raises(InputError, match="has version 9, but this program"):
         Records.open(path)
     assert path.read_bytes() == before
 

@@ -34,5 +34,5 @@ def test_a_file_of_version_1_is_read(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_a_damaged_or_newer_file_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE).write_text(text)
-    with pytest.raises(InputError, match="list of presses"):
+    with pytest.raises(InputError, match=r"list of presses|has version 3"):
         read_presses(tmp_path)
