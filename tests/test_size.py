@@ -81,7 +81,7 @@ MOST = {
     "tests/experiments": 982,
     "tests/export": 438,
     "tests/factors": 77,
-    "tests/golden": 197,
+    "tests/golden": 214,
     "tests/health": 264,
     "tests/image": 143,
     "tests/in_place": 675,
