@@ -23,7 +23,7 @@ THICKNESS_SD = 0.01
 INDEX_SD = 0.01
 """The same of each layer's refractive index: 0.014 of a silicone's."""
 HEIGHT_BY_RADIUS = 0.66
-"""Relative change of a height by that of all ball radii (docs/stability.md)."""
+"""Relative change of a height by that of all ball radii (docs/studies/stability.md)."""
 
 
 class StatedSd(NamedTuple):

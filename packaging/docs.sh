@@ -18,11 +18,10 @@ if [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
     echo "$wanted" >"$stamp"
 fi
 
-# The theme's makers warn of a coming MkDocs at every build; the locked one is not it.
-NO_MKDOCS_2_WARNING=1 "$venv/bin/python" -m mkdocs build --strict --quiet --clean --site-dir site
+"$venv/bin/python" -m properdocs build --strict --quiet --clean --site-dir site
 
 # Whoever hands the site on hands on the theme's scripts and styles.
-cp "$venv"/lib/python*/site-packages/mkdocs_material-*.dist-info/licenses/LICENSE site/assets/
+cp "$venv"/lib/python*/site-packages/properdocs_theme_mkdocs-*.dist-info/licenses/LICENSE site/LICENSE-theme.txt
 
 if grep -rnE '(src="|<link [^>]*href=")https?:' --include='*.html' site; then
     echo "These pages would fetch something from the network when they are read; keep it in docs/ instead." >&2

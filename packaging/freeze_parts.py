@@ -21,7 +21,7 @@ RESOURCES = ("checkerboards", "designs", "icons")
 # What setuptools puts beside the modules: see package-data in pyproject.toml.
 PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.jinja", "*.mo", "*.po", "py.typed")
 # Of the documentation: for search engines.
-GUIDE = ("*.md", "guide/*.md", "pictures/*")
+GUIDE = ("*.md", "guide/*.md", "reference/*.md", "pictures/*")
 NOT_READ = ("sitemap.xml", "sitemap.xml.gz")
 # Whose version the program asks for.
 NAMED_VERSIONS = (

@@ -33,10 +33,10 @@ PAGES = (
     ("guide/inspect", tr("Inspect")),
     ("guide/measure", tr("Measure")),
     ("guide/keeping-it-true", tr("Routine checks")),
-    ("closed-sensors", tr("Closed sensors")),
-    ("quality-figures", tr("Quality figures")),
-    ("health", tr("Faults of an image")),
-    ("troubleshooting", tr("Troubleshooting")),
+    ("guide/closed-sensors", tr("Closed sensors")),
+    ("reference/quality-figures", tr("Quality figures")),
+    ("reference/health", tr("Faults of an image")),
+    ("guide/troubleshooting", tr("Troubleshooting")),
 )
 # Guide page for each page of the program.
 OF_PAGE = {

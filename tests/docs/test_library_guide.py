@@ -15,7 +15,7 @@ from chapter import DOCS, blocks
 
 from app.command_line.main import main
 
-CHAPTER = "library.md"
+CHAPTER = "reference/library.md"
 
 
 def _run(chapter: str, folder: Path) -> types.ModuleType:

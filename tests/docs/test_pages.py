@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = tuple(sorted(DOCS.rglob("*.md")))
-GUIDE = (*sorted((DOCS / "guide").glob("*.md")), DOCS / "troubleshooting.md")
+GUIDE = tuple(sorted((DOCS / "guide").glob("*.md")))
 PICTURES = DOCS / "pictures"
 SCENES = tuple(sorted((DOCS / "scripts").glob("screenshot_*.py")))
 LARGEST_KB, ALL_KB = 100, 2000
@@ -42,7 +42,7 @@ def anchors_of(page: Path) -> set[str]:
 
 def nav_entries() -> list[str]:
     """Return the pages that the site's navigation names."""
-    config = (ROOT / "mkdocs.yml").read_text("utf-8")
+    config = (ROOT / "properdocs.yml").read_text("utf-8")
     return re.findall(r"^ +- [^:\n]+: (\S+\.md)$", config.partition("\nnav:")[2], re.MULTILINE)
 
 
@@ -89,6 +89,12 @@ def test_every_link_leads_to_a_page_a_picture_or_a_heading(page: Path) -> None:
             assert anchor in anchors_of(target), link
 
 
+def test_installed_pages_link_to_installed_pages() -> None:
+    """The studies are not installed."""
+    links = [link for page in PAGES if page.parent.name != "studies" for link in links_of(page)]
+    assert [link for link in links if "studies/" in link] == []
+
+
 def test_every_page_is_in_the_navigation_and_there() -> None:
     entries = nav_entries()
     assert sorted(entries) == sorted({str(page.relative_to(DOCS)) for page in PAGES})
@@ -120,7 +126,7 @@ def test_every_quoted_message_is_one_that_the_program_says(page: Path) -> None:
 
 def test_troubleshooting_quotes_messages() -> None:
     """The test above has something to look at."""
-    assert len(messages_of(DOCS / "troubleshooting.md")) > 60
+    assert len(messages_of(DOCS / "guide/troubleshooting.md")) > 60
 
 
 @guided

@@ -7,7 +7,7 @@ import re
 import pytest
 from chapter import DOCS
 
-CHAPTERS = ("library.md", "physics.md", "quality-figures.md")
+CHAPTERS = ("reference/library.md", "reference/physics.md", "reference/quality-figures.md")
 COLUMNS = (
     "Sensor A: matt",
     "Sensor B: glossy",
@@ -46,7 +46,7 @@ def test_formulas_can_be_read_without_anything_that_is_loaded(name: str) -> None
 
 def worths() -> list[dict[str, float]]:
     """Return what each term is worth on each sensor, um, as the tables of the ablation say."""
-    text = (DOCS / "ablation.md").read_text("utf-8")
+    text = (DOCS / "studies/ablation.md").read_text("utf-8")
     found = []
     for column in COLUMNS:
         table = text[text.index(f"### {column}") :].partition("\n### ")[0]
@@ -59,7 +59,7 @@ def worths() -> list[dict[str, float]]:
 
 def test_the_terms_are_worth_what_the_ablation_found() -> None:
     """The chapter's table is that of the ablation, which is made by a command."""
-    text = (DOCS / "physics.md").read_text("utf-8")
+    text = (DOCS / "reference/physics.md").read_text("utf-8")
     section = text[text.index("## What each term is worth") :].partition("\n## ")[0]
     rows = [line.split("|") for line in section.splitlines() if line.startswith("| ")]
     found = worths()

@@ -21,7 +21,7 @@ from gelpolight_core.sensor_calibration import Calibration
 
 ROOT = DOCS.parent
 NOTHING = "\N{EN DASH}"
-CHAPTER = (DOCS / "quality-figures.md").read_text("utf-8")
+CHAPTER = (DOCS / "reference/quality-figures.md").read_text("utf-8")
 # Of a development report, not of a sensor: how many of its own cases went wrong.
 ELSEWHERE = {"gelpolight_core/experiments/stability_report.py"}
 HIGHER_IS_BETTER = {"axis_ratio", "coverage", "signal_to_noise"}  # of a ball's contact

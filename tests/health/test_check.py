@@ -80,7 +80,7 @@ def test_a_shallow_wide_face_in_much_noise_is_no_change_of_light() -> None:
             assert not check.check(known.noisy(frame, seed=seed)).findings
 
 
-# At these sizes a press 1 mm deep is 10 um off; see docs/health.md.
+# At these sizes a press 1 mm deep is 10 um off; see docs/reference/health.md.
 AT_TEN_UM: list[tuple[str, Change]] = [
     ("exposure", light(1.0025, 1.0025, 1.0025)),
     ("exposure", light(0.9975, 0.9975, 0.9975)),

@@ -19,7 +19,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 
 zmq = pytest.importorskip("zmq")
-GUIDE = Path(__file__).resolve().parents[3] / "docs" / "streaming.md"
+GUIDE = Path(__file__).resolve().parents[3] / "docs" / "reference/streaming.md"
 WAIT_MS = 60_000
 
 
