@@ -31,8 +31,8 @@ IN_WORDS = {
     "None if odd.usual_odd_share > ODD_WARN_PERCENT / 100.0 else RADIUS_FAIL_PERCENT": (
         "{RADIUS_FAIL_PERCENT:g} %"
     ),
-    "camera.width / 500.0": "width / 500",
-    "camera.width / 50.0": "width / 50",
+    "camera.width / 500.0": "width/500",
+    "camera.width / 50.0": "width/50",
     "edge_limit_px(view.image_size[0])": "width / 200, at least 3 px",
     "LED_OFF_OF_WIDTH * rgb.shape[1]": "{LED_OFF_OF_WIDTH:g} widths",
     "worst_residual": "{100LARGEST_RESIDUAL:g} %, or {ALLOWED_RESIDUAL_PX:g} px",
@@ -142,11 +142,12 @@ def rows() -> dict[str, list[Row]]:
         head, _, table = section.partition("\n| figure |")
         modules = re.findall(r"`((?:gelpolight_core|app)/[\w/]+\.py)`", head)
         listed = []
-        for line in table.splitlines():
-            cells = [cell.strip() for cell in line.split("|")]
-            key = re.search(r"`([\w*]+)`", cells[1]) if len(cells) > 5 else None
+        for line in table.partition("\n\n")[0].splitlines():
+            _, figure, limits, *_ = (cell.strip() for cell in line.split("|"))
+            key = re.search(r"`([\w*]+)`", figure)
             if key is not None:
-                listed.append(Row(key[1], cells[2], cells[3]))
+                warn, _, fail = limits.rpartition(" / ") if limits != NOTHING else (NOTHING, "", NOTHING)
+                listed.append(Row(key[1], warn, fail))
         for module in modules:
             found.setdefault(module, []).extend(listed)
     return found
