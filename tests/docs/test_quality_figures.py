@@ -146,7 +146,9 @@ def rows() -> dict[str, list[Row]]:
             _, figure, limits, *_ = (cell.strip() for cell in line.split("|"))
             key = re.search(r"`([\w*]+)`", figure)
             if key is not None:
-                warn, _, fail = limits.rpartition(" / ") if limits != NOTHING else (NOTHING, "", NOTHING)
+                warn, _, fail = (
+                    limits.rpartition(" / ") if limits != NOTHING else (NOTHING, "", NOTHING)
+                )
                 listed.append(Row(key[1], warn, fail))
         for module in modules:
             found.setdefault(module, []).extend(listed)
@@ -247,8 +249,10 @@ def test_notes_and_faults_are_stated_with_the_limits_of_the_source(name: str) ->
 def test_the_limits_of_a_validation_are_those_of_a_new_installation() -> None:
     """The chapter says when a calibration counts as validated, and when as old."""
     # By its text: the module needs a window library, which this folder does without.
-    source = (ROOT / "app/services/settings.py").read_text("utf-8")
-    limit = {k: float(v) for k, v in re.findall(r"^    (\w+): float = ([\d.]+)$", source, re.M)}
+    source = (ROOT / "app/services/preferences.py").read_text("utf-8")
+    limit = {
+        k: float(v) for k, v in re.findall(r"^    (\w+): float = number\(([\d.]+)", source, re.M)
+    }
     text = " ".join(CHAPTER.split())
     assert f"height is right to {limit['height_percent']:g} % and its size to" in text
     assert f"its size to {limit['size_percent']:g} %" in text
