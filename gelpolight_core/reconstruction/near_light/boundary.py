@@ -1,7 +1,7 @@
 """Where the boundary of a solved region is free, decided from the solved depth.
 
 Depth 0 just outside the boundary is correct where the membrane is at rest. It is wrong where a
-contact crosses the boundary (docs/reference/physics.md, integration). The brightness does not show this: a
+contact crosses the boundary (physics chapter, integration). The brightness does not show this: a
 flat face looks almost like the untouched membrane. The first round is therefore integrated with
 depth 0 on the whole boundary. If the depth next to the boundary is not 0, it is integrated again
 with a free boundary: parts above the lowest level are pressed and stay free, and the others are set
