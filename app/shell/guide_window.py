@@ -9,16 +9,15 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QImage, QTextCursor, QTextDocument
 from PySide6.QtWidgets import (
     QDialog,
-    QHBoxLayout,
     QListWidget,
     QListWidgetItem,
-    QPushButton,
     QSplitter,
     QTextBrowser,
-    QVBoxLayout,
     QWidget,
 )
 
+from app.widgets.buttons import push_button
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -111,22 +110,16 @@ class GuideWindow(QDialog):
         self.list.itemActivated.connect(lambda i: self.show_page(i.data(Qt.ItemDataRole.UserRole)))
         self.text = named(GuideText(self), "guide.text", tr("Guide"))
         self.text.setOpenExternalLinks(False)
-        back = named(QPushButton(tr("Back"), self), "guide.back", tr("Back"))
+        back = push_button("guide.back", tr("Back"), self.text.backward)
         back.setEnabled(False)
         back.setAutoDefault(False)
-        back.clicked.connect(self.text.backward)
         self.text.backwardAvailable.connect(back.setEnabled)
         split = QSplitter(self)
         split.addWidget(self.list)
         split.addWidget(self.text)
         split.setStretchFactor(1, 1)
         split.setChildrenCollapsible(False)
-        row = QHBoxLayout()
-        row.addWidget(back)
-        row.addStretch(1)
-        column = QVBoxLayout(self)
-        column.addLayout(row)
-        column.addWidget(split, 1)
+        vbox(hbox(back, None), (split, 1), of=self)
 
     def show_page(self, name: str, heading: str = "") -> None:
         """Show a page, at a heading if one is given."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 
 from app.widgets.label import PlainLabel
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -23,10 +24,7 @@ class LoadingView(QWidget):
         bar = named(QProgressBar(), "main.loading.bar", tr("Page is loading"))
         bar.setRange(0, 0)
         bar.setFixedWidth(WIDTH)
-        column = QVBoxLayout(self)
-        column.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        column.addWidget(self._text)
-        column.addWidget(bar)
+        vbox(self._text, bar, of=self).setAlignment(Qt.AlignmentFlag.AlignCenter)
 
     def say(self, title: str) -> None:
         """Show the name of the page."""

@@ -6,34 +6,27 @@ import logging
 
 from PySide6.QtCore import QTimer, QUrl
 from PySide6.QtGui import QCloseEvent, QDesktopServices, QFontDatabase, QGuiApplication, QShowEvent
-from PySide6.QtWidgets import (
-    QDialog,
-    QHBoxLayout,
-    QPlainTextEdit,
-    QPushButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
 from app.services.log import KEPT, Log
-from app.theme.icons import icon
+from app.widgets.buttons import push_button
+from app.widgets.dialog import Dialog
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 REFRESH_MS = 250
 
 
-class LogWindow(QDialog):
+class LogWindow(Dialog):
     """Shows the records of this run, newest last."""
 
     def __init__(self, log: Log, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(parent, "log", tr("Log"))
         self._log = log
         self._seen = 0
-        named(self, "log", tr("Log"))
-        self.setWindowTitle(tr("Log"))
         self.resize(900, 480)
         self._levels = named(ComboBox(self), "log.level", tr("Minimum level"))
         for label, level in (
@@ -50,26 +43,16 @@ class LogWindow(QDialog):
         self._text.setMaximumBlockCount(KEPT)
         self._text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self._text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
-        copy = named(QPushButton(icon("copy"), tr("Copy"), self), "log.copy", tr("Copy the log"))
-        copy.clicked.connect(self.copy)
-        folder = named(
-            QPushButton(icon("folder"), tr("Open folder"), self),
-            "log.folder",
-            tr("Open the folder of the log files"),
-            str(log.folder),
+        copy = push_button(
+            "log.copy", tr("Copy"), self.copy, icon_name="copy", accessible=tr("Copy the log")
         )
-        folder.clicked.connect(
-            lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log.folder)))
-        )
-        row = QHBoxLayout()
-        row.addWidget(PlainLabel(tr("Show"), self))
-        row.addWidget(self._levels)
-        row.addStretch(1)
-        row.addWidget(copy)
-        row.addWidget(folder)
-        layout = QVBoxLayout(self)
-        layout.addLayout(row)
-        layout.addWidget(self._text, 1)
+        folder = push_button(
+            "log.folder", tr("Open folder"),
+            lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log.folder))),
+            icon_name="folder", accessible=tr("Open the folder of the log files"),
+            tip=str(log.folder),
+        )  # fmt: skip
+        self.fill(hbox(PlainLabel(tr("Show")), self._levels, None, copy, folder), (self._text, 1))
         self._timer = QTimer(self)
         self._timer.setInterval(REFRESH_MS)
         self._timer.timeout.connect(self._show_new)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu
 
 from app.services.preferences import THEMES
 from app.shell.edit_menu import EditMenu
@@ -35,75 +38,38 @@ class Menus:
         menu = window.menuBar().addMenu(tr("&View"))
         menu.addActions(list(window.page_actions.values()))
         menu.addSeparator()
-        themes = menu.addMenu(tr("&Theme"))
-        themes.addActions(list(self.themes.values()))
-        menu.addAction(
-            make_action(
-                window,
-                "view.fullscreen",
-                tr("&Full screen"),
-                window.toggle_full_screen,
-                keys=("F11",),
-            )
-        )
-        menu.addAction(
-            make_action(
-                window, "view.log", tr("&Log"), window.show_log, keys=("Ctrl+L",), icon_name="log"
-            )
-        )
+        menu.addMenu(tr("&Theme")).addActions(list(self.themes.values()))
+        self._add(menu, "view.fullscreen", tr("&Full screen"), window.toggle_full_screen, "F11")
+        self._add(menu, "view.log", tr("&Log"), window.show_log, "Ctrl+L", icon_name="log")
 
     def _build_tools(self) -> None:
         window = self._window
         menu = window.menuBar().addMenu(tr("&Tools"))
-        menu.addAction(
-            make_action(
-                window,
-                "tools.precision",
-                tr("&Error against run time…"),
-                window.show_precision,
-            )
-        )
-        menu.addAction(
-            make_action(
-                window, "tools.stability", tr("Numerical &stability…"), window.show_stability
-            )
-        )
+        self._add(menu, "tools.precision", tr("&Error against run time…"), window.show_precision)
+        self._add(menu, "tools.stability", tr("Numerical &stability…"), window.show_stability)
         if "inspect" in window.entries:
-            menu.addAction(
-                make_action(
-                    window, "tools.stream", tr("&Stream the live depth…"), window.show_stream
-                )
-            )
-        menu.addAction(
-            make_action(window, "tools.design", tr("&Design check…"), window.show_design)
-        )
+            self._add(menu, "tools.stream", tr("&Stream the live depth…"), window.show_stream)
+        self._add(menu, "tools.design", tr("&Design check…"), window.show_design)
 
     def _build_help(self) -> None:
         window = self._window
         menu = window.menuBar().addMenu(tr("&Help"))
-        menu.addAction(
-            make_action(window, "help.documentation", tr("&Documentation"), window.show_guide)
-        )
-        menu.addAction(
-            make_action(
-                window,
-                "help.shortcuts",
-                tr("&Keyboard shortcuts"),
-                window.show_shortcuts,
-                keys=("F1", "?"),
-            )
-        )
+        self._add(menu, "help.documentation", tr("&Documentation"), window.show_guide)
+        shortcuts = tr("&Keyboard shortcuts")
+        self._add(menu, "help.shortcuts", shortcuts, window.show_shortcuts, "F1", "?")
         boards = menu.addMenu(tr("&Printable checkerboards"))
         for square, use in ((3, tr("lens views")), (2, tr("top surface"))):
-            boards.addAction(
-                make_action(
-                    window,
-                    f"help.board_{square}mm",
-                    tr("Squares of {s} mm ({use})").format(s=square, use=use),
-                    lambda square=square: window.open_board(square),
-                )
-            )
-        menu.addAction(make_action(window, "help.about", tr("&About"), window.show_about))
+            text = tr("Squares of {s} mm ({use})").format(s=square, use=use)
+            show = partial(window.open_board, square)
+            self._add(boards, f"help.board_{square}mm", text, show)
+        self._add(menu, "help.about", tr("&About"), window.show_about)
+
+    def _add(
+        self, menu: QMenu, name: str, text: str, slot: Callable[[], object], *keys: str,
+        icon_name: str = "",
+    ) -> None:  # fmt: skip
+        action = make_action(self._window, name, text, slot, keys=keys, icon_name=icon_name)
+        menu.addAction(action)
 
     def _build_themes(self) -> dict[str, QAction]:
         group = QActionGroup(self._window)

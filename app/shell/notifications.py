@@ -6,20 +6,13 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtGui import QHideEvent
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QListWidget,
-    QListWidgetItem,
-    QPushButton,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QListWidget, QListWidgetItem, QToolButton, QWidget
 
 from app.services.toasts import ICONS, WORDS, Toasts
 from app.theme.icons import icon
+from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -99,25 +92,15 @@ class NotificationList(QFrame):
         empty = PlainLabel(tr("No messages in this run"), self)
         empty.setVisible(not toasts.history)
         self.list.setVisible(bool(toasts.history))
-        close = named(
-            QPushButton(tr("Close visible messages"), self),
-            "notifications.clear",
-            tr("Close visible messages"),
-        )
+        close = push_button("notifications.clear", tr("Close visible messages"), toasts.clear)
         close.setEnabled(bool(toasts.shown()))
-        close.clicked.connect(toasts.clear)
-        log = named(QPushButton(icon("log"), tr("Show log"), self), "notifications.log", tr("Log"))
-        log.clicked.connect(show_log)
+        log = push_button(
+            "notifications.log", tr("Show log"), show_log, icon_name="log", accessible=tr("Log")
+        )
         for button in (close, log):
             button.clicked.connect(self.close)
-        row = QHBoxLayout()
-        row.addStretch(1)
-        row.addWidget(close)
-        row.addWidget(log)
-        column = QVBoxLayout(self)
-        column.addWidget(empty, 1, Qt.AlignmentFlag.AlignCenter)
-        column.addWidget(self.list, 1)
-        column.addLayout(row)
+        centre = Qt.AlignmentFlag.AlignCenter
+        vbox((empty, 1, centre), (self.list, 1), hbox(None, close, log), of=self)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Go away for good: it is made again when it is asked for."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.services.preferences import Limits, Preferences
+from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
-from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 
-class PreferencesDialog(QDialog):
+class PreferencesDialog(Dialog):
     """Shows preferences and limits, and passes on their changes.
 
     Parameters
@@ -28,16 +28,10 @@ class PreferencesDialog(QDialog):
         self, preferences: Preferences, keep: Callable[[str, Any], object], limits: Limits,
         keep_limits: Callable[[str, Any], object], parent: QWidget,
     ) -> None:  # fmt: skip
-        super().__init__(parent)
-        named(self, "preferences", tr("Preferences"))
-        self.setWindowTitle(tr("Preferences"))
+        super().__init__(parent, "preferences", tr("Preferences"), once=True)
         self.setMinimumWidth(520)
         self.preferences = Form(preferences, "preferences")
         self.limits = Form(limits, "preferences")
         self.preferences.changed.connect(keep)
         self.limits.changed.connect(keep_limits)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        buttons.rejected.connect(self.reject)
-        column = QVBoxLayout(self)
-        for part in (self.preferences, self.limits, buttons):
-            column.addWidget(part)
+        self.fill(self.preferences, self.limits)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QShortcut
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QScrollArea, QWidget
 
+from app.widgets.dialog import Dialog
 from app.widgets.label import MarkupLabel, escaped, key_text
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
@@ -50,37 +52,27 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda s: s.group))
 
 
-class ShortcutSheet(QDialog):
+class ShortcutSheet(Dialog):
     """All shortcuts of the window in its current state."""
 
     def __init__(self, window: QWidget) -> None:
-        super().__init__(window)
-        named(self, "shortcuts", tr("Keyboard shortcuts"))
-        self.setWindowTitle(tr("Keyboard shortcuts"))
+        super().__init__(window, "shortcuts", tr("Keyboard shortcuts"), once=True)
         self.shortcuts = shortcuts_of(window)
-        rows, group = [], ""
-        for shortcut in self.shortcuts:
-            if shortcut.group != group:
-                group = shortcut.group
-                title = TITLES.get(group, group.capitalize())
-                rows.append(f"<tr><td colspan=2><h4>{escaped(title)}</h4></td></tr>")
-            rows.append(
+        rows = []
+        for group, shortcuts in groupby(self.shortcuts, lambda shortcut: shortcut.group):
+            title = TITLES.get(group, group.capitalize())
+            rows.append(f"<tr><td colspan=2><h4>{escaped(title)}</h4></td></tr>")
+            rows += [
                 f"<tr><td><b>{escaped(shortcut.keys)}</b>&nbsp;&nbsp;&nbsp;</td>"
                 f"<td>{escaped(shortcut.text)}</td></tr>"
-            )
-        sheet = named(
-            MarkupLabel(f"<table cellpadding=2>{''.join(rows)}</table>", self),
-            "shortcuts.table",
-            tr("Shortcuts"),
-        )
+                for shortcut in shortcuts
+            ]
+        text = MarkupLabel(f"<table cellpadding=2>{''.join(rows)}</table>")
+        sheet = named(text, "shortcuts.table", tr("Shortcuts"))
         sheet.setAlignment(Qt.AlignmentFlag.AlignTop)
         sheet.setMargin(8)
-        area = QScrollArea(self)
+        area = QScrollArea()
         area.setWidget(sheet)
         area.setWidgetResizable(True)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
-        buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.addWidget(area)
-        layout.addWidget(buttons)
+        self.fill(area)
         self.resize(420, max(520, round(TALL * window.height())))

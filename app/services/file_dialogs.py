@@ -1,0 +1,55 @@
+"""File dialogs that begin in the folder that was chosen last for the same kind of file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from app.services.settings import Settings
+
+
+def ask_open(
+    parent: QWidget, settings: Settings, kind: str, title: str, patterns: str
+) -> Path | None:
+    """Let the user choose a file. None: no file.
+
+    Parameters
+    ----------
+    parent : QWidget
+        The window.
+    settings : Settings
+        Keep the folder.
+    kind : str
+        One of FOLDER_KINDS.
+    title : str
+        Title of the dialog.
+    patterns : str
+        Names of the files, as in Qt.
+    """
+    chosen, _ = QFileDialog.getOpenFileName(parent, title, str(settings.folder(kind)), patterns)
+    return _kept(settings, kind, chosen)
+
+
+def ask_save(
+    parent: QWidget, settings: Settings, kind: str, title: str, name: str, patterns: str
+) -> Path | None:
+    """Let the user choose a file to write, `name` is proposed. See :func:`ask_open`."""
+    proposed = str(settings.folder(kind) / name)
+    chosen, _ = QFileDialog.getSaveFileName(parent, title, proposed, patterns)
+    return _kept(settings, kind, chosen)
+
+
+def ask_folder(parent: QWidget, settings: Settings, kind: str, title: str) -> Path | None:
+    """Let the user choose a folder. See :func:`ask_open`."""
+    chosen = QFileDialog.getExistingDirectory(parent, title, str(settings.folder(kind)))
+    if chosen:
+        settings.keep_folder(kind, Path(chosen))
+    return Path(chosen) if chosen else None
+
+
+def _kept(settings: Settings, kind: str, chosen: str) -> Path | None:
+    if not chosen:
+        return None
+    settings.keep_folder(kind, Path(chosen).parent)
+    return Path(chosen)

@@ -1,0 +1,57 @@
+"""Rows and columns of widgets, each in one expression."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
+
+Margins = int | tuple[int, int, int, int]
+
+
+def hbox(*parts: Any, of: QWidget | None = None, margins: Margins | None = None,
+        spacing: int | None = None) -> QHBoxLayout:  # fmt: skip
+    """Return a row of widgets, see :func:`vbox`."""
+    return _fill(QHBoxLayout(), parts, of, margins, spacing)
+
+
+def vbox(*parts: Any, of: QWidget | None = None, margins: Margins | None = None,
+           spacing: int | None = None) -> QVBoxLayout:  # fmt: skip
+    """Return a column of widgets.
+
+    Parameters
+    ----------
+    *parts : QWidget, QLayout, tuple or None
+        From top to bottom. A tuple is a part with its stretch and alignment. None is a space that
+        stretches, an int one of so many pixels.
+    of : QWidget, optional
+        The widget whose layout it is.
+    margins : int or (left, top, right, bottom), optional
+        Around all parts.
+    spacing : int, optional
+        Between two parts.
+    """
+    return _fill(QVBoxLayout(), parts, of, margins, spacing)
+
+
+def _fill(
+    box: QBoxLayout, parts: tuple[Any, ...], of: QWidget | None, margins: Margins | None,
+    spacing: int | None,
+) -> Any:  # fmt: skip
+    if of is not None:
+        of.setLayout(box)
+    if margins is not None:
+        box.setContentsMargins(*((margins,) * 4 if isinstance(margins, int) else margins))
+    if spacing is not None:
+        box.setSpacing(spacing)
+    for part in parts:
+        item, *more = part if isinstance(part, tuple) else (part,)
+        if item is None:
+            box.addStretch(*(more or (1,)))
+        elif isinstance(item, int):
+            box.addSpacing(item)
+        elif isinstance(item, QLayout):
+            box.addLayout(item, *more)
+        else:
+            box.addWidget(item, *more)
+    return box
