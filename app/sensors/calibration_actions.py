@@ -17,7 +17,6 @@ from app.widgets.question import ask
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from app.workspace.trash import Removal
-from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
@@ -41,35 +40,26 @@ class CalibrationActions:
 
     def entries(self) -> tuple[Entry, ...]:
         """Return all calibrations. If the workspace cannot be read: none, with a message."""
-        try:
+        with self._context.toasts.errors():
             return self._context.workspace.entries()
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-            return ()
+        return ()
 
     def sessions(self) -> tuple[SessionEntry, ...]:
         """Return all sessions. If the workspace cannot be read: none, with a message."""
-        try:
+        with self._context.toasts.errors():
             return self._context.workspace.sessions()
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-            return ()
+        return ()
 
     def import_files(self, files: Iterable[Path]) -> Path | None:
         """Copy calibration files into the library. Return the path of the last one."""
         imported = None
         for file in files:
-            try:
+            with self._context.toasts.errors():
                 imported = self._context.workspace.import_calibration(file)
-            except InputError as error:
-                self._context.toasts.show(str(error), "fail")
-                continue
-            self._context.toasts.show(
-                tr("{name} is now in the library of sensor {serial}.").format(
+                text = tr("{name} is now in the library of sensor {serial}.").format(
                     name=imported.name, serial=imported.parent.name
-                ),
-                "pass",
-            )
+                )
+                self._context.toasts.show(text, "pass")
         if imported is not None:
             self._context.requests.calibrations_changed.emit()
         return imported

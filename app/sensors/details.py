@@ -8,7 +8,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFrame,
-    QHBoxLayout,
     QProgressBar,
     QScrollArea,
     QToolBar,
@@ -20,6 +19,7 @@ from app.sensors.gel_care import GelCarePanel
 from app.sensors.model import made_cell
 from app.theme.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
@@ -62,18 +62,12 @@ class Details(QWidget):
         self._area.setWidgetResizable(True)
         self._area.setFrameShape(QFrame.Shape.NoFrame)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(12, 0, 0, 0)
         self.busy = named(QProgressBar(self), "sensors.busy", tr("Writing the report"))
         self.busy.setRange(0, 0)
         self.busy.hide()
-        layout.addWidget(self._title)
         self.gel = GelCarePanel()
-        layout.addWidget(self._facts)
-        layout.addWidget(self.gel)
-        layout.addWidget(buttons)
-        layout.addWidget(self.busy)
-        layout.addWidget(self._area, 1)
+        parts = self._title, self._facts, self.gel, buttons, self.busy, (self._area, 1)
+        vbox(*parts, of=self, margins=(12, 0, 0, 0))
 
     def show_entry(self, entry: Entry | None, uses: str = "", presses: str = "") -> None:
         """Show a calibration, or none; how often it was used, and the presses on its gel."""
@@ -117,12 +111,9 @@ def _stages(entry: Entry) -> QWidget:
 
 def _heading(title: str, verdict: Verdict) -> QWidget:
     heading = QWidget()
-    row = QHBoxLayout(heading)
-    row.setContentsMargins(0, 10, 0, 0)
-    row.addWidget(Sign(icon(verdict.value, verdict.value), heading))
-    row.addWidget(MarkupLabel(f"<b>{escaped(title)}</b>", heading))
-    row.addWidget(PlainLabel(verdict_word(verdict), heading))
-    row.addStretch(1)
+    sign, text = Sign(icon(verdict.value, verdict.value)), MarkupLabel(f"<b>{escaped(title)}</b>")
+    parts = sign, text, PlainLabel(verdict_word(verdict)), None
+    hbox(*parts, of=heading, margins=(0, 10, 0, 0))
     return heading
 
 

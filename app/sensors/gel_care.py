@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -33,15 +34,9 @@ class GelCarePanel(QWidget):
         self.elastomer.editingFinished.connect(self._on_edited)
         label = PlainLabel(tr("&Elastomer"))
         label.setBuddy(self.elastomer)
-        row = QHBoxLayout()
-        row.addWidget(label)
-        row.addWidget(self.elastomer, 1)
         self._care = named(PlainLabel(), "sensors.gel.care", tr("Use of the gel"))
         self._care.setWordWrap(True)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addLayout(row)
-        column.addWidget(self._care)
+        vbox(hbox(label, (self.elastomer, 1)), self._care, of=self, margins=0)
 
     def show_gel(self, elastomer: str, presses: str) -> None:
         """Show the name of the elastomer, and its presses or why they are not known."""

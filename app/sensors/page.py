@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
-from PySide6.QtCore import QItemSelectionModel, Qt, QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
     QSplitter,
     QStackedWidget,
     QToolBar,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -20,14 +20,16 @@ from app.context.context import AppContext
 from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
-from app.sensors.model import LibraryModel
+from app.sensors.model import cells_of, library_titles
 from app.sensors.report_writer import write_entry_report
 from app.sensors.sessions_box import SessionsBox
-from app.sensors.tables import CellsTable
+from app.sensors.tables import Cell, CellsTable
 from app.sensors.trash_dialog import TrashDialog
 from app.sensors.welcome import Welcome
+from app.services.file_dialogs import ask_save
 from app.services.jobs import Job, Jobs
 from app.widgets.actions import make_action
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.gel_care import presses_text, read_presses
@@ -48,8 +50,10 @@ class SensorsPage(QWidget):
         self._trash: TrashDialog | None = None
         named(self, "sensors", tr("Sensors"))
         self._make_actions()
-        self._model = LibraryModel(lambda: context.settings.limits.age_days)
-        self._table = CellsTable(self._model, "sensors.table", tr("Calibrations"), self)
+        self._table = CellsTable(
+            "sensors.table", tr("Calibrations"), library_titles(), self._cells,
+            lambda entry: entry.path,
+        )  # fmt: skip
         self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
         self._table.selectionModel().selectionChanged.connect(self._show_chosen)
         self._table.doubleClicked.connect(lambda _: self.use.trigger())
@@ -69,87 +73,56 @@ class SensorsPage(QWidget):
         self._stack = QStackedWidget(self)
         self._stack.addWidget(Welcome(self._first_actions()))
         self._stack.addWidget(self._build_library(split))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._stack)
+        vbox(self._stack, of=self, margins=0)
         context.requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 
+    def _action(
+        self, name: str, text: str, slot: Callable[[], object], icon_name: str, tip: str = "",
+        *keys: str,
+    ) -> QAction:  # fmt: skip
+        return make_action(
+            self, f"sensors.{name}", text, slot, keys=keys, icon_name=icon_name, tip=tip
+        )
+
     def _make_actions(self) -> None:
-        requests = self._context.requests
-        self.new = make_action(
-            self,
-            "sensors.new",
-            tr("&New sensor"),
-            requests.new_sensor.emit,
-            icon_name="add",
-            tip=tr("Calibrate a sensor from its camera"),
-        )
-        self.session = make_action(
-            self,
-            "sensors.session",
-            tr("Open &session folder"),
-            requests.choose_session.emit,
-            icon_name="folder",
-            tip=tr("Calibrate from existing images"),
-        )
-        self.import_ = make_action(
-            self,
-            "sensors.import",
-            tr("&Import calibration"),
-            self.choose_calibrations,
-            icon_name="import",
-            tip=tr("Copy calibration files into the library"),
-        )
-        self.demo = make_action(
-            self,
-            "sensors.demo",
-            tr("&Try the virtual sensor"),
-            requests.begin_demo.emit,
-            icon_name="demo",
-            tip=tr("Use all functions without a camera"),
-        )
-        self.use = make_action(
-            self,
-            "sensors.use",
-            tr("&Use"),
-            lambda: self._with_chosen(self._library.use),
-            keys=("Ctrl+U",),
-            icon_name="use",
-            tip=tr("Use this calibration for measuring"),
-        )
-        self.report = make_action(
-            self,
-            "sensors.report",
-            tr("Re&port…"),
-            self.choose_report,
-            icon_name="report",
-            tip=tr("Write a report of this calibration as web page or PDF"),
-        )
-        self.reveal = make_action(
-            self,
-            "sensors.reveal",
-            tr("Show in fol&der"),
-            lambda: self._with_chosen(lambda entry: _open_folder(entry.path.parent)),
-            icon_name="folder",
-        )
-        self.remove = make_action(
-            self,
-            "sensors.remove",
-            tr("&Remove"),
-            lambda: self._with_chosen(self._library.remove),
-            keys=("Del",),
-            icon_name="remove",
-            tip=tr("Move this calibration to the trash. It can be restored from there."),
-        )
-        self.trash = make_action(
-            self,
-            "sensors.trash",
-            tr("&Trash…"),
-            self.show_trash,
-            icon_name="remove",
-            tip=tr("Show removed calibrations, and restore them"),
-        )
+        requests, library = self._context.requests, self._library
+        self.new = self._action(
+            "new", tr("&New sensor"), requests.new_sensor.emit, "add",
+            tr("Calibrate a sensor from its camera"),
+        )  # fmt: skip
+        self.session = self._action(
+            "session", tr("Open &session folder"), requests.choose_session.emit, "folder",
+            tr("Calibrate from existing images"),
+        )  # fmt: skip
+        self.import_ = self._action(
+            "import", tr("&Import calibration"), self.choose_calibrations, "import",
+            tr("Copy calibration files into the library"),
+        )  # fmt: skip
+        self.demo = self._action(
+            "demo", tr("&Try the virtual sensor"), requests.begin_demo.emit, "demo",
+            tr("Use all functions without a camera"),
+        )  # fmt: skip
+        self.use = self._action(
+            "use", tr("&Use"), lambda: self._with_chosen(library.use), "use",
+            tr("Use this calibration for measuring"), "Ctrl+U",
+        )  # fmt: skip
+        self.report = self._action(
+            "report", tr("Re&port…"), self.choose_report, "report",
+            tr("Write a report of this calibration as web page or PDF"),
+        )  # fmt: skip
+        self.reveal = self._action(
+            "reveal", tr("Show in fol&der"),
+            lambda: self._with_chosen(lambda entry: _open_folder(entry.path.parent)), "folder",
+        )  # fmt: skip
+        self.remove = self._action(
+            "remove", tr("&Remove"), lambda: self._with_chosen(library.remove), "remove",
+            tr("Move this calibration to the trash. It can be restored from there."), "Del",
+        )  # fmt: skip
+        self.trash = self._action(
+            "trash", tr("&Trash…"), self.show_trash, "remove",
+            tr("Show removed calibrations, and restore them"),
+        )  # fmt: skip
         stack = self._library.undo
         make_action(self, "sensors.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",))
         make_action(self, "sensors.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"))
@@ -182,10 +155,7 @@ class SensorsPage(QWidget):
             bar.addAction(action)
             bar.widgetForAction(action).setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         library = QWidget(self)
-        column = QVBoxLayout(library)
-        column.setContentsMargins(12, 6, 12, 8)
-        column.addWidget(bar)
-        column.addWidget(split, 1)
+        vbox(bar, (split, 1), of=library, margins=(12, 6, 12, 8))
         return library
 
     def enter(self) -> None:
@@ -196,7 +166,7 @@ class SensorsPage(QWidget):
         """Import a calibration file and select it."""
         imported = self._library.import_files([path])
         if imported is not None:
-            self._choose(imported)
+            self._table.choose(imported)
 
     def show_trash(self) -> None:
         """Show the removed calibrations."""
@@ -219,22 +189,18 @@ class SensorsPage(QWidget):
             settings.keep_folder("calibration", Path(names[0]).parent)
             imported = self._library.import_files(Path(name) for name in names)
             if imported is not None:
-                self._choose(imported)
+                self._table.choose(imported)
 
     def choose_report(self) -> None:
         """Ask for a file, and write the report of the selected calibration to it."""
-        entry, settings = self.chosen(), self._context.settings
-        if entry is None:
-            return
-        name, _ = QFileDialog.getSaveFileName(
-            self,
-            tr("Save the report"),
-            str(settings.folder("report") / f"{entry.path.stem}-report.html"),
-            tr("Web page (*.html);;PDF (*.pdf)"),
-        )
-        if name:
-            settings.keep_folder("report", Path(name).parent)
-            self._write_report(entry, Path(name))
+        entry = self.chosen()
+        if entry is not None:
+            path = ask_save(
+                self, self._context.settings, "report", tr("Save the report"),
+                f"{entry.path.stem}-report.html", tr("Web page (*.html);;PDF (*.pdf)"),
+            )  # fmt: skip
+            if path is not None:
+                self._write_report(entry, path)
 
     def _write_report(self, entry: Entry, path: Path) -> None:
         self._show_busy(True)
@@ -268,39 +234,25 @@ class SensorsPage(QWidget):
 
     def chosen(self) -> Entry | None:
         """Return the selected calibration."""
-        row = self._table.chosen_row()
-        return None if row is None else self._model.entry(row)
+        return self._table.chosen()
+
+    def _cells(self, entry: Entry) -> tuple[Cell, ...]:
+        return cells_of(entry, datetime.now(UTC), self._context.settings.limits.age_days)
 
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
-        chosen = self.chosen()
         entries = self._library.entries()
-        self._model.set_entries(entries)
+        self._table.show_items(entries)
         sessions = self._library.sessions()
         self._sessions.set_entries(sessions)
         self._stack.setCurrentIndex(1 if entries or sessions else 0)
         self.trash.setEnabled(bool(self._library.removals()))
         if self._trash is not None:
             self._trash.refresh()
-        used = next((entry for entry in entries if entry.in_use), None)
-        known = {entry.path for entry in entries}
-        if chosen is not None and chosen.path in known:
-            self._choose(chosen.path)
-        elif entries:
-            self._choose((used or entries[0]).path)
-        else:
-            self._show_chosen()
-
-    def _choose(self, path: Path) -> None:
-        rows = self._table.sorted
-        for row in range(rows.rowCount()):
-            index = rows.index(row, 0)
-            if self._model.entry(rows.mapToSource(index).row()).path == path:
-                self._table.selectionModel().setCurrentIndex(
-                    index,
-                    QItemSelectionModel.SelectionFlag.ClearAndSelect
-                    | QItemSelectionModel.SelectionFlag.Rows,
-                )
+        if self.chosen() is None and entries:
+            used = next((entry for entry in entries if entry.in_use), entries[0])
+            self._table.choose(used.path)
+        self._show_chosen()
 
     def _show_chosen(self) -> None:
         entry = self.chosen()

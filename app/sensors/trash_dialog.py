@@ -5,30 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
-from app.sensors.model import Cell, CellsModel, validated_cell
-from app.sensors.tables import CellsTable
-from app.theme.icons import icon
+from app.sensors.model import validated_cell
+from app.sensors.tables import Cell, CellsTable
+from app.widgets.buttons import push_button
+from app.widgets.dialog import Dialog
 from app.widgets.label import PlainLabel
-from app.widgets.naming import named
 from app.workspace.trash import Removal
 from gelpolight_core.translation import tr
-
-
-class TrashModel(CellsModel):
-    """One row for each removed calibration."""
-
-    def __init__(self) -> None:
-        super().__init__((tr("Sensor"), tr("Name"), tr("Removed"), tr("Validation")))
-        self.removals: tuple[Removal, ...] = ()
-
-    def set_removals(self, removals: tuple[Removal, ...]) -> None:
-        """Show other calibrations."""
-        self.beginResetModel()
-        self.removals = removals
-        self._cells = [_cells(removal) for removal in removals]
-        self.endResetModel()
 
 
 def _cells(removal: Removal) -> tuple[Cell, ...]:
@@ -42,7 +27,7 @@ def _cells(removal: Removal) -> tuple[Cell, ...]:
     )
 
 
-class TrashDialog(QDialog):
+class TrashDialog(Dialog):
     """Shows the trash.
 
     Parameters
@@ -59,35 +44,27 @@ class TrashDialog(QDialog):
         restore: Callable[[Removal], None],
         parent: QWidget,
     ) -> None:
-        super().__init__(parent)
-        named(self, "trash", tr("Trash"))
-        self.setWindowTitle(tr("Trash"))
+        super().__init__(parent, "trash", tr("Trash"))
         self.resize(720, 360)
         self._removals, self._restore = removals, restore
-        self._model = TrashModel()
-        self.table = CellsTable(self._model, "trash.table", tr("Removed calibrations"), self)
+        titles = tr("Sensor"), tr("Name"), tr("Removed"), tr("Validation")
+        self.table = CellsTable(
+            "trash.table", tr("Removed calibrations"), titles, _cells, lambda r: r.trashed
+        )
         self.table.sortByColumn(2, Qt.SortOrder.DescendingOrder)
         self.table.selectionModel().selectionChanged.connect(self._enable)
         self.table.doubleClicked.connect(lambda _: self.restore_chosen())
         self._empty = PlainLabel(tr("The trash is empty."), self)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
-        self.restore_button = named(
-            QPushButton(icon("undo"), tr("Restore"), self),
-            "trash.restore",
-            tr("Restore the selected calibration"),
-        )
-        buttons.addButton(self.restore_button, QDialogButtonBox.ButtonRole.ActionRole)
-        self.restore_button.clicked.connect(self.restore_chosen)
-        buttons.rejected.connect(self.reject)
-        column = QVBoxLayout(self)
-        column.addWidget(self._empty)
-        column.addWidget(self.table, 1)
-        column.addWidget(buttons)
+        self.restore_button = push_button(
+            "trash.restore", tr("Restore"), self.restore_chosen, icon_name="undo",
+            accessible=tr("Restore the selected calibration"),
+        )  # fmt: skip
+        self.fill(self._empty, (self.table, 1), add=(self.restore_button,))
 
     def refresh(self) -> None:
         """Show the present content. The first row is selected."""
         removals = self._removals()
-        self._model.set_removals(removals)
+        self.table.show_items(removals)
         self._empty.setVisible(not removals)
         self.table.setVisible(bool(removals))
         self.table.selectRow(0)
@@ -95,10 +72,10 @@ class TrashDialog(QDialog):
 
     def restore_chosen(self) -> None:
         """Restore the selected calibration."""
-        row = self.table.chosen_row()
-        if row is not None:
-            self._restore(self._model.removals[row])
+        removal = self.table.chosen()
+        if removal is not None:
+            self._restore(removal)
             self.refresh()
 
     def _enable(self) -> None:
-        self.restore_button.setEnabled(self.table.chosen_row() is not None)
+        self.restore_button.setEnabled(self.table.chosen() is not None)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QToolButton, QWidget
 
 from app.theme.icons import application_icon
 from app.widgets.label import MarkupLabel, PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -41,17 +42,11 @@ class Welcome(QWidget):
         text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         middle = QWidget(self)
         middle.setFixedWidth(WIDTH)
-        column = QVBoxLayout(middle)
-        column.addStretch(2)
-        column.addWidget(sign, 0, Qt.AlignmentFlag.AlignHCenter)
-        column.addWidget(title, 0, Qt.AlignmentFlag.AlignHCenter)
-        column.addWidget(text)
-        column.addSpacing(16)
-        for action in actions:
-            column.addWidget(_button(action), 0, Qt.AlignmentFlag.AlignHCenter)
-        column.addStretch(3)
-        layout = QHBoxLayout(self)
-        layout.addWidget(middle)
+        centre = Qt.AlignmentFlag.AlignHCenter
+        buttons = [(_button(action), 0, centre) for action in actions]
+        head = (sign, 0, centre), (title, 0, centre)
+        vbox((None, 2), *head, text, 16, *buttons, (None, 3), of=middle)
+        hbox(middle, of=self)
 
 
 def _button(action: QAction) -> QToolButton:

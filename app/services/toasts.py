@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -24,6 +25,7 @@ from app.theme.icons import icon
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from app.widgets.native import give_own_window, native_windows
+from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 log = logging.getLogger(__name__)
@@ -237,6 +239,14 @@ class Toasts(QObject):
             old.dismiss()
         toast.show()
         self._arrange()
+
+    @contextmanager
+    def errors(self) -> Iterator[None]:
+        """Show an error that the user can correct, and go on after the block."""
+        try:
+            yield
+        except InputError as error:
+            self.show(str(error), "fail")
 
     def shown(self) -> list[Toast]:
         """Return the visible messages, oldest first."""
