@@ -24,6 +24,8 @@ OF_SPREAD = 1.5
 LINE_SHARE = 0.5
 """A column (row) is bad where at least this share of its pixels differs from both sides."""
 ACROSS, DOWN = 1, 2
+FAR_SHARE = 0.02
+"""Share of single bad pixels from which on the error of a depth is a third of its value."""
 REACH = 12
 """Distance to the nearest good pixel above which bad pixels are not single pixels or lines."""
 
@@ -140,12 +142,23 @@ def find_bad_pixels(images: list[NDArray[np.float32]], *, noise: float) -> BadPi
     light = np.tile(np.linspace(0.0, 1.0, 65536, dtype=np.float32), (3, 1))
     for image in images:
         code = np.rint(np.clip(np.nan_to_num(image), 0.0, 1.0) * 65535.0).astype(np.uint16)
-        marks = differing(code, light, np.arange(height), noise=noise)
-        spikes = marks == (ACROSS | DOWN)
-        spikes[:, bad_lines(marks, ACROSS)] = True
-        spikes[bad_lines(marks.T, DOWN), :] = True
-        bad &= spikes
+        bad &= isolated_pixels(code, light, noise=noise).mask
     return BadPixels(np.argwhere(bad).astype(np.int32), height, width)
+
+
+def isolated_pixels(raw: NDArray[Any], light: NDArray[np.float32], *, noise: float) -> BadPixels:
+    """Return the pixels and lines of one image that differ from their neighbours.
+
+    Parameters
+    ----------
+    raw, light, noise
+        As for :func:`differing`.
+    """
+    marks = differing(raw, light, np.arange(len(raw)), noise=noise)
+    bad = marks == (ACROSS | DOWN)
+    bad[:, bad_lines(marks, ACROSS)] = True
+    bad[bad_lines(marks.T, DOWN), :] = True
+    return BadPixels(np.argwhere(bad).astype(np.int32), *marks.shape)
 
 
 def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:

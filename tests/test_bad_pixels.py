@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from gelpolight_core.bad_pixels import BadPixels, find_bad_pixels, no_bad_pixels
+from gelpolight_core import read_image
+from gelpolight_core.bad_pixels import (
+    ACROSS,
+    DOWN,
+    BadPixels,
+    differing,
+    find_bad_pixels,
+    no_bad_pixels,
+)
 
 HEIGHT, WIDTH = 60, 80
 
@@ -34,6 +44,29 @@ def test_lines_and_pixels_are_found_and_nothing_else() -> None:
     wanted[:, 30] = wanted[41, :] = wanted[10, 50] = wanted[20, 60] = True
     assert (found.mask == wanted).all()
     assert not find_bad_pixels([scene(0), scene(1)], noise=0.004).pixels.size
+
+
+@pytest.mark.parametrize("share", [0.0005, 0.002, 0.003, 0.01, 0.03, 0.1])
+def test_hot_pixels_are_found_however_many(share: float) -> None:
+    hot = np.random.default_rng(5).random((HEIGHT, WIDTH)) < share
+    hot[:2] = hot[-2:] = hot[:, :2] = hot[:, -2:] = False
+    scenes = [np.where(hot[..., None], np.float32(1.0), scene(n)) for n in (0, 1)]
+    found = find_bad_pixels(scenes, noise=0.004).mask
+    assert not (found & ~hot).any()
+    # All but those that touch another one along a row or a column.
+    beside = sum(np.roll(hot, step, axis) for axis in (0, 1) for step in (-2, -1, 1, 2))
+    assert hot.any() and found[hot & (beside == 0)].all()
+
+
+@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B", "sensor-C", "real/closed/mini-1"])
+def test_images_of_healthy_cameras_show_no_share_of_hot_pixels(
+    shared_data: Path, sensor: str
+) -> None:
+    light = np.tile(np.linspace(0.0, 1.0, 256, dtype=np.float32), (3, 1))
+    for path in sorted(shared_data.glob(f"{sensor}/[bp]*s/*.png")):
+        image = read_image(path)
+        marks = differing(image, light, np.arange(len(image)), noise=0.0)
+        assert (marks == (ACROSS | DOWN)).mean() < 1e-4, path
 
 
 def test_dirt_in_one_scene_and_specks_are_no_bad_pixels() -> None:

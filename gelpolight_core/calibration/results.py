@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.bad_pixels import BadPixels
+from gelpolight_core.bad_pixels import FAR_SHARE, BadPixels
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult
@@ -137,7 +137,7 @@ def judge_bad_pixels(bad: BadPixels) -> Figure:
         100.0 * len(bad.pixels) / max(bad.height * bad.width, 1),
         "%",
         warn=0.5,
-        fail=5.0,
+        fail=100.0 * FAR_SHARE,
         advice=tr("Replace the camera, or lower its gain and temperature"),
     )
 

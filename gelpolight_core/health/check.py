@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing
+from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
 from gelpolight_core.health.finding import KEYS, Finding, Health, health_of
 from gelpolight_core.health.fit import LEAST_START, CommonChange, common_change
 from gelpolight_core.health.judging import (
@@ -73,6 +73,7 @@ class HealthCheck:
         full = calibration.full
         interreflection = 0.0 if full is None else full.membrane.interreflection
         self._limits = Limits.of(interreflection)
+        self._noise = float(calibration.noise.max())
         self._stripe = 0
         self._lock = Lock()
 
@@ -93,11 +94,18 @@ class HealthCheck:
         with self._lock:
             raw, light = self._coded(frame)
             common = self._common(raw, light)
-            if common.share < LEAST_UNTOUCHED and self._boundary_fits():
-                return Health(unknown=UNJUDGED, untouched=common.share)
-            if common.share < LEAST_UNTOUCHED:
-                return self._strange(raw, light, common.share, whole)
-            return self._faults(raw, light, common, whole)
+            pixels = self._bad_pixels(raw, light, whole)
+            if common.share < LEAST_UNTOUCHED and pixels:
+                # Hot pixels in most cells hide the light there.
+                bad = isolated_pixels(raw, light, noise=self._noise)
+                raw = bad.left_out(raw)
+                common = self._common(raw, light)
+            if common.share >= LEAST_UNTOUCHED:
+                return self._faults(raw, light, common, whole, pixels)
+            far = [finding for finding in pixels if finding.meaningless]
+            if far or self._boundary_fits():
+                return health_of(far or pixels, unknown=UNJUDGED, untouched=common.share)
+            return self._strange(raw, light, common.share, whole)
 
     def _faults(
         self,
@@ -105,6 +113,7 @@ class HealthCheck:
         light: Map,
         common: CommonChange,
         whole: bool,
+        pixels: list[Finding],
     ) -> Health:
         """Return the changes on the membrane of this sensor."""
         limits, samples = self._limits, self.samples
@@ -121,7 +130,6 @@ class HealthCheck:
             changes, gain = [finding for finding in changes if finding.meaningless], None
         if gain is not None:
             changes = [corrected(change) for change in changes]
-        pixels = self._bad_pixels(raw, light, whole)
         blurred = None if moved else blur_finding(common, samples.blur_strength)
         if blurred is not None and blurred.meaningless and common.share < LEAST_START:
             # The texture is missing.
@@ -188,7 +196,7 @@ class HealthCheck:
         step = 1 if whole else max(height // STRIPE_ROWS, 1)
         self._stripe = (self._stripe + 1) % step
         rows = np.arange(0 if whole else self._stripe, height, step)
-        marks = differing(raw, light, rows, noise=float(self.calibration.noise.max()))
+        marks = differing(raw, light, rows, noise=self._noise)
         single = int(np.count_nonzero(marks == (ACROSS | DOWN)))
         columns, lines = bad_lines(marks, ACROSS), rows[bad_lines(marks.T, DOWN)]
         return bad_pixel_findings(single / marks.size, single, columns.tolist(), lines.tolist())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.bad_pixels import FAR_SHARE
 from gelpolight_core.channels import channel_name
 from gelpolight_core.health.finding import Finding, LightGain
 from gelpolight_core.health.fit import LEAST_START, CommonChange
@@ -343,7 +344,8 @@ def bad_pixel_findings(
             )  # fmt: skip
     if share > BAD_SHARE and count >= LEAST_BAD:
         text = tr("{p:.2g} % of the pixels are dead or hot").format(p=100.0 * share)
-        found.append(Finding("bad_pixels", text, remedy, Verdict.WARN, False, 100.0 * share, "%"))
+        far = share > FAR_SHARE
+        found.append(Finding("bad_pixels", text, remedy, _severity(far), far, 100.0 * share, "%"))
     return found
 
 

@@ -15,6 +15,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.experiments.known_sensor import KnownSensor, known_sensor, matt_design
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.finding import KEYS
+from gelpolight_core.quality import Verdict
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
 
@@ -186,19 +187,31 @@ def test_dirt_is_distinguished_from_a_press(
     assert check.check(known.noisy(dirty)).keys == ("dirt",)
 
 
-def test_dead_lines_and_hot_pixels_are_found(
+def test_dead_lines_are_found(
     known: KnownSensor, frames: dict[str, Map], check: HealthCheck
 ) -> None:
     image = known.noisy(frames["cylinder"])
-    column, row, hot = image.copy(), image.copy(), image.copy()
+    column, row = image.copy(), image.copy()
     column[:, 350] = 0
     row[200] = 0
-    hot[np.random.default_rng(0).random(image.shape[:2]) < 3e-4] = 255
     assert check.check(column).keys == ("bad_line",)
     assert check.check(row, whole=True).keys == ("bad_line",)
-    assert check.check(hot, whole=True).keys == ("bad_pixels",)
     # A live check looks at other rows in each frame.
     assert any("bad_line" in check.check(row).keys for _ in range(row.shape[0]))
+
+
+@pytest.mark.parametrize("share", [5e-4, 0.002, 0.003, 0.01, 0.03, 0.1])
+@pytest.mark.parametrize("whole", [True, False])
+def test_hot_pixels_are_found_and_the_more_there_are_the_worse(
+    known: KnownSensor, frames: dict[str, Map], check: HealthCheck, share: float, whole: bool
+) -> None:
+    """From 0.3 % on they hid the light of most cells, and nothing was judged."""
+    image = known.noisy(frames["cylinder"])
+    image[np.random.default_rng(0).random(image.shape[:2]) < share] = 255
+    (found,) = check.check(image, whole=whole).findings
+    assert found.key == "bad_pixels"
+    assert found.value == pytest.approx(100.0 * share, rel=0.7)
+    assert found.meaningless is (found.severity is Verdict.FAIL) is (share > 0.02)
 
 
 def test_what_no_texture_shows_is_unknown_and_not_guessed() -> None:
