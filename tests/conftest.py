@@ -63,7 +63,6 @@ LONGEST_FIRST = (
     "experiments/test_ablation.py",
     "app/test_rounds.py",
     "calibration/test_joint.py",
-    "experiments/test_virtual_protocol.py",
     "app/calibrate/test_wizard_killed.py",
     "reconstruction/test_uncertainty.py",
 )

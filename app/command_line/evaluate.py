@@ -9,17 +9,14 @@ from app.command_line.common import StageProgress, add_workers
 from app.command_line.reconstructing import add_model, load_reconstructor
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.press_workers import Equipment
-from gelpolight_core.experiments.virtual_protocol import measure_folder
 from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.evaluation_report import evaluation_table
 from gelpolight_core.measurement.evaluation_run import evaluate_presses
+from gelpolight_core.measurement.press_pool import measure_folder
 from gelpolight_core.measurement.presses import open_ledger, press_measurement
 from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.report.evaluation_files import write_evaluation_files
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 
@@ -48,8 +45,14 @@ def run(options: argparse.Namespace) -> int:
     ledger = open_ledger(None, reconstructor)
     with StageProgress() as progress:
         if options.workers > 1:
-            equipment = Equipment(options.calibration, options.model)
-            measure_folder(presses, equipment, ledger, workers=options.workers, progress=progress)
+            measure_folder(
+                presses,
+                options.calibration,
+                ledger,
+                model=options.model,
+                workers=options.workers,
+                progress=progress,
+            )
         evaluation = evaluate_presses(
             presses,
             press_measurement(reconstructor),
@@ -57,13 +60,9 @@ def run(options: argparse.Namespace) -> int:
             crossing=crossing,
             ledger=ledger,
         )
-    report(evaluation, reconstructor.calibration, options.output, presses)
-    return 0
-
-
-def report(evaluation: Evaluation, calibration: Calibration, output: Path, presses: Path) -> None:
-    """Write the report's files and print the table. Raise an error if nothing could be measured."""
-    written = write_evaluation_files(evaluation, output, calibration=calibration)
+    written = write_evaluation_files(
+        evaluation, options.output, calibration=reconstructor.calibration
+    )
     say(evaluation_table(evaluation))
     say(tr("Saved: {files}").format(files=", ".join(str(path) for path in written)))
     if len(evaluation.failed) == len(evaluation.results):
@@ -74,3 +73,4 @@ def report(evaluation: Evaluation, calibration: Calibration, output: Path, press
             where=str(presses),
             advice=tr("Check that the calibration belongs to this sensor"),
         )
+    return 0

@@ -101,7 +101,6 @@ def _commands() -> tuple[tuple[str, str, str], ...]:
             "drift",
             tr("compare an image of the untouched sensor with the calibration's background"),
         ),
-        ("protocol", "protocol", tr("run the paper's evaluation protocol on the virtual bench")),
         ("report", "report", tr("write a calibration's report, HTML or PDF")),
         ("benchmark", "benchmark", tr("show the processing time of each step of a frame")),
         ("ablation", "ablation", tr("show the benefit and cost of each term of the full model")),

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from app.sources.bench import Bench
-from gelpolight_core.experiments.press_workers import placed_by_hand
 from gelpolight_core.measurement.protocol import PressWanted
+
+HAND_MM, HAND_DEG = 0.1, 1.0
+"""Repeatability of placing by hand, one standard deviation."""
 
 
 class BenchHand:
@@ -31,12 +35,14 @@ class BenchHand:
         if wanted == self._laid:
             return
         self._laid = wanted
-        x_mm, y_mm, yaw_deg = placed_by_hand(wanted, self._bench.seed)
+        rng = np.random.default_rng([self._bench.seed, *wanted.file.encode()])
+        dx_mm, dy_mm, turn_deg = rng.standard_normal(3) * (HAND_MM, HAND_MM, HAND_DEG)
+        x_mm, y_mm = wanted.position_mm
         self._bench.lay(wanted.truth.shape)
         self._bench.arrange(
             size_mm=wanted.truth.size_mm,
             depth_mm=wanted.truth.height_mm,
-            x_mm=x_mm,
-            y_mm=y_mm,
-            yaw_deg=yaw_deg,
+            x_mm=x_mm + dx_mm,
+            y_mm=y_mm + dy_mm,
+            yaw_deg=wanted.yaw_deg + turn_deg,
         )

@@ -15,13 +15,12 @@ from app.measure.press_check import ImageMap
 from app.services.jobs import Job, Jobs
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.virtual_protocol import evaluate_run, run_ledger
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
 from gelpolight_core.measurement.evaluation import Evaluation
-from gelpolight_core.measurement.evaluation_run import measure_press
+from gelpolight_core.measurement.evaluation_run import evaluate_presses, measure_press
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.presses import press_measurement
+from gelpolight_core.measurement.presses import open_ledger, press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.measurement.result import Measurement
@@ -30,7 +29,7 @@ from gelpolight_core.report.evaluation_files import write_evaluation_files
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
-REPORT = "report"
+REPORT, LEDGER = "report", "measurements.jsonl"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +75,8 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
         )
     lock = RunLock(run.folder)
     try:
-        return Equipped(run, reconstructor, run_ledger(run, reconstructor), lock)
+        ledger = open_ledger(run.folder / LEDGER, reconstructor)
+        return Equipped(run, reconstructor, ledger, lock)
     except BaseException:
         lock.release()
         raise
@@ -161,11 +161,16 @@ class ProtocolWork(QObject):
 
     def evaluate(self) -> None:
         """Compare all presses with their true values, after the running measurements."""
-        equipped = self._equipped
+        ledger = self._equipped.ledger
 
         def work(progress: Callable[[float], None]) -> Evaluation:
             progress(0.0)
-            return evaluate_run(equipped.run, equipped.reconstructor, equipped.ledger)
+            return evaluate_presses(
+                self.run.presses,
+                self._measure_press,
+                crossing=self.run.protocol.crossing,
+                ledger=ledger,
+            )
 
         self._jobs.submit(Job(tr("Evaluating"), work, self.evaluated.emit, self.refused.emit))
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.design_check.known_sensor import KnownSensor, exact_calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.known_sensor import KnownSensor, exact_calibration
 from gelpolight_core.measurement.score import TrueDepth, score_depth, scored_radius_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.directional import directional_lamps, shadow_areas

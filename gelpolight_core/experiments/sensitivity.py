@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.experiments.known_sensor import KnownPress, KnownSensor, exact_calibration
+from gelpolight_core.design_check.known_sensor import KnownPress, KnownSensor, exact_calibration
 from gelpolight_core.experiments.stability_trial import rms_um
 from gelpolight_core.measurement.score import score_depth
 from gelpolight_core.optics.frame import TopPlane

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.design_check.known_sensor import KnownSensor
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.known_sensor import KnownSensor
 from gelpolight_core.experiments.stability import Case, Seen
 from gelpolight_core.experiments.stability_trial import (
     judged,

@@ -10,7 +10,7 @@ import numpy as np
 
 from gelpolight_core.design.parts import LayerDesign, LedDesign
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
+from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.experiments.stability import Case, Seen
 from gelpolight_core.experiments.stability_trial import (
     BALL,

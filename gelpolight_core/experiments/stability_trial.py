@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.experiments.known_sensor import (
+from gelpolight_core.design_check.known_sensor import (
     KnownPress,
     KnownSensor,
     known_sensor,

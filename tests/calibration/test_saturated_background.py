@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.saturated_background import beyond_saturation
-from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
+from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import Calibration
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 from pathlib import Path
@@ -41,6 +42,22 @@ def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
     planar, depth = (overall[name]["mean_absolute_percent"] for name in ("planar", "depth"))
     output = f"mean absolute error {planar:.1f} % in size and {depth:.1f} % in height"
     assert output in page.read_text()
+
+
+def test_an_evaluation_gives_the_same_numbers_with_one_process_or_two(
+    calibration: Path, run_folder: Path, tmp_path: Path
+) -> None:
+    """To rounding: the compiler may order a sum otherwise where a kernel is compiled again."""
+    tables = []
+    for workers in ("1", "2"):
+        out = tmp_path / workers
+        arguments = ["evaluate", str(calibration), str(run_folder), "-o", str(out)]
+        assert main([*arguments, "--workers", workers]) == 0
+        tables.append(list(csv.DictReader((out / "evaluation.csv").read_text().splitlines())))
+    for one, two in zip(*tables, strict=True):
+        assert one["file"] == two["file"]
+        for name in ("size_mm", "height_mm"):
+            assert float(one[name]) == pytest.approx(float(two[name]), rel=1e-6)
 
 
 @pytest.mark.parametrize("named", ["presses/truth.csv", "none"])

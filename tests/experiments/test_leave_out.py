@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
+from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.experiments.leave_out import (
     Frame,
     RuleFigure,

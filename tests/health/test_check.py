@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.ndimage import shift as moved
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.experiments.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.design_check.known_sensor import KnownSensor, known_sensor, matt_design
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.finding import KEYS
 from gelpolight_core.quality import Verdict

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.experiments.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.design_check.known_sensor import KnownSensor, known_sensor, matt_design
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.result import Measurement

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.known_sensor import (
+from gelpolight_core.design_check.known_sensor import (
     KnownPress,
     KnownSensor,
     known_sensor,
     matt_design,
 )
+from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.checks import (

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from gelpolight_core.experiments.known_sensor import (
+from gelpolight_core.design_check.known_sensor import (
     KnownPress,
     KnownSensor,
     known_sensor,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
+from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cylinder

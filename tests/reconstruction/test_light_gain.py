@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.experiments.known_sensor import KnownPress, KnownSensor, known_sensor
+from gelpolight_core.design_check.known_sensor import KnownPress, KnownSensor, known_sensor
 from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.image.response import gamma_response
 from gelpolight_core.measurement.indenter_tools import measure_heightmap

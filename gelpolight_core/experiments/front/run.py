@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.design_check.known_sensor import matt_design
 from gelpolight_core.experiments.front.measure import REPEATS, Point, measure_scene
 from gelpolight_core.experiments.front.methods import Method
 from gelpolight_core.experiments.front.scene import (
@@ -22,7 +23,6 @@ from gelpolight_core.experiments.front.scene import (
     session_presses,
     smaller,
 )
-from gelpolight_core.experiments.known_sensor import matt_design
 from gelpolight_core.experiments.leave_out import (
     EMPTY,
     PRESSED,
