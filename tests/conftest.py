@@ -58,7 +58,7 @@ LONGEST_FIRST = (
     "app/inspect/test_inspect_page.py",
     "reconstruction/test_contact.py",
     "reconstruction/test_boundary.py",
-    "experiments/test_stability.py",
+    "studies/test_stability.py",
     "measurement/test_honest_sizes.py",
     "experiments/test_ablation.py",
     "app/test_rounds.py",

@@ -103,8 +103,6 @@ def _commands() -> tuple[tuple[str, str, str], ...]:
         ),
         ("report", "report", tr("write a calibration's report, HTML or PDF")),
         ("benchmark", "benchmark", tr("show the processing time of each step of a frame")),
-        ("ablation", "ablation", tr("show the benefit and cost of each term of the full model")),
-        ("explain", "explain", tr("show where the errors of presses with true depth come from")),
         ("work-precision", "work_precision", tr("show error against run time")),
         ("stability", "stability", tr("run extreme cases")),
         ("design", "design", tr("check a sensor design before it is built")),

@@ -9,28 +9,16 @@ from tqdm import tqdm
 
 from app.command_line.common import StageProgress
 from app.command_line.terminal import say
-from gelpolight_core.experiments.sensitivity import Sensitivity, sensitivities
-from gelpolight_core.experiments.stability import (
-    CaseResult,
+from gelpolight_core.io.atomic import make_folder, refuse_unwritable
+from gelpolight_core.studies.stability import (
     Outcome,
     chosen_cases,
-    run_cases,
-)
-from gelpolight_core.experiments.stability_cases import all_cases
-from gelpolight_core.experiments.stability_report import (
-    length_table,
-    result_line,
-    sensitivity_table,
+    run_case,
     summary_line,
     write_stability,
 )
-from gelpolight_core.experiments.stability_sessions import LengthCost, length_costs
-from gelpolight_core.experiments.stability_trial import standard_sensor
-from gelpolight_core.io.atomic import make_folder, refuse_unwritable
+from gelpolight_core.studies.stability_cases import all_cases
 from gelpolight_core.translation import tr
-
-SENSITIVITY, LENGTHS = "sensitivity", "lengths"
-CASES_SHARE, SENSITIVITY_END = 0.8, 0.9
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,53 +28,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--only",
         metavar="NAMES",
         help=tr("only these cases or subjects, separated by commas: {names}").format(
-            names=", ".join([*dict.fromkeys(c.subject for c in all_cases()), SENSITIVITY, LENGTHS])
+            names=", ".join(dict.fromkeys(case.subject for case in all_cases()))
         ),
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the cases, print a line for each, and write the report."""
-    names = options.only
-    asked = [] if names is None else [name.strip() for name in names.split(",")]
-    others = ",".join(name for name in asked if name not in (SENSITIVITY, LENGTHS))
-    cases = () if asked and not others else chosen_cases(all_cases(), others or None)
-    wants_sensitivity = names is None or SENSITIVITY in asked
-    wants_lengths = names is None or LENGTHS in asked
+    """Run the cases, print a line for each, and write table and figure."""
+    cases = chosen_cases(all_cases(), options.only)
     make_folder(options.output)
-    refuse_unwritable(options.output / "stability.html")
-    found: tuple[Sensitivity, ...] = ()
-    costs: tuple[LengthCost, ...] = ()
+    refuse_unwritable(options.output / "stability.csv")
+    results = []
     with StageProgress() as progress:
-        results = run_cases(
-            cases,
-            progress=lambda name, share: progress(name, CASES_SHARE * share),
-            done=_print_line,
-        )
-        if wants_sensitivity:
-            found = sensitivities(
-                standard_sensor(),
-                progress=lambda name, share: progress(
-                    name, CASES_SHARE + (SENSITIVITY_END - CASES_SHARE) * share
-                ),
-            )
-        if wants_lengths:
-            costs = length_costs(
-                progress=lambda name, share: progress(
-                    name, SENSITIVITY_END + (1 - SENSITIVITY_END) * share
-                )
-            )
-    if found:
-        say("\n" + sensitivity_table(found))
-    if costs:
-        say("\n" + length_table(costs))
+        for number, case in enumerate(cases):
+            progress(case.name, number / len(cases))
+            results.append(run_case(case))
+            with tqdm.external_write_mode():
+                say(results[-1].line, flush=True)
+        progress("", 1.0)
     say("\n" + summary_line(results))
-    written = write_stability(results, found, costs, options.output)
+    written = write_stability(results, options.output)
     say(tr("Saved: {files}").format(files=", ".join(str(path) for path in written)))
     return 1 if any(result.outcome is Outcome.FAILED for result in results) else 0
-
-
-def _print_line(result: CaseResult) -> None:
-    with tqdm.external_write_mode():
-        say(result_line(result), flush=True)

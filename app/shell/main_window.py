@@ -405,28 +405,18 @@ class MainWindow(QMainWindow):
 
     def show_precision(self) -> None:
         """Show accuracy against run time on this machine."""
-        from app.tools.precision_dialog import PrecisionDialog  # slow import: loads every method
+        from app.tools.precision_dialog import PrecisionDialog  # slow import
 
         self._show_tool("precision", lambda: PrecisionDialog(context=self.context, parent=self))
 
-    def show_stability(self) -> None:
-        """Show the stability report."""
-        from app.tools.report_dialog import ReportDialog  # slow import: loads every case
-        from app.tools.stability_report import StabilityReport
-
-        self._show_tool(
-            "stability", lambda: ReportDialog(StabilityReport(), context=self.context, parent=self)
-        )
-
     def show_design(self) -> None:
         """Show the check of the virtual sensor's design."""
-        from app.tools.design_report import DesignReport  # slow import, as above
-        from app.tools.report_dialog import ReportDialog
+        from app.tools.design_dialog import DesignDialog  # slow import
         from gelpolight_core.design.sensor_design import SensorDesign
 
         bench = self.context.source.bench
-        report = DesignReport(SensorDesign() if bench is None else bench.design)
-        self._show_tool("design", lambda: ReportDialog(report, context=self.context, parent=self))
+        design = SensorDesign() if bench is None else bench.design
+        self._show_tool("design", lambda: DesignDialog(design, context=self.context, parent=self))
 
     def show_stream(self) -> None:
         """Show what is sent to other programs, on the Inspect page."""

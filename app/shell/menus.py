@@ -46,7 +46,6 @@ class Menus:
         window = self._window
         menu = window.menuBar().addMenu(tr("&Tools"))
         self._add(menu, "tools.precision", tr("&Error against run time…"), window.show_precision)
-        self._add(menu, "tools.stability", tr("Numerical &stability…"), window.show_stability)
         if "inspect" in window.entries:
             self._add(menu, "tools.stream", tr("&Stream the live depth…"), window.show_stream)
         self._add(menu, "tools.design", tr("&Design check…"), window.show_design)

@@ -6,21 +6,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QPixmap, QShowEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
-    QHeaderView,
+    QLabel,
     QPushButton,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
 
 from app.context.context import AppContext
-from app.tools.precision_plot import PrecisionPlot, errors
 from app.tools.work_dialog import WorkDialog
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel, plain_tip
@@ -28,15 +25,20 @@ from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_open_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.front.measure import Point, pareto_front, recommended
-from gelpolight_core.experiments.front.trial import (
-    measure_calibration,
+from gelpolight_core.studies.work_precision import (
+    ERRORS,
+    Point,
+    figure_png,
+    measure_session,
     measure_virtual,
-    usual_methods,
+    pareto_front,
+    recommended,
+    write_work_precision,
 )
 from gelpolight_core.translation import tr
 
-NUMBERS = ("median_ms", "p95_ms", "rms_um", "normal_deg", "height_percent", "size_percent")
+Result = tuple[tuple[Point, ...], bytes]
+HEIGHT_PX = 300
 
 
 class PrecisionDialog(WorkDialog):
@@ -63,7 +65,7 @@ class PrecisionDialog(WorkDialog):
     @property
     def points(self) -> tuple[Point, ...]:
         """The last results."""
-        return self.result_shown or ()
+        return () if self.result_shown is None else self.result_shown[0]
 
     def _make_choice(self) -> None:
         self.calibrations = named(ComboBox(), "precision.calibration", tr("Calibration"))
@@ -78,27 +80,20 @@ class PrecisionDialog(WorkDialog):
         self.folder.clicked.connect(self.choose_folder)
 
     def _make_result(self) -> None:
-        self.error = named(ComboBox(), "precision.error", tr("Error shown in the diagram"))
-        for name, label in errors().items():
-            self.error.addItem(label, name)
-        self.error.currentIndexChanged.connect(self._draw)
-        self.plot = PrecisionPlot()
-        self.plot.setMinimumHeight(200)
+        self.figure = named(QLabel(), "precision.figure", tr("Error against time of a frame"))
+        self.figure.setMinimumHeight(HEIGHT_PX)
+        self.figure.setAlignment(Qt.AlignmentFlag.AlignCenter)
         heads = (
-            tr("Method"), "ms", tr("p95 ms"), tr("RMS um"), tr("normals deg"), tr("height %"),
+            tr("Mode"), "ms", tr("p95 ms"), tr("RMS um"), tr("normals deg"), tr("height %"),
             tr("size %"), tr("on front"),
         )  # fmt: skip
-        self.table = self.result_table(heads)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        mode = QHeaderView.ResizeMode
-        self.table.horizontalHeader().setSectionResizeMode(mode.ResizeToContents)
-        self.table.horizontalHeader().setSectionResizeMode(0, mode.Stretch)
+        self.table = self.result_table(heads, stretched=0)
         self.table.setMaximumHeight(170)
         self.rate = self._wish("rate", tr("Frames per second that are needed"), tr(" frames/s"))
         self.limit = self._wish("limit", tr("Largest error of the depth"), tr(" um RMS"))
         self.advice = named(PlainLabel(), "precision.advice", tr("Recommended mode"))
         self.words.setMinimumHeight(2 * self.words.fontMetrics().lineSpacing())
-        self.save.setToolTip(plain_tip(tr("HTML with the diagrams, CSV, JSON and PNG")))
+        self.save.setToolTip(plain_tip(tr("Table as CSV, and figure as PNG")))
 
     def _wish(self, name: str, label: str, suffix: str) -> DoubleSpinBox:
         box = named(DoubleSpinBox(), f"precision.{name}", label, label)
@@ -121,11 +116,10 @@ class PrecisionDialog(WorkDialog):
         wish.addWidget(self.rate)
         wish.addWidget(self.limit)
         wish.addWidget(self.advice, 1)
-        form.addRow(tr("Diagram"), self.error)
         form.addRow(tr("I need"), wish)
         column = QVBoxLayout(self)
         column.addLayout(form)
-        column.addWidget(self.plot, 1)
+        column.addWidget(self.figure, 1)
         column.addWidget(self.table)
         column.addLayout(self.foot_row())
 
@@ -162,7 +156,7 @@ class PrecisionDialog(WorkDialog):
             self.say(tr("There is no calibration yet. Calibrate a sensor first."), "warn")
         elif self._virtual:
             self.presses.setText(tr("simulated by the virtual sensor"))
-            self.say(tr("Measures the accuracy and run time of each method on this machine."))
+            self.say(tr("Measures the accuracy and run time of each mode on this machine."))
         else:
             self.presses.setText(tr("none selected"))
             self.say(tr("Choose a session folder of this sensor that contains the true depths."))
@@ -191,40 +185,37 @@ class PrecisionDialog(WorkDialog):
         if entry is None or self.jobs.busy:
             return
         path, folder, design = entry.path, self._folder, self._design()
-        chosen = usual_methods()
 
-        def work(progress: Callable[[float], None]) -> tuple[Point, ...]:
+        def work(progress: Callable[[float], None]) -> Result:
             def step(_what: str, share: float) -> None:
                 progress(share)
 
             calibration = read_open_calibration(path)
             if folder is not None:
-                return measure_calibration(calibration, folder, chosen, progress=step)
-            return measure_virtual(calibration, design, chosen, progress=step)
+                points = measure_session(folder, calibration, progress=step)
+            else:
+                points = measure_virtual(design, calibration, progress=step)
+            return points, figure_png(points)
 
         self.submit(tr("Measuring"), work)
 
     # Results
 
-    def show_result(self, points: tuple[Point, ...]) -> None:
+    def show_result(self, result: Result) -> None:
         """Show the results."""
+        points, png = result
         front = pareto_front(points)
-        self.table.setRowCount(len(points))
-        for row, point in enumerate(points):
-            numbers = [getattr(point, name) for name in NUMBERS]
-            cells = [point.label, *("" if v is None else _digits(v) for v in numbers)]
-            cells.append(tr("yes") if point in front else "")
-            for column, text in enumerate(cells):
-                item = QTableWidgetItem(text)
-                if column:
-                    right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-                    item.setTextAlignment(right)
-                item.setToolTip(plain_tip(point.gap))
-                self.table.setItem(row, column, item)
-        gaps = [f"{point.label}: {point.gap}" for point in points if point.gap]
-        text = tr("The dashed line is the front: no other method is both faster and more accurate.")
-        self.say(" ".join([text, *gaps]))
-        self._draw()
+        rows = []
+        for point in points:
+            numbers = [getattr(point, name) for name in ("median_ms", "p95_ms", *ERRORS)]
+            on_front = tr("yes") if point in front else ""
+            rows.append([point.label, *(_digits(number) for number in numbers), on_front])
+        self.fill(self.table, rows)
+        picture = QPixmap()
+        picture.loadFromData(png)
+        smooth = Qt.TransformationMode.SmoothTransformation
+        self.figure.setPixmap(picture.scaledToHeight(HEIGHT_PX, smooth))
+        self.say(tr("Front: no other mode is both faster and more accurate."))
         self._recommend()
 
     def _recommend(self) -> None:
@@ -239,20 +230,13 @@ class PrecisionDialog(WorkDialog):
             self.advice.setText(tr("No mode on this machine is that fast and accurate"))
             return
         text = tr("Use: {mode} ({ms} ms, {um} um)").format(
-            mode=found.label,
-            ms=_digits(found.median_ms or 0.0),
-            um=_digits(found.rms_um or 0.0),
+            mode=found.label, ms=_digits(found.median_ms), um=_digits(found.rms_um)
         )
         self.advice.setText(text)
 
-    def files_of(self, points: tuple[Point, ...], folder: Path) -> list[Path]:
+    def files_of(self, result: Result, folder: Path) -> list[Path]:
         """Write the report into a folder; return the files."""
-        from gelpolight_core.experiments.front.report import write_work_precision
-
-        return write_work_precision(points, (), folder)
-
-    def _draw(self) -> None:
-        self.plot.show_points(self.points, str(self.error.currentData()))
+        return write_work_precision(result[0], folder)
 
     def ready(self) -> bool:
         """Whether presses with true depths are chosen."""

@@ -10,15 +10,17 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QHBoxLayout,
+    QHeaderView,
     QProgressBar,
     QPushButton,
     QTableWidget,
+    QTableWidgetItem,
     QWidget,
 )
 
 from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
-from app.widgets.label import PlainLabel
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -107,13 +109,26 @@ class WorkDialog(QDialog):
         row.addWidget(self.save)
         return row
 
-    def result_table(self, heads: Sequence[str]) -> QTableWidget:
-        """Return an empty table with these columns, which cannot be edited."""
+    def result_table(self, heads: Sequence[str], *, stretched: int) -> QTableWidget:
+        """Return an empty table with these columns, which cannot be edited; one is stretched."""
         table = named(QTableWidget(0, len(heads)), f"{self.objectName()}.table", tr("Results"))
         table.setHorizontalHeaderLabels(list(heads))
         table.verticalHeader().hide()
         table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        table.setSelectionMode(QTableWidget.SelectionMode.NoSelection)
+        table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        table.horizontalHeader().setSectionResizeMode(stretched, QHeaderView.ResizeMode.Stretch)
         return table
+
+    @staticmethod
+    def fill(table: QTableWidget, rows: Sequence[Sequence[str]]) -> None:
+        """Show these rows of text."""
+        table.setRowCount(len(rows))
+        for number, row in enumerate(rows):
+            for column, text in enumerate(row):
+                item = QTableWidgetItem(text)
+                item.setToolTip(plain_tip(text))
+                table.setItem(number, column, item)
 
     def submit(self, title: str, work: Callable[[Callable[[float], None]], Any]) -> None:
         """Work in the background while live processing rests; then show the result."""

@@ -81,15 +81,19 @@ class KnownSensor:
         return self.sensor.brightness(BareMembrane()).astype(np.float32)
 
 
-def matt_design(scale: float = 0.25) -> SensorDesign:
-    """Return the default sensor with a uniform Lambertian membrane and no crosstalk.
+def matt(design: SensorDesign) -> SensorDesign:
+    """Return a design with a uniform Lambertian membrane and no crosstalk.
 
     Its shading is exactly that of the model, so that all errors are numerical.
     """
-    plain = SensorDesign()
-    still = replace(plain.membrane, specular_weight=0.0, variation=0.0, speck_count=0)
-    photometry = replace(plain.photometry, crosstalk=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)))
-    return replace(plain, membrane=still, photometry=photometry).scaled(scale)
+    membrane = replace(design.membrane, specular_weight=0.0, variation=0.0, speck_count=0)
+    photometry = replace(design.photometry, crosstalk=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)))
+    return replace(design, membrane=membrane, photometry=photometry)
+
+
+def matt_design(scale: float = 0.25) -> SensorDesign:
+    """Return the default sensor made :func:`matt`."""
+    return matt(SensorDesign()).scaled(scale)
 
 
 def known_sensor(design: SensorDesign, *, seed: int = 0) -> KnownSensor:
@@ -105,13 +109,7 @@ def known_sensor(design: SensorDesign, *, seed: int = 0) -> KnownSensor:
 
 
 def exact_calibration(
-    sensor: VirtualSensor,
-    *,
-    camera: Camera | None = None,
-    plane: TopPlane | None = None,
-    stated: SensorData | None = None,
-    leds_mm: NDArray[np.float64] | None = None,
-    crosstalk: NDArray[np.float64] | None = None,
+    sensor: VirtualSensor, *, leds_mm: NDArray[np.float64] | None = None
 ) -> Calibration:
     """Return the exact calibration of a sensor.
 
@@ -122,17 +120,14 @@ def exact_calibration(
     ----------
     sensor : VirtualSensor
         To be calibrated.
-    camera, plane, stated, leds_mm, crosstalk : optional
-        Values instead of the exact ones; background and light are then those of the sensor's images
-        with these values.
+    leds_mm : (3, 3), optional
+        LED positions instead of the exact ones.
     """
     design = sensor.design
-    camera = camera or _camera(design)
-    plane = plane or _plane(design)
-    stated = stated or _stated(design)
+    camera, plane, stated = _camera(design), _plane(design), _stated(design)
     leds = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in design.leds])
     leds = leds if leds_mm is None else leds_mm
-    mixing = np.array(design.photometry.crosstalk) if crosstalk is None else crosstalk
+    mixing = np.array(design.photometry.crosstalk)
     table = build_resampling_table(
         camera, plane, sensor_stack(stated, plane), working_diameter_mm=stated.working_diameter_mm
     )

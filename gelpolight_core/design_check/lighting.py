@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.design_check.known_sensor import KnownSensor, exact_calibration
+from gelpolight_core.design_check.known_sensor import KnownSensor, exact_calibration, matt
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.score import TrueDepth, score_depth, scored_radius_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -98,7 +98,7 @@ def compare_lighting(
     InputError
         If the design does not hold together.
     """
-    plain = _matt(design)
+    plain = matt(design).scaled(WIDTH_PX / design.camera.width_px)
     surface = press(
         Cylinder(diameter_mm, depth_mm),
         x_mm=position_mm[0],
@@ -136,14 +136,6 @@ def lighting_name(row: LightingRow) -> str:
     if row.lighting == "point":
         return tr("point, LEDs at {h:.1f} mm").format(h=row.setting)
     return tr("directional, {angle:.0f} deg").format(angle=row.setting)
-
-
-def _matt(design: SensorDesign) -> SensorDesign:
-    """Return the design with an even Lambertian membrane, without crosstalk, at a small size."""
-    membrane = replace(design.membrane, specular_weight=0.0, variation=0.0, speck_count=0)
-    photometry = replace(design.photometry, crosstalk=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)))
-    plain = replace(design, membrane=membrane, photometry=photometry)
-    return plain.scaled(WIDTH_PX / design.camera.width_px)
 
 
 def _point_row(

@@ -22,8 +22,6 @@ from gelpolight_core.sensor_calibration import Calibration
 ROOT = DOCS.parent
 NOTHING = "\N{EN DASH}"
 CHAPTER = (DOCS / "reference/quality-figures.md").read_text("utf-8")
-# Of a development report, not of a sensor: how many of its own cases went wrong.
-ELSEWHERE = {"gelpolight_core/experiments/stability_report.py"}
 HIGHER_IS_BETTER = {"axis_ratio", "coverage", "signal_to_noise"}  # of a ball's contact
 # What the chapter says of limits that depend on the image or the ball; its numbers are filled in
 # from the module.
@@ -128,7 +126,7 @@ def all_figures() -> tuple[Judged, ...]:
     found = []
     for folder in ("gelpolight_core", "app"):
         for path in sorted((ROOT / folder).rglob("*.py")):
-            if str(path.relative_to(ROOT)) not in {"gelpolight_core/quality.py", *ELSEWHERE}:
+            if str(path.relative_to(ROOT)) != "gelpolight_core/quality.py":
                 found += figures_of(path)
     return tuple(found)
 

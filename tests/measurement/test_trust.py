@@ -11,7 +11,7 @@ from app.command_line.main import main
 from app.measure.measuring import apply_tool
 from gelpolight_core import measure, read_height_map, write_height_map
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
+from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.measurement.indenter_tools import Cylinder
 from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.tools import ToolResult

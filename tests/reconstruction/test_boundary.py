@@ -16,7 +16,6 @@ from gelpolight_core.design_check.known_sensor import (
     matt_design,
 )
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.checks import (
     fixed_boundary_note,
@@ -29,6 +28,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.studies.trial import depth_error, rms_um
 
 Array = NDArray[np.float64]
 CELL_MM, HALF_MM = 0.025, 15.0

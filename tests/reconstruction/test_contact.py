@@ -14,12 +14,12 @@ from gelpolight_core.design_check.known_sensor import (
     known_sensor,
     matt_design,
 )
-from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.checks import small_image_notes, visible_depth_notes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
+from gelpolight_core.studies.trial import depth_error, rms_um
 
 AT_MM = (1.0, -2.0)
 EMPTY_FRAMES = 150

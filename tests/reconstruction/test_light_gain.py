@@ -9,7 +9,6 @@ import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.design_check.known_sensor import KnownPress, KnownSensor, known_sensor
-from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.image.response import gamma_response
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.trust import judged
@@ -18,6 +17,7 @@ from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder
+from gelpolight_core.studies.trial import depth_error, rms_um
 
 TEN_UM = 10.0
 CORRECTION = "light of the image"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scene
+from reference.plain_paper import plain_depth, plain_slopes
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.plain_paper import plain_depth, plain_slopes
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.paper.depth import shading_maps
 from gelpolight_core.reconstruction.paper.model import solve_slopes

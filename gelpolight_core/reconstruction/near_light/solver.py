@@ -263,7 +263,7 @@ class NearLightSolver:
     def solved(
         self, frame: NDArray[Any], *, effort: str = "best", everywhere: bool = False
     ) -> Solved | None:
-        """Return the solved region of a frame, for experiments; None where nothing is pressed.
+        """Return the solved region of a frame, for studies; None where nothing is pressed.
 
         It lies in the solver's buffers, which the next frame overwrites.
 

@@ -359,7 +359,7 @@ def dialog_of(window: MainWindow, kind: type) -> QWidget:
     return dialog
 
 
-@pytest.mark.parametrize("name", ["precision", "stability", "design"])
+@pytest.mark.parametrize("name", ["precision", "design"])
 def test_a_tool_opens_once_and_closes_with_the_window(window: MainWindow, name: str) -> None:
     for _ in range(2):
         window.findChild(QAction, f"tools.{name}").trigger()

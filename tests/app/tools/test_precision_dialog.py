@@ -14,20 +14,15 @@ from pytestqt.qtbot import QtBot
 from app.context.context import AppContext
 from app.tools import precision_dialog
 from app.tools.precision_dialog import PrecisionDialog
-from app.tools.precision_plot import LIMITS, PrecisionPlot
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.experiments.front.measure import Point
-from gelpolight_core.experiments.front.trial import USUAL, measure_calibration, usual_methods
 from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.studies.work_precision import Point
 
-POINT = Point(
-    "A", "paper", "paper's model", "paper", 1280, 1.2, 0.02, 10.0, 12.0, 30.0, 6.0, 2.0, 2.6
-)
+POINT = Point("A", "paper", "paper's model", 1280, 0.02, 4, 10.0, 12.0, 30.0, 6.0, 2.0, 2.6)
 POINTS = (
     POINT,
-    replace(POINT, method="full_fast", label="full model, fast", family="effort", rms_um=9.0),
-    replace(POINT, method="full_best", family="effort", median_ms=900.0, p95_ms=950.0, rms_um=4.0),
-    replace(POINT, method="bare", median_ms=None, p95_ms=None, rms_um=None, gap="refused"),
+    replace(POINT, mode="fast", label="full model, fast", median_ms=20.0, p95_ms=25.0, rms_um=9.0),
+    replace(POINT, mode="best", label="full model, best", median_ms=900.0, p95_ms=950.0, rms_um=4),
 )
 
 
@@ -53,7 +48,7 @@ def test_the_calibration_in_use_is_measured_on_rendered_presses(
 ) -> None:
     asked = []
 
-    def measure(calibration: Calibration, *arguments: object, **options: object) -> object:
+    def measure(_design: object, calibration: Calibration, **_: object) -> object:
         asked.append(calibration.identity)
         return POINTS
 
@@ -65,20 +60,33 @@ def test_the_calibration_in_use_is_measured_on_rendered_presses(
     assert asked == [small_calibration.identity]
     assert "small" in dialog.calibrations.currentText()
     assert dialog.table.rowCount() == len(POINTS)
-    assert "refused" in dialog.words.text()
-    for row in range(dialog.error.count()):
-        dialog.error.setCurrentIndex(row)
-    assert not dialog.grab().isNull()
+    assert dialog.table.item(1, 0).text() == "full model, fast"  # type: ignore[union-attr]
+    assert not dialog.figure.pixmap().isNull()
 
 
-def test_its_report_equals_that_of_the_command_line(
-    dialog: PrecisionDialog, tmp_path: Path, qtbot: QtBot
+def test_the_recommended_mode_follows_the_required_rate(
+    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:
-    dialog._done(POINTS)
+    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
+    dialog.start.click()
+    qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
+    assert "best" in dialog.advice.text()
+    dialog.rate.setValue(30.0)
+    assert "fast" in dialog.advice.text()
+    dialog.limit.setValue(1.0)
+    assert "No mode" in dialog.advice.text()
+
+
+def test_its_table_and_figure_are_saved(
+    dialog: PrecisionDialog, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
+    dialog.start.click()
+    qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
     dialog.write_report(tmp_path)
     qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=20_000)
-    assert "full model, fast" in (tmp_path / "work-precision.html").read_text("utf-8")
-    assert (tmp_path / "work-precision.csv").is_file()
+    assert "full model, fast" in (tmp_path / "work-precision.csv").read_text("utf-8")
+    assert (tmp_path / "work-precision.png").is_file()
 
 
 def test_presses_of_another_sensor_are_refused_in_one_sentence(
@@ -91,16 +99,6 @@ def test_presses_of_another_sensor_are_refused_in_one_sentence(
     qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=20_000)
     assert "other" in dialog.words.text() and "virtual-1" in dialog.words.text()
     assert dialog.start.isEnabled()
-
-
-def test_a_calibration_is_measured_in_the_modes_offered_to_users(
-    small_calibration: Calibration, small_session: Path
-) -> None:
-    methods = [m for m in usual_methods() if m.name in ("paper", "full_balanced")]
-    points = measure_calibration(small_calibration, small_session, methods, repeats=1)
-    assert [p.method for p in points] == ["paper", "full_balanced"]
-    assert all(p.median_ms and p.rms_um for p in points)
-    assert {m.name for m in usual_methods()} == set(USUAL)
 
 
 @pytest.mark.parametrize("mode", ["escape", "close"])
@@ -138,33 +136,3 @@ def test_closing_it_stops_the_measurement(
     dialog.show()
     assert dialog.start.isEnabled()
     assert not dialog.stop.isEnabled()
-
-
-def ticks(plot: PrecisionPlot, side: str) -> list[str]:
-    return [text for _, text in plot._plot.getAxis(side)._tickLevels[0]]
-
-
-def test_the_axes_have_round_values_at_any_zoom(dialog: PrecisionDialog) -> None:
-    plot = dialog.plot
-    view = plot._plot.getViewBox()
-    assert ticks(plot, "bottom")
-    for _ in range(200):
-        view.scaleBy((4.0, 4.0))
-    # The axis update must work for every zoom of a mouse wheel.
-    dialog._done(POINTS)
-    (left, right), (bottom, top) = plot._plot.viewRange()
-    assert LIMITS["xMin"] <= left < right <= LIMITS["xMax"]
-    assert LIMITS["yMin"] <= bottom < top <= LIMITS["yMax"]
-    dialog._done(())
-    for _ in range(200):
-        view.scaleBy((4.0, 4.0))
-    assert ticks(plot, "bottom") == [f"{10.0**power:g}" for power in range(-3, 9)]
-    view.setRange(xRange=(1.0, 2.0), yRange=(0.1, 0.4), padding=0.0)
-    assert ticks(plot, "bottom") == ["10", "20", "50", "100"]
-    view.setRange(xRange=(0.95, 1.15), yRange=(-0.5, 2.5), padding=0.0)
-    assert ticks(plot, "bottom") == ["9", "10", "11", "12", "13", "14"]
-    assert ticks(plot, "left") == "0.5 1 2 5 10 20 50 100 200".split()
-    for _ in range(200):
-        view.scaleBy((0.25, 0.25))
-    assert 3 <= len(ticks(plot, "bottom")) <= 9
-    assert 3 <= len(ticks(plot, "left")) <= 9

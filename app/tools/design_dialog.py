@@ -1,0 +1,102 @@
+"""The check of a sensor design before it is built."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.context.context import AppContext
+from app.tools.work_dialog import WorkDialog
+from app.widgets.quality_table import limit_text, value_text
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.design_check.check import DesignCheckResult, check_design
+from gelpolight_core.design_check.lighting import LightingRow, compare_lighting, lighting_name
+from gelpolight_core.quality import Verdict, verdict_word
+from gelpolight_core.studies.files import write_table
+from gelpolight_core.translation import tr
+
+Result = tuple[DesignCheckResult, tuple[LightingRow, ...]]
+
+
+class DesignDialog(WorkDialog):
+    """Checks a design, and presses a cylinder under its LEDs and under directional light.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The design in use.
+    context : AppContext
+        Settings, and the request to rest.
+    parent : QWidget, optional
+        Owner.
+    """
+
+    def __init__(
+        self, design: SensorDesign, *, context: AppContext, parent: QWidget | None = None
+    ) -> None:
+        start = tr("&Run"), tr("Run")
+        super().__init__("design", tr("Design check"), start=start, context=context, parent=parent)
+        self._design = design
+        self.resize(980, 620)
+        self.heads = (tr("Figure"), tr("Value"), tr("Limit"), tr("Result"), tr("Advice"))
+        self.table = self.result_table(self.heads, stretched=len(self.heads) - 1)
+        column = QVBoxLayout(self)
+        column.addLayout(self.button_row())
+        column.addWidget(self.table, 1)
+        column.addLayout(self.foot_row())
+        self.say(
+            tr(
+                "Checks the design of the virtual sensor, and presses a cylinder under its LEDs "
+                "and under directional light: shadow, and the depth error of the near-light and "
+                "of the directional method."
+            )
+        )
+        self.allow()
+
+    def run(self) -> None:
+        """Check the design in the background."""
+        if self.jobs.busy:
+            return
+        design = self._design
+
+        def work(progress: Callable[[float], None]) -> Result:
+            check = check_design(design)
+            rows = compare_lighting(design, progress=lambda _what, share: progress(share))
+            return check, rows
+
+        self.submit(self.windowTitle(), work)
+
+    def show_result(self, result: Result) -> None:
+        """Show the figures, and the verdict of the design."""
+        self.fill(self.table, _rows(result))
+        verdict = verdict_word(result[0].quality.verdict)
+        self.say(tr("The design: {verdict}").format(verdict=verdict))
+
+    def files_of(self, result: Result, folder: Path) -> Sequence[Path]:
+        """Write the table as CSV."""
+        path = folder / "design-check.csv"
+        write_table([dict(zip(self.heads, row, strict=True)) for row in _rows(result)], path)
+        return [path]
+
+
+def _rows(result: Result) -> list[tuple[str, ...]]:
+    """Return one row for each figure, then one for each kind of light."""
+    check, lighting = result
+    rows = []
+    for figure in check.quality.figures:
+        advice = "" if figure.verdict is Verdict.PASS else figure.advice
+        texts = value_text(figure), limit_text(figure), verdict_word(figure.verdict)
+        rows.append((figure.label, *texts, advice))
+    for light in lighting:
+        shadow = tr("{p:.1f} % in shadow").format(p=light.shadow_percent)
+        errors = tr("depth error: near light {near}, directional {parallel}").format(
+            near=_um(light.near_um), parallel=_um(light.parallel_um)
+        )
+        rows.append((lighting_name(light), shadow, "", "", errors))
+    return rows
+
+
+def _um(value: float | None) -> str:
+    return tr("refused") if value is None else tr("{v:.1f} um").format(v=value)

@@ -1,1 +1,0 @@
-"""Experiments on the method itself: the benefit and the cost of its parts."""

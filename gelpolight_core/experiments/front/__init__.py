@@ -1,1 +1,0 @@
-"""Error against run time of every method, sensor by sensor."""

@@ -1,1 +1,0 @@
-"""Integration alone: several integrators on surfaces with an exact formula."""

@@ -1,1 +1,0 @@
-"""Other methods from colour to depth; all learn from the same ball presses."""

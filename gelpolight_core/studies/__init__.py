@@ -1,0 +1,1 @@
+"""Studies: error against run time, and numerical stability."""

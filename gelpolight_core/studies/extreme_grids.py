@@ -1,0 +1,168 @@
+"""Extreme grids: integration on all sizes, with bad slopes; and results that must repeat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reconstruction.integration.poisson import PoissonSolver, integrate_slopes
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import MODELS
+from gelpolight_core.studies.stability import Case, Seen, group, seen_once
+from gelpolight_core.studies.trial import rms_um, standard_press, standard_sensor
+
+Map = NDArray[np.float32]
+LEAST_NODES = 20
+RIGHT_SHARE, FINE_SHARE = 0.1, 1e-4
+"""Accepted error, as a share of the bump's height: on a few nodes it is not smooth."""
+LARGE = (4904, 6544)
+"""32 megapixels with lengths for which the transform is slow: prime factors 613 and 409."""
+TINY = ((1, 1), (1, 2), (2, 2), (3, 5))
+LINES = ((1, 20_000), (20_000, 1), (16, 8192), (8192, 16), (4, 65_536))
+PRIME = ((127, 131), (1279, 957), LARGE)
+BAD_UM = 3.0
+"""Accepted error with one slope in a thousand missing, on a bump of some millimetres."""
+TOLERANCES = (1e-2, 1e-3, 3e-4, 1e-6)
+USED = 3e-4
+"""Tolerance of the reconstruction."""
+TOLERANCE_UM = 2.0
+SINGLE_UM = 0.05
+RUNS, THREADS = (2, 2, 2, 2, 2), (1, 2, 3, 8)
+
+
+def grid_cases() -> list[Case]:
+    """Return the cases on grids of nodes, and on results that must repeat."""
+    sizes = {f"grid_{r}x{c}": partial(_bump, r, c) for r, c in (*TINY, *LINES, *PRIME)}
+    bad: dict[str, Callable[[], Seen]] = {
+        "slopes_nan": partial(_spoilt, np.nan),
+        "slopes_infinite": partial(_spoilt, np.inf),
+        "one_slope_1e4": _one_steep,
+        "slopes_denormal": _tiny,
+        "weights_of_nothing": _no_weights,
+    }
+    repeats = {
+        f"{name}_{model}": partial(_repeated, model, threads)
+        for model in MODELS
+        for name, threads in (("runs", RUNS), ("threads", THREADS))
+    }
+    precision = {
+        f"single_precision_{r}x{c}": partial(_precision, r, c)
+        for r, c in ((240, 320), (960, 1280), LARGE)
+    }
+    return [
+        *group("grids", "the bump from which the slopes were computed, or refused", sizes),
+        *group("grids", "finite, counted, and the rest nearly unchanged", bad),
+        *group("grids", "the result does not depend on it", {"solver_tolerance": _tolerances}),
+        *group("numbers", "five runs, or 1, 2, 3 and 8 threads: the same bits", repeats),
+        *group("numbers", "single against double: less than 0.05 um apart", precision),
+    ]
+
+
+def bump(rows: int, columns: int) -> tuple[Map, Map, Map, float]:
+    """Return a smooth bump that is 0 at the border, its slopes (at most 1), and the pitch in mm.
+
+    A product of squared sines over 20 mm; a single row or column is constant across.
+    """
+    pitch = 20.0 / max(rows, columns)
+
+    def axis(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        if count == 1:
+            return np.ones(1), np.zeros(1), 0.0
+        phase, steepest = np.pi * (np.arange(count) + 0.5) / count, np.pi / (count * pitch)
+        return np.sin(phase) ** 2, np.sin(2.0 * phase) * steepest, steepest
+
+    (down, down_slope, a), (across, across_slope, b) = axis(rows), axis(columns)
+    height_mm = 1.0 / max(a, b, 1.0)
+    depth, slope_x, slope_y = (
+        (height_mm * np.outer(first, second)).astype(np.float32)
+        for first, second in ((down, across), (down, across_slope), (down_slope, across))
+    )
+    return depth, slope_x, slope_y, pitch
+
+
+def _bump(rows: int, columns: int) -> Seen:
+    depth, slope_x, slope_y, pitch = bump(rows, columns)
+    found = PoissonSolver(rows, columns, pitch_mm=pitch).integrate(slope_x, slope_y).depth_mm
+    error, peak_um = rms_um((found - depth).astype(np.float64)), 1e3 * float(depth.max())
+    summary = f"{error:.2g} um RMS on a bump of {peak_um:.4g} um"
+    if max(rows, columns) < LEAST_NODES:  # too few for a bump
+        return seen_once(math.isfinite(error), summary)
+    share = RIGHT_SHARE if min(rows, columns) in range(2, LEAST_NODES) else FINE_SHARE
+    return seen_once(True, summary, error_um=error, bound_um=share * peak_um)
+
+
+def _spoilt(value: float) -> Seen:
+    depth, slope_x, slope_y, pitch = bump(240, 320)
+    bad = np.random.default_rng(0).random(depth.shape) < 1e-3
+    slope_x[bad] = value
+    found = integrate_slopes(slope_x, slope_y, pitch_mm=pitch)
+    error = rms_um((found.depth_mm - depth).astype(np.float64))
+    counted = found.sanitised_count == np.count_nonzero(bad)
+    summary = f"{error:.2f} um RMS; {found.sanitised_count} values counted"
+    return seen_once(counted, summary, error_um=error, bound_um=BAD_UM)
+
+
+def _one_steep() -> Seen:
+    depth, _, _, pitch = bump(240, 320)
+    slope_x = np.zeros_like(depth)
+    slope_x[120, 160] = 1e4
+    found = integrate_slopes(slope_x, np.zeros_like(depth), pitch_mm=pitch)
+    peak_px = float(np.abs(found.depth_mm).max()) / pitch
+    summary = f"a peak of {peak_px:.1f} pixels; {found.clipped_count} value clipped"
+    return seen_once(peak_px < 5.0 and found.clipped_count == 1, summary)
+
+
+def _tiny() -> Seen:
+    slope = np.full((64, 64), 1e-42, np.float32)
+    deepest = float(np.abs(integrate_slopes(slope, slope, pitch_mm=0.1).depth_mm).max())
+    return seen_once(deepest < 1e-30, f"at most {deepest:.1g} mm")
+
+
+def _walled() -> tuple[Map, Map, Map, float]:
+    """Return a bump's slopes, wrong along a ring, with low weights there, and the pitch."""
+    _, slope_x, slope_y, pitch = bump(240, 320)
+    y, x = np.mgrid[:240, :320]
+    ring = np.abs(np.hypot(x - 160, y - 120) - 60.0) < 2.0
+    slope_x[ring], slope_y[ring] = 0.0, 0.0
+    return slope_x, slope_y, np.where(ring, 0.01, 1.0).astype(np.float32), pitch
+
+
+def _tolerances() -> Seen:
+    *maps, pitch = _walled()
+    found = [integrate_weighted(*maps, pitch_mm=pitch, tolerance=t) for t in TOLERANCES]
+    away = [1e3 * float(np.abs(f.depth_mm - found[-1].depth_mm).max()) for f in found[:-1]]
+    texts = " / ".join(f"{um:.2f}" for um in away), " / ".join(str(f.rounds) for f in found)
+    summary = f"at most {texts[0]} um from the strictest, {texts[1]} rounds"
+    return seen_once(away[TOLERANCES.index(USED)] < TOLERANCE_UM, summary)
+
+
+def _no_weights() -> Seen:
+    slope_x, slope_y, weight, pitch = _walled()
+    found = integrate_weighted(slope_x, slope_y, np.zeros_like(weight), pitch_mm=pitch).depth_mm
+    return seen_once(bool(np.isfinite(found).all()), f"at most {np.abs(found).max():.2g} mm")
+
+
+def _repeated(model: str, threads: tuple[int, ...]) -> Seen:
+    calibration, frame = standard_sensor().calibration, standard_press().frame
+    first, *maps = (
+        Reconstructor(calibration, model=model, workers=n).depth(frame) for n in threads
+    )
+    same = all(np.array_equal(first.flags, found.flags) for found in maps)
+    away = max(float(np.abs(found.depth_mm - first.depth_mm).max()) for found in maps)
+    return seen_once(same and away == 0.0, f"up to {1e3 * away:.2g} um apart")
+
+
+def _precision(rows: int, columns: int) -> Seen:
+    _, slope_x, slope_y, pitch = bump(rows, columns)
+    single, double = (
+        PoissonSolver(rows, columns, pitch_mm=pitch, dtype=kind).integrate(slope_x, slope_y)
+        for kind in (np.float32, np.float64)
+    )
+    away = 1e3 * float(np.abs(single.depth_mm - double.depth_mm).max())
+    summary = f"at most {away:.2g} um of 1 mm apart"
+    return seen_once(True, summary, error_um=away, bound_um=SINGLE_UM)

@@ -1,0 +1,256 @@
+"""Extreme cases: each must be correct or be refused with its reason.
+
+A case is a function that returns what each mode made of it. An :class:`InputError` counts as
+refused, and so does a wrong result that reports that it is not reliable. Any other exception is a
+failure of the program; the run continues and the table shows it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.trace import EFFORTS
+from gelpolight_core.studies.files import drawn, write_results
+from gelpolight_core.translation import tr
+
+MODES = (*reversed(EFFORTS), "paper")
+
+
+class Outcome(StrEnum):
+    """How a case ended."""
+
+    PASSED = "passed"
+    REFUSED = "refused"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """Result of one mode in a case.
+
+    Attributes
+    ----------
+    name : str
+        One of `MODES`; empty where a case has no modes.
+    right : bool
+        Whether it meets all requirements; a result that is not finite never does.
+    error_um : float or None
+        Root mean square error of the depth; None without truth.
+    bound_um : float
+        The largest accepted error.
+    warning : str
+        What the result reports if it is not reliable; otherwise empty.
+    """
+
+    name: str
+    right: bool
+    error_um: float | None = None
+    bound_um: float = math.inf
+    warning: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """Measurement of a case.
+
+    Attributes
+    ----------
+    summary : str
+        What happened, without a full stop.
+    modes : tuple of Mode
+        What each mode made of it; the first one is shown. The case ends as the worst of them.
+    flags : str
+        The flags that were set, each with its share of the nodes.
+    condition : float or None
+        Largest condition number of the light directions, or that of the joint fit.
+    """
+
+    summary: str
+    modes: tuple[Mode, ...]
+    flags: str = ""
+    condition: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One extreme case.
+
+    Attributes
+    ----------
+    subject, name : str
+        The group that it belongs to, and its name on the command line.
+    required : str
+        What is done to all cases of its kind, and the required result.
+    run : callable
+        Does it.
+    """
+
+    subject: str
+    name: str
+    required: str
+    run: Callable[[], Seen]
+
+
+def group(subject: str, required: str, cases: Mapping[str, Callable[[], Seen]]) -> list[Case]:
+    """Return cases with the same requirement, from their names and functions."""
+    return [Case(subject, name, required, run) for name, run in cases.items()]
+
+
+@dataclass(frozen=True, slots=True)
+class CaseResult:
+    """A case with its result.
+
+    Attributes
+    ----------
+    case : Case
+        What was done.
+    outcome : Outcome
+        How it ended.
+    message : str
+        What happened, with the reason of a refusal.
+    seen : Seen
+        Without modes where the case was refused or raised an error.
+    seconds : float
+        Of the whole case, its rendering included.
+    """
+
+    case: Case
+    outcome: Outcome
+    message: str
+    seen: Seen
+    seconds: float
+
+    @property
+    def first(self) -> Mode:
+        """The first mode, which is shown; without numbers where there is none."""
+        return self.seen.modes[0] if self.seen.modes else Mode("", False)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """One row of the table."""
+        errors = {mode.name: mode.error_um for mode in self.seen.modes}
+        return {
+            "subject": self.case.subject,
+            "case": self.case.name,
+            "required": self.case.required,
+            "verdict": self.outcome.value,
+            "error_um": self.first.error_um,
+            "bound_um": self.first.bound_um if math.isfinite(self.first.bound_um) else None,
+            **{f"{name}_um": errors.get(name) for name in MODES},
+            "flags": self.seen.flags,
+            "condition": self.seen.condition,
+            "seconds": round(self.seconds, 3),
+            "message": self.message,
+        }
+
+    @property
+    def line(self) -> str:
+        """The result as one line of text."""
+        error = "" if self.first.error_um is None else f"{self.first.error_um:.3g} um"
+        start = f"{self.outcome.value:<8} {self.case.name:<32}{error:>12}"
+        return f"{start}{self.seconds:7.1f} s  {self.message}"
+
+
+def seen_once(
+    right: bool, summary: str, *, error_um: float | None = None, bound_um: float = math.inf
+) -> Seen:
+    """Return the measurement of a case without modes; an error beyond its bound is not right."""
+    within = error_um is None or error_um <= bound_um
+    return Seen(summary, (Mode("", right and within, error_um, bound_um),))
+
+
+def run_case(case: Case) -> CaseResult:
+    """Run one case; any exception becomes its result, except Ctrl-C."""
+    begin = time.perf_counter()
+    seen = Seen("", ())
+    try:
+        seen = case.run()
+        outcome, message = _outcome(seen)
+    except InputError as error:
+        outcome, message = Outcome.REFUSED, str(error).rstrip(".")
+    except Exception as error:  # the table must show faults of the program
+        outcome, message = Outcome.FAILED, f"{type(error).__name__}: {error}"
+    return CaseResult(case, outcome, message, seen, time.perf_counter() - begin)
+
+
+def _outcome(seen: Seen) -> tuple[Outcome, str]:
+    wrong = [mode for mode in seen.modes if not mode.right]
+    silent = [mode.name for mode in wrong if not mode.warning]
+    if silent:
+        return Outcome.FAILED, f"{seen.summary}; wrong without a note: {', '.join(silent)}"
+    warnings = dict.fromkeys(mode.warning for mode in wrong)
+    return Outcome.REFUSED if wrong else Outcome.PASSED, "; ".join([seen.summary, *warnings])
+
+
+def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
+    """Return the cases with the given names or subjects, separated by commas; all if none is given.
+
+    Raises
+    ------
+    InputError
+        If there is no such case.
+    """
+    if names is None:
+        return tuple(cases)
+    asked = [name.strip() for name in names.split(",")]
+    known = {case.name for case in cases} | {case.subject for case in cases}
+    for name in asked:
+        if name not in known:
+            raise InputError(
+                tr("there is no case {name!r}").format(name=name),
+                where="--only",
+                advice=tr("Use some of {names}").format(names=", ".join(sorted(known))),
+            )
+    return tuple(case for case in cases if case.name in asked or case.subject in asked)
+
+
+def summary_line(results: Iterable[CaseResult]) -> str:
+    """Return the number of cases with each outcome."""
+    outcomes = [result.outcome for result in results]
+    passed, refused, failed = (outcomes.count(outcome) for outcome in Outcome)
+    return tr("{p} passed, {r} refused with the reason, {f} failed, of {n}").format(
+        p=passed, r=refused, f=failed, n=len(outcomes)
+    )
+
+
+def write_stability(results: Sequence[CaseResult], folder: Path) -> list[Path]:
+    """Write ``stability.csv`` and ``stability.png``: the error of each case with its limit.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    shown = [result for result in results if result.first.error_um]
+    png = drawn(lambda figure: _paint(figure, shown), 9.0, 1.5 + 0.14 * len(shown))
+    return write_results(folder, "stability", [result.row for result in results], png)
+
+
+def _paint(figure: Figure, results: Sequence[CaseResult]) -> None:
+    styles = {Outcome.PASSED: "go", Outcome.REFUSED: "yD", Outcome.FAILED: "rX"}
+    axes = figure.subplots()
+    for outcome, style in styles.items():
+        rows = [n for n, result in enumerate(results) if result.outcome is outcome]
+        axes.plot(
+            [results[n].first.error_um for n in rows],
+            rows,
+            style,
+            markersize=4,
+            label=outcome.value,
+        )
+    axes.plot([result.first.bound_um for result in results], range(len(results)), "k|")
+    axes.set_yticks(range(len(results)), [result.case.name for result in results], fontsize=6)
+    axes.set_ylim(len(results), -1)
+    axes.set_xscale("log")
+    axes.grid(axis="x", color="0.9")
+    axes.set_xlabel(tr("error of the depth, RMS (um); bar: largest error that passes"))
+    axes.legend()

@@ -1,0 +1,176 @@
+"""Shared parts of the cases on whole images: one sensor, every mode, and their notes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.design_check.known_sensor import (
+    KnownPress,
+    KnownSensor,
+    known_sensor,
+    matt_design,
+)
+from gelpolight_core.lights.positions import direction_condition
+from gelpolight_core.measurement.indenter_tools import mode_error
+from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
+from gelpolight_core.measurement.spread import BALL_SLOPE
+from gelpolight_core.reconstruction.checks import free_boundary_note
+from gelpolight_core.reconstruction.height_map import FLAG_NAMES, Flag, HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.simulation.indenters import Ball
+from gelpolight_core.studies.stability import MODES, Mode, Seen
+
+SCALE = 0.25
+MOST_OWN_SHARE = 0.1
+BALL = Ball(4.0, 1.0)
+BALL_AT_MM = (1.2, -0.8)
+
+
+@lru_cache(maxsize=1)
+def standard_sensor() -> KnownSensor:
+    """Return the sensor of all cases on images, at a quarter of the default's size."""
+    return known_sensor(matt_design(SCALE))
+
+
+@lru_cache(maxsize=1)
+def standard_press() -> KnownPress:
+    """Return a ball of 4 mm radius, 1 mm deep, in the standard sensor."""
+    return standard_sensor().pressed(BALL, x_mm=BALL_AT_MM[0], y_mm=BALL_AT_MM[1])
+
+
+def maps_of(
+    calibration: Calibration, frame: NDArray[Any], *, uncertainty: bool = False
+) -> dict[str, HeightMap]:
+    """Return the height map of a frame in each of `MODES`."""
+    full = Reconstructor(calibration, model="full")
+    paper = Reconstructor(calibration, model="paper")
+    solvers = {mode: paper if mode == "paper" else full.at_effort(mode) for mode in MODES}
+    return {mode: s.depth(frame, uncertainty=uncertainty) for mode, s in solvers.items()}
+
+
+def is_finite(found: HeightMap) -> bool:
+    """Return whether depth and normals are all finite."""
+    assert found.normals is not None
+    return bool(np.isfinite(found.depth_mm).all() and np.isfinite(found.normals).all())
+
+
+def flag_shares(found: HeightMap) -> str:
+    """Return the percentage of the visible nodes with each flag that occurs."""
+    visible = found.flags[~flagged(found, Flag.OUTSIDE)]
+    counts = {name: np.count_nonzero(visible & bit) for name, bit in FLAG_NAMES.items()}
+    return ", ".join(f"{n} {100 * c / visible.size:.2g} %" for n, c in counts.items() if c)
+
+
+def flagged(found: HeightMap, flag: Flag) -> NDArray[np.bool_]:
+    """Return the nodes with a flag."""
+    return np.asarray((found.flags & int(flag)) != 0)
+
+
+def truth_at(truth: TrueDepth, found: HeightMap) -> NDArray[np.float64]:
+    """Return true depth, d(depth)/dx and d(depth)/dy (rows, columns, 3) at the nodes of a map."""
+    pitch = float(truth.x_mm[1] - truth.x_mm[0])
+    down, across = np.gradient(truth.depth_mm, pitch)
+    column = ((found.x_mm - truth.x_mm[0]) / pitch).astype(np.float32)
+    row = ((found.y_mm - truth.y_mm[0]) / pitch).astype(np.float32)
+    maps = np.stack([truth.depth_mm, across, down], axis=-1)
+    x, y = np.meshgrid(column, row)
+    return np.asarray(cv2.remap(maps, x, y, cv2.INTER_LINEAR), np.float64)
+
+
+def depth_error(
+    found: HeightMap, truth: TrueDepth, *, radius_mm: float, spare: NDArray[np.bool_] | None = None
+) -> NDArray[np.float64]:
+    """Return found minus true depth, mm, at the compared nodes inside a radius."""
+    counts = np.hypot(*np.meshgrid(found.x_mm, found.y_mm)) < radius_mm
+    counts &= ~flagged(found, Flag.OUTSIDE)
+    if spare is not None:
+        counts &= ~spare
+    return np.asarray((found.depth_mm - truth_at(truth, found)[..., 0])[counts], np.float64)
+
+
+def rms_um(error_mm: NDArray[np.float64]) -> float:
+    """Return the root mean square in um."""
+    return float(1e3 * np.sqrt(np.mean(error_mm**2))) if error_mm.size else float("nan")
+
+
+def condition_of(calibration: Calibration) -> float:
+    """Return the largest condition number of the light directions on the visible membrane."""
+    points = calibration.table.grid.points_mm()[calibration.table.valid][::97]
+    assert calibration.full is not None
+    return direction_condition(calibration.full.led_positions_mm, points)
+
+
+def judged(
+    known: KnownSensor,
+    press: KnownPress,
+    bound_um: float,
+    *,
+    frame: NDArray[Any] | None = None,
+    spare: NDArray[np.bool_] | None = None,
+    needs: Sequence[Flag] = (),
+    radius_mm: float | None = None,
+) -> Seen:
+    """Reconstruct in every mode and compare with the truth.
+
+    Parameters
+    ----------
+    known, press
+        The sensor, and what is pressed into it.
+    bound_um : float
+        Largest accepted error of the best mode (root mean square). The others may exceed it by
+        their own error (:func:`own_share`).
+    frame : array, optional
+        Image instead of that of the press.
+    spare : (rows, columns) bool, optional
+        Nodes that are not compared, because their depth cannot be known.
+    needs : sequence of Flag, optional
+        Flags that each mode must raise somewhere.
+    radius_mm : float, optional
+        Of the compared area; by default the working circle without its edge.
+    """
+    calibration = known.calibration
+    radius = radius_mm or scored_radius_mm(calibration.sensor)
+    peak_mm = float(press.truth.depth_mm.max())
+    maps = maps_of(calibration, press.frame if frame is None else frame)
+    modes = []
+    for name, found in maps.items():
+        error = rms_um(depth_error(found, press.truth, radius_mm=radius, spare=spare))
+        bound = bound_um + (0.0 if name == "best" else 1e3 * peak_mm * own_share(found))
+        missing = [str(flag.name) for flag in needs if not flagged(found, flag).any()]
+        raised = [f"flagged: {', '.join(str(f.name) for f in needs)}"] if needs else []
+        sound = is_finite(found) and not missing
+        warning = "; ".join([*warnings_of(found), *raised]) if sound else ""
+        modes.append(Mode(name, sound and error <= bound, error, bound, warning))
+    return Seen(
+        f"{modes[0].error_um:.1f} um RMS on a press of {peak_mm:.2f} mm",
+        tuple(modes),
+        flag_shares(maps["best"]),
+        condition_of(calibration),
+    )
+
+
+def own_share(found: HeightMap) -> float:
+    """Return the additional error that a mode may have, as a share of the largest depth.
+
+    Coarse nodes and the lights of the flat membrane cause errors even with an exact calibration.
+    These are part of the stated standard deviation. Above `MOST_OWN_SHARE`, the map must have a
+    note.
+    """
+    own = mode_error(found)
+    return min(math.hypot(own.depth, own.depth_per_slope * BALL_SLOPE), MOST_OWN_SHARE)
+
+
+def warnings_of(found: HeightMap) -> tuple[str, ...]:
+    """Return the notes of a map that report an unreliable depth."""
+    harmless = {free_boundary_note().text}
+    if found.health is not None:
+        harmless |= {finding.line for finding in found.health.findings if finding.corrected}
+    return tuple(note for note in found.notes if note not in harmless)

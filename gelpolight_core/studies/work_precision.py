@@ -1,0 +1,352 @@
+"""Error against run time of each mode, on presses with a known truth.
+
+Errors are differences from the true depth, which no mode uses. Every press is reconstructed by all
+modes in turn, so that a slow phase of the machine affects all.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.score import (
+    TrueDepth,
+    read_true_depth,
+    score_depth,
+    scored_radius_mm,
+)
+from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import read_raw_image
+from gelpolight_core.session.session import read_session
+from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.studies.files import drawn, write_results
+from gelpolight_core.studies.trial import truth_at
+from gelpolight_core.translation import tr
+
+Progress = Callable[[str, float], None]
+WIDTHS = (320, 640, 1280)
+"""Of the virtual sensor's images, in pixels."""
+REPEATS = 2
+FLAT_TOPPED = ("cylinder", "cuboid")
+ERRORS = ("rms_um", "normal_deg", "height_percent", "size_percent")
+TOUCHED_MM = 0.02
+"""Normals count where the membrane is deeper than this."""
+WORTH = 0.01
+"""A slower mode must be better by this share to be on the front: smaller differences are noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One mode at one image width.
+
+    Attributes
+    ----------
+    sensor, mode, label : str
+        Serial, name of the mode, and the mode for people.
+    width : int
+        Of the image, in pixels.
+    pitch_mm : float
+        Of the grid.
+    presses : int
+        How many there were.
+    median_ms, p95_ms : float
+        Of a frame, over all presses.
+    rms_um, normal_deg, height_percent, size_percent : float
+        Mean absolute errors over the presses: depth (RMS), direction of the normal where the
+        membrane is pressed (RMS), plateau height, size at half height.
+    """
+
+    sensor: str
+    mode: str
+    label: str
+    width: int
+    pitch_mm: float
+    presses: int
+    median_ms: float
+    p95_ms: float
+    rms_um: float
+    normal_deg: float
+    height_percent: float
+    size_percent: float
+
+
+def modes() -> dict[str, tuple[str, str, str]]:
+    """Return model, effort and label of each mode, by its name."""
+    return {
+        "paper": ("paper", "best", tr("paper's model")),
+        "fast": ("full", "fast", tr("full model, {effort}").format(effort="fast")),
+        "balanced": ("full", "balanced", tr("full model, {effort}").format(effort="balanced")),
+        "best": ("full", "best", tr("full model, {effort}").format(effort="best")),
+    }
+
+
+def measure_virtual(
+    design: SensorDesign,
+    calibration: Calibration | None = None,
+    *,
+    widths: Sequence[int] = WIDTHS,
+    repeats: int = REPEATS,
+    seed: int = 0,
+    progress: Progress = lambda _what, _share: None,
+) -> tuple[Point, ...]:
+    """Measure the modes on rendered presses of the virtual sensor.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The sensor, with its presses.
+    calibration : Calibration, optional
+        Of the virtual sensor, at any image size. By default it is calibrated from a rendered
+        session, at each of `widths`.
+    widths : sequence of int, optional
+        Of the images, in pixels; with a calibration, its own.
+    repeats, seed : int, optional
+        How often each press is timed; seed of the virtual sensor.
+    progress : callable, optional
+        Called with the present task and the share done; its exceptions stop the work.
+
+    Raises
+    ------
+    InputError
+        If the calibration is of another sensor.
+    """
+    if calibration is not None:
+        _refuse_other(design.serial, calibration, tr("virtual sensor"))
+        widths = (calibration.camera.width,)
+    points: list[Point] = []
+    for number, width in enumerate(widths):
+        phase = partial(_phase, progress, number, len(widths))
+        with TemporaryDirectory(prefix="gelpolight-") as temporary:
+            folder, scale = Path(temporary) / "session", width / design.camera.width_px
+            simulate_session(
+                design,
+                folder,
+                seed=seed,
+                scale=scale,
+                presses_only=calibration is not None,
+                progress=partial(phase, 0.0, 0.3),
+            )
+            made = calibration
+            if made is None:
+                calibrating = partial(phase, 0.3, 0.6)
+                made = calibrate_session(read_session(folder), progress=calibrating).calibration
+            measuring = partial(phase, 0.6, 1.0)
+            points += measure_session(folder, made, repeats=repeats, progress=measuring)
+    return tuple(points)
+
+
+def _phase(
+    progress: Progress, number: int, total: int, begin: float, end: float, what: str, share: float
+) -> None:
+    progress(what, (number + begin + (end - begin) * share) / total)
+
+
+def measure_session(
+    folder: Path,
+    calibration: Calibration,
+    *,
+    repeats: int = REPEATS,
+    progress: Progress = lambda _what, _share: None,
+) -> tuple[Point, ...]:
+    """Measure the modes with a calibration on the presses of a session folder with truth.
+
+    Parameters
+    ----------
+    folder : Path
+        With ``presses/truth.csv`` and ``truth/*.npz``; cylinders and cuboids count.
+    calibration : Calibration
+        Of the session's sensor.
+    repeats : int, optional
+        How often each press is timed, after a first run for the error.
+    progress : callable, optional
+        Called with the present task and the share done; its exceptions stop the work.
+
+    Raises
+    ------
+    InputError
+        If the session is of another sensor, or its presses have no image or no truth.
+    """
+    _refuse_other(read_session(folder).sensor.serial, calibration, str(folder))
+    rows = [row for row in read_truth(folder / "presses").rows if row.truth.shape in FLAT_TOPPED]
+    if not rows:
+        raise InputError(
+            tr("No press of a cylinder or cuboid was found"),
+            where=str(folder / "presses" / "truth.csv"),
+            advice=tr("Use a session that contains such presses and their true depth"),
+        )
+    solvers = {
+        name: Reconstructor(calibration, model=model, effort=effort)
+        for name, (model, effort, _) in modes().items()
+        if model == "paper" or calibration.full is not None
+    }
+    radius_mm = scored_radius_mm(calibration.sensor)
+    times_ms: dict[str, list[float]] = {name: [] for name in solvers}
+    errors: dict[str, list[tuple[float, ...]]] = {name: [] for name in solvers}
+    for number, row in enumerate(rows):
+        progress(row.file, number / len(rows))
+        frame, _ = read_raw_image(folder / "presses" / row.file)
+        truth = read_true_depth((folder / "truth" / row.file).with_suffix(".npz"))
+        for repeat in range(1 + repeats):
+            for name, solver in solvers.items():
+                begin = time.perf_counter()
+                found = solver.depth(frame, name=row.file)
+                if repeat:
+                    times_ms[name].append(1e3 * (time.perf_counter() - begin))
+                else:
+                    errors[name].append(_errors(found, truth, row.truth.height_mm, radius_mm))
+    progress("", 1.0)
+    points = []
+    for name in solvers:
+        median, p95 = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
+        means = np.abs(errors[name]).mean(axis=0).tolist()
+        label, width = modes()[name][2], calibration.camera.width
+        sensor, pitch_mm = calibration.sensor.serial, calibration.table.grid.pitch_mm
+        points.append(Point(sensor, name, label, width, pitch_mm, len(rows), median, p95, *means))
+    return tuple(points)
+
+
+def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
+    if serial != calibration.sensor.serial:
+        raise InputError(
+            tr("The presses are of {one}, the calibration is of {other}").format(
+                one=serial, other=calibration.sensor.serial
+            ),
+            where=where,
+            advice=tr(
+                "Choose presses of this sensor with known true depth, or the calibration "
+                "of their sensor"
+            ),
+        )
+
+
+def _errors(
+    found: HeightMap, truth: TrueDepth, height_mm: float, radius_mm: float
+) -> tuple[float, ...]:
+    """Return `ERRORS` of a depth map."""
+    score = score_depth(
+        found.depth_mm, found.x_mm, found.y_mm, truth, height_mm=height_mm, radius_mm=radius_mm
+    )
+    angle = normal_error_deg(found, truth, radius_mm)
+    return score.rms_um, angle, score.height_percent, score.size_percent
+
+
+def normal_error_deg(found: HeightMap, truth: TrueDepth, radius_mm: float) -> float:
+    """Return the root mean square angle between found and true normals, where pressed.
+
+    Parameters
+    ----------
+    found : HeightMap
+        With normals.
+    truth : TrueDepth
+        What was pressed; only nodes deeper than `TOUCHED_MM` count.
+    radius_mm : float
+        Only nodes within this radius count.
+    """
+    assert found.normals is not None
+    depth, across, down = np.moveaxis(truth_at(truth, found), -1, 0)
+    counts = (depth > TOUCHED_MM) & (np.hypot(*np.meshgrid(found.x_mm, found.y_mm)) < radius_mm)
+    normals = -np.stack([across, down, np.ones_like(depth)], axis=-1)[counts]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    cosine = np.clip((normals * found.normals[counts]).sum(axis=1), -1.0, 1.0)
+    return float(np.degrees(np.sqrt(np.mean(np.arccos(cosine) ** 2))))
+
+
+def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
+    """Return the points of each width that no other exceeds in both time and depth error.
+
+    The fastest comes first. A slower point must be better by `WORTH`.
+    """
+    front: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.width, p.median_ms, p.rms_um)):
+        known = front[-1] if front and front[-1].width == point.width else None
+        if known is None or point.rms_um < (1.0 - WORTH) * known.rms_um:
+            front.append(point)
+    return tuple(front)
+
+
+def recommended(
+    points: Sequence[Point], *, rate_hz: float | None = None, rms_um: float | None = None
+) -> Point | None:
+    """Return the recommended mode; None if none is fast and accurate enough.
+
+    With a required error it is the fastest, without one the most accurate.
+
+    Parameters
+    ----------
+    points : sequence of Point
+        Of one sensor and width.
+    rate_hz : float, optional
+        Required frames per second; the 95th percentile of the time must meet it.
+    rms_um : float, optional
+        Largest accepted depth error.
+    """
+    known = [p for p in points if p.p95_ms * (rate_hz or 0.0) <= 1e3]
+    if rms_um is None:
+        return min(known, key=lambda p: p.rms_um, default=None)
+    accurate = [point for point in known if point.rms_um <= rms_um]
+    return min(accurate, key=lambda p: p.median_ms, default=None)
+
+
+def point_table(points: Sequence[Point]) -> str:
+    """Return the points as lines of text; a star marks the front."""
+    front = pareto_front(points)
+    heads = ("ms", "p95", "RMS um", "deg", tr("height %"), tr("size %"))
+    lines = [f"  {tr('mode'):<24}{tr('width'):>6}" + "".join(f"{head:>10}" for head in heads)]
+    for p in points:
+        numbers = [getattr(p, name) for name in ("median_ms", "p95_ms", *ERRORS)]
+        cells = "".join(f"{number:10.2f}" for number in numbers)
+        lines.append(f"{'*' if p in front else ' '} {p.label:<24}{p.width:6d}{cells}")
+    return "\n".join(lines)
+
+
+def figure_png(points: Sequence[Point]) -> bytes:
+    """Return the figure as PNG: depth error and plateau height against time."""
+    return drawn(lambda figure: _paint(figure, points), 9.0, 4.0)
+
+
+def write_work_precision(points: Sequence[Point], folder: Path) -> list[Path]:
+    """Write ``work-precision.csv`` and ``work-precision.png`` into a folder.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    front = pareto_front(points)
+    rows = [{**asdict(point), "on_front": point in front} for point in points]
+    return write_results(folder, "work-precision", rows, figure_png(points))
+
+
+def _paint(figure: Figure, points: Sequence[Point]) -> None:
+    depth, height = figure.subplots(1, 2)
+    for mode in dict.fromkeys(point.mode for point in points):
+        mine = [point for point in points if point.mode == mode]
+        times = [point.median_ms for point in mine]
+        late = [[0.0] * len(mine), [point.p95_ms - point.median_ms for point in mine]]
+        for axes, name in ((depth, "rms_um"), (height, "height_percent")):
+            values = [getattr(point, name) for point in mine]
+            axes.errorbar(times, values, xerr=late, marker="o", label=mine[0].label)
+    for width in dict.fromkeys(point.width for point in points):
+        front = [(p.median_ms, p.rms_um) for p in pareto_front(points) if p.width == width]
+        depth.step(*zip(*front, strict=True), "k:", where="post")
+        depth.annotate(f"{width} px", front[0])
+    for axes, label in ((depth, tr("depth, RMS (um)")), (height, tr("height of the plateau (%)"))):
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.grid(which="both", color="0.92")
+        axes.set_xlabel(tr("time of a frame (ms); bar: to the 95th percentile"))
+        axes.set_ylabel(label)
+    height.legend(title=tr("dotted: the front of each width"))

@@ -1,0 +1,179 @@
+"""The stability report as its reader meets it: every quick case is right or refused."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from app.command_line.main import MENDABLE, main
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.simulation.session import session_toml
+from gelpolight_core.studies import extreme_sessions
+from gelpolight_core.studies.extreme_sessions import LENGTHS, state_wrongly
+from gelpolight_core.studies.stability import Case, Mode, Outcome, Seen, run_case, seen_once
+from gelpolight_core.studies.stability_cases import all_cases
+from gelpolight_core.studies.trial import judged, standard_press, standard_sensor
+
+CASES = all_cases()
+RIGHT, WRONG = Mode("best", True, 1.0, 2.0), Mode("fast", False, 3.0, 2.0)
+REPORTED = Mode("paper", False, None, warning="nothing is pressed")
+# One of each kind of hard thing; the command runs all of them.
+LARGEST = "grid_4904x6544"
+QUICK = (
+    "pixels_huge",
+    "light_2_percent",
+    "kind_uint8",
+    "patch_two_dark",
+    "leds_0.5_mm_apart",
+    "leds_0.5_mm_below",
+    "leds_10_deg_off_a_row",
+    "depth_4_mm",
+    "light_zero_everywhere",
+    "index_2.5",
+    "distortion_-0.6",
+    "factor_zero",
+    "curve_falling",
+    "crosstalk_singular",
+    "plane_behind_camera",
+    "light_beyond_curve",
+    "threads_full",
+)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [c for c in CASES if c.name in QUICK or (c.subject == "grids" and c.name != LARGEST)],
+    ids=lambda case: case.name,
+)
+def test_an_extreme_case_is_right_or_refused(case: Case) -> None:
+    result = run_case(case)
+    assert result.outcome is not Outcome.FAILED, result.message
+    assert result.message
+
+
+def test_pixels_that_are_no_number_leave_the_rest_of_the_map_alone() -> None:
+    result = run_case(next(case for case in CASES if case.name == "pixels_nan"))
+    assert result.first.error_um is not None and result.first.error_um < 2.0
+    assert result.seen.flags.startswith("invalid") and "," not in result.seen.flags
+
+
+def test_the_papers_model_says_where_shadows_leave_its_assumptions() -> None:
+    for name, says in (("wall_57_deg", False), ("cone_89_deg", True)):
+        result = run_case(next(case for case in CASES if case.name == name))
+        assert result.outcome is not Outcome.FAILED, result.message
+        assert ("shadow of an LED" in result.message) is says
+
+
+def test_names_are_one_each() -> None:
+    assert len({case.name for case in CASES}) == len(CASES)
+    assert {LARGEST, *QUICK} <= {case.name for case in CASES}
+
+
+def _case(run) -> Case:  # type: ignore[no-untyped-def]
+    return Case("subject", "x", "required", run)
+
+
+def test_a_crash_is_a_row_that_failed_and_a_refusal_has_its_reason() -> None:
+    def crash() -> Seen:
+        raise ZeroDivisionError("by nothing")
+
+    def refuse() -> Seen:
+        raise InputError("it is bent", where="here", advice="Straighten it")
+
+    results = [run_case(_case(crash)), run_case(_case(refuse))]
+    assert [r.outcome for r in results] == [Outcome.FAILED, Outcome.REFUSED]
+    assert "by nothing" in results[0].message and "Straighten it" in results[1].message
+
+
+@pytest.mark.parametrize(
+    ("seen", "outcome"),
+    [
+        (seen_once(True, "", error_um=1.0, bound_um=2.0), Outcome.PASSED),
+        (seen_once(True, "", error_um=3.0, bound_um=2.0), Outcome.FAILED),
+        (seen_once(True, "", error_um=float("nan"), bound_um=2.0), Outcome.FAILED),
+        (seen_once(False, ""), Outcome.FAILED),
+        (Seen("", (RIGHT, RIGHT)), Outcome.PASSED),
+        (Seen("", (RIGHT, WRONG)), Outcome.FAILED),
+        (Seen("", (RIGHT, REPORTED)), Outcome.REFUSED),
+        (Seen("", (REPORTED, WRONG)), Outcome.FAILED),
+    ],
+)
+def test_a_wrong_result_counts_as_refused_only_where_every_wrong_mode_reports_it(
+    seen: Seen, outcome: Outcome
+) -> None:
+    assert run_case(_case(lambda: seen)).outcome is outcome
+
+
+def test_an_image_is_tried_in_every_mode() -> None:
+    seen = judged(standard_sensor(), standard_press(), 8.0)
+    assert [mode.name for mode in seen.modes] == ["best", "balanced", "fast", "paper"]
+    row = run_case(_case(lambda: seen)).row
+    assert all(row[f"{mode.name}_um"] == mode.error_um for mode in seen.modes)
+
+
+@pytest.mark.parametrize("length", LENGTHS)
+def test_each_stated_length_is_stated_wrongly_alone(length: str, tmp_path: Path) -> None:
+    path = tmp_path / "session.toml"
+    before = session_toml(standard_sensor().sensor.design)
+    path.write_text(before)
+    state_wrongly(length, 5.0, tmp_path)
+    changed = [
+        (a, b)
+        for a, b in zip(before.splitlines(), path.read_text().splitlines(), strict=True)
+        if a != b
+    ]
+    assert len(changed) == (len(standard_sensor().sensor.design.balls) if "ball" in length else 1)
+    for a, b in changed:
+        old, new = (float(line.split("=")[1]) for line in (a, b))
+        assert new == pytest.approx(1.05 * old, rel=1e-4)
+
+
+def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = SensorDesign()
+    fewer = replace(whole, balls=whole.balls[:5])
+    monkeypatch.setattr(extreme_sessions, "SensorDesign", lambda: fewer)
+    case = next(c for c in CASES if c.name == "session_scale_0.25")
+    result = run_case(case)
+    assert result.outcome is not Outcome.FAILED, result.message
+    assert len(result.seen.modes) == 4
+
+
+def test_ctrl_c_stops_the_cases() -> None:
+    def stop() -> Seen:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(_case(stop))
+
+
+def test_the_table_and_the_figure_hold_every_case_that_was_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    names = "grid_127x131,kind_int8,one_slope_1e4"
+    assert main(["stability", "-o", str(out), "--only", names]) == 0
+    captured = capsys.readouterr()
+    assert "2 passed, 1 refused" in captured.out
+    assert "%" in captured.err  # progress
+    with (out / "stability.csv").open() as stream:
+        verdicts = {row["case"]: row["verdict"] for row in csv.DictReader(stream)}
+    assert verdicts == {
+        "kind_int8": "refused",
+        "grid_127x131": "passed",
+        "one_slope_1e4": "passed",
+    }
+    assert (out / "stability.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_unknown_case_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["stability", "-o", str(tmp_path / "out"), "--only", "nothing"]) == MENDABLE
+    assert "nothing" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,162 @@
+"""Error against run time as its reader meets it: modes, front, recommendation."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from app.command_line.main import MENDABLE, main
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.score import TrueDepth
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.studies import work_precision
+from gelpolight_core.studies.work_precision import (
+    Point,
+    measure_session,
+    measure_virtual,
+    normal_error_deg,
+    pareto_front,
+    recommended,
+)
+
+POINT = Point("A", "a", "A", 1280, 0.02, 4, 10.0, 12.0, 5.0, 1.0, 1.0, 1.0)
+
+
+def at(ms: float, um: float, **others: object) -> Point:
+    return replace(POINT, median_ms=ms, p95_ms=ms, rms_um=um, **others)  # type: ignore[arg-type]
+
+
+def test_the_front_is_what_nothing_beats_in_both_time_and_error() -> None:
+    points = [at(10, 5), at(5, 9), at(20, 6), at(5, 8), at(40, 1)]
+    assert [(p.median_ms, p.rms_um) for p in pareto_front(points)] == [(5, 8), (10, 5), (40, 1)]
+
+
+def test_each_width_has_a_front_of_its_own() -> None:
+    small, large = at(2, 9, width=320), at(40, 50)
+    assert set(pareto_front([small, large])) == {small, large}
+
+
+def test_the_recommended_mode_keeps_the_rate_or_the_error() -> None:
+    points = [at(5, 9, mode="fast"), at(40, 2, mode="best")]
+    assert recommended(points).mode == "best"  # type: ignore[union-attr]
+    assert recommended(points, rate_hz=30).mode == "fast"  # type: ignore[union-attr]
+    assert recommended(points, rms_um=10).mode == "fast"  # type: ignore[union-attr]
+    assert recommended(points, rms_um=5).mode == "best"  # type: ignore[union-attr]
+    assert recommended(points, rate_hz=30, rms_um=5) is None
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 5.0])
+def test_the_error_of_a_normal_is_its_angle_to_the_true_one(tilt_deg: float) -> None:
+    axis = np.linspace(-4.0, 4.0, 161)
+    plane = TrueDepth(np.tile(0.5 + 0.1 * axis, (161, 1)), axis, axis)
+    nodes = axis[20:-20:2]
+    angle = np.arctan(0.1) + np.radians(tilt_deg)
+    normals = np.full(
+        (nodes.size, nodes.size, 3), [-np.sin(angle), 0.0, -np.cos(angle)], np.float32
+    )
+    depth, flags = np.zeros(normals.shape[:2], np.float32), np.zeros(normals.shape[:2], np.uint8)
+    found = HeightMap(depth, nodes, nodes, 0.1, normals, flags, "id", "full", "")
+    assert normal_error_deg(found, plane, 3.0) == pytest.approx(tilt_deg, abs=0.03)
+
+
+@pytest.fixture(scope="module")
+def two_presses(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the virtual session with a cylinder and a cuboid."""
+    folder = tmp_path_factory.mktemp("two") / "session"
+    shutil.copytree(virtual_session, folder)
+    truth = folder / "presses" / "truth.csv"
+    names = ("file", "cylinder_s5_d100.png", "cuboid_s4_d100.png")
+    truth.write_text("\n".join(r for r in truth.read_text().splitlines() if r.startswith(names)))
+    return folder
+
+
+def test_every_press_is_timed_and_scored_in_every_mode(
+    two_presses: Path, virtual_calibration: Calibration
+) -> None:
+    points = measure_session(two_presses, virtual_calibration, repeats=1)
+    by_mode = {point.mode: point for point in points}
+    paper, best = by_mode["paper"], by_mode["best"]
+    assert set(by_mode) == {"paper", "fast", "balanced", "best"}
+    assert best.rms_um < paper.rms_um < 60.0
+    assert 0.5 < best.normal_deg < paper.normal_deg < 10.0
+    for point in points:
+        assert point.presses == 2
+        assert point.p95_ms >= point.median_ms > 0.0
+    assert best in pareto_front(points)
+
+
+def test_a_calibration_of_the_papers_model_has_this_mode_only(
+    two_presses: Path, virtual_calibration: Calibration
+) -> None:
+    paper = replace(virtual_calibration, model="paper", full=None)
+    points = measure_session(two_presses, paper, repeats=1)
+    assert [point.mode for point in points] == ["paper"]
+
+
+def test_the_virtual_sensor_is_calibrated_at_each_width(
+    small_session: Path,
+    small_calibration: Calibration,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scales: list[float] = []
+
+    def simulate(_design: object, out: Path, *, scale: float, **_: object) -> None:
+        scales.append(scale)
+        shutil.copytree(small_session, out)
+
+    monkeypatch.setattr(work_precision, "simulate_session", simulate)
+    monkeypatch.setattr(
+        work_precision,
+        "calibrate_session",
+        lambda *_, **__: SimpleNamespace(calibration=small_calibration),
+    )
+    shares: list[float] = []
+    points = measure_virtual(
+        SensorDesign(), widths=(320, 640), repeats=1, progress=lambda _, share: shares.append(share)
+    )
+    assert scales == [0.25, 0.5] and len(points) == 2 * 4
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_one_calibration_is_measured_on_the_presses_of_a_session(
+    virtual_calibration: Calibration,
+    two_presses: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file, out = tmp_path / "c.gplcal", tmp_path / "out"
+    write_calibration(virtual_calibration, file)
+    arguments = ["work-precision", str(two_presses), "--calibration", str(file), "-o", str(out)]
+    assert main([*arguments, "--repeats", "1"]) == 0
+    assert "full model, best" in capsys.readouterr().out
+    with (out / "work-precision.csv").open() as stream:
+        rows = {row["mode"]: row for row in csv.DictReader(stream)}
+    assert float(rows["best"]["rms_um"]) > 0.0 and rows["best"]["on_front"] == "True"
+    assert (out / "work-precision.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_measured_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["work-precision", "nowhere", "-o", str(tmp_path / "out")]) == MENDABLE
+    assert "session.toml" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_presses_of_another_sensor_are_refused(
+    two_presses: Path, virtual_calibration: Calibration
+) -> None:
+    other = replace(virtual_calibration, sensor=replace(virtual_calibration.sensor, serial="other"))
+    with pytest.raises(InputError, match="other"):
+        measure_session(two_presses, other)
+    with pytest.raises(InputError, match="other"):
+        measure_virtual(SensorDesign(), other)
