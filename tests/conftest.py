@@ -60,7 +60,6 @@ LONGEST_FIRST = (
     "reconstruction/test_boundary.py",
     "studies/test_stability.py",
     "measurement/test_honest_sizes.py",
-    "experiments/test_ablation.py",
     "app/test_rounds.py",
     "calibration/test_joint.py",
     "app/calibrate/test_wizard_killed.py",

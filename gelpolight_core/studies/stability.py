@@ -236,17 +236,11 @@ def write_stability(results: Sequence[CaseResult], folder: Path) -> list[Path]:
 
 
 def _paint(figure: Figure, results: Sequence[CaseResult]) -> None:
-    styles = {Outcome.PASSED: "go", Outcome.REFUSED: "yD", Outcome.FAILED: "rX"}
     axes = figure.subplots()
-    for outcome, style in styles.items():
+    for outcome, style in zip(Outcome, ("go", "yD", "rX"), strict=True):
         rows = [n for n, result in enumerate(results) if result.outcome is outcome]
-        axes.plot(
-            [results[n].first.error_um for n in rows],
-            rows,
-            style,
-            markersize=4,
-            label=outcome.value,
-        )
+        errors = [results[n].first.error_um or 0.0 for n in rows]
+        axes.plot(errors, rows, style, markersize=4, label=outcome.value)
     axes.plot([result.first.bound_um for result in results], range(len(results)), "k|")
     axes.set_yticks(range(len(results)), [result.case.name for result in results], fontsize=6)
     axes.set_ylim(len(results), -1)
