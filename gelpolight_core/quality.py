@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -113,6 +113,20 @@ def judge(
     else:
         verdict = Verdict.WARN if beyond(warn) else Verdict.PASS
     return Figure(key, label, float(value), unit, warn, fail, verdict, advice)
+
+
+def judge_left_out(key: str, label: str, reasons: Sequence[str]) -> Figure:
+    """Judge how many images were left out.
+
+    Parameters
+    ----------
+    key, label : str
+        As in :class:`Figure`.
+    reasons : sequence of str
+        Of each image that was left out, its name and why.
+    """
+    advice = tr("Left out: {names}").format(names=joined("; ", reasons))
+    return judge(key, label, len(reasons), warn=0.0, advice=advice)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,7 @@ from pathlib import Path
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.session.closed import ClosedSession, parse_closed_session
 from gelpolight_core.session.session import Session, parse_session
-from gelpolight_core.simulation.closed import closed_session_toml
-from gelpolight_core.simulation.session import session_toml
+from gelpolight_core.simulation.session import closed_session_toml, session_toml
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 

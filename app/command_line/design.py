@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         # A late import, as it loads the plotting library.
         from gelpolight_core.simulation.directional import draw_shadow_comparison, shadow_comparison
 
-        comparison = shadow_comparison(leds=design.leds, decay_mm=design.membrane.decay_length_mm)
+        comparison = shadow_comparison(design.leds, decay_mm=design.membrane.decay_length_mm)
         write_atomically(options.shadows, partial(draw_shadow_comparison, comparison))
         say("\n".join(shadow_lines(comparison)))
     if options.lighting:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -184,19 +184,8 @@ def gather_ball_pixels(
 
 def thinned(pixels: BallPixels) -> BallPixels:
     """Return every second pixel of a press."""
-
-    def half(part: Array) -> Array:
-        return np.ascontiguousarray(part[::2])
-
-    return BallPixels(
-        half(pixels.points_mm),
-        half(pixels.ray_slope),
-        half(pixels.view),
-        half(pixels.ratio),
-        half(pixels.weight),
-        pixels.radius_mm,
-        pixels.view_of_field,
-        pixels.field,
-        half(pixels.around),
-        half(pixels.around_flat),
-    )
+    names = ("points_mm", "ray_slope", "view", "ratio", "weight", "around", "around_flat")
+    half: dict[str, Any] = {
+        name: np.ascontiguousarray(getattr(pixels, name)[::2]) for name in names
+    }
+    return replace(pixels, **half)

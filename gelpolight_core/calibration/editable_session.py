@@ -16,9 +16,10 @@ from typing import Any, Generic, TypeVar
 
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.image_checks import read_bytes, refuse_other_size, refuse_unfit
+from gelpolight_core.calibration.image_checks import refuse_other_size, refuse_unfit
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.file import read_image_file
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.session.capture import average_frames, write_image
@@ -404,7 +405,7 @@ _STEMS = {
 
 
 def _copy(source: Path, session: Path, target: Path) -> None:
-    data = read_bytes(source)
+    data = read_image_file(source)
     make_folder(target.parent)
     write_atomically(target, lambda stream: stream.write(data), new=True, inside=session)
 

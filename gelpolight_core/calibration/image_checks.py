@@ -7,8 +7,7 @@ from pathlib import Path
 
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import FILE_LIMIT
-from gelpolight_core.io.reading import read_file
+from gelpolight_core.image.linear import require_size
 from gelpolight_core.session.file_hashes import file_hash, refuse_copies
 from gelpolight_core.session.images import SessionImages, read_image, require_colour
 from gelpolight_core.translation import tr
@@ -38,11 +37,13 @@ def refuse_unfit(session: SessionImages, stage: Stage, files: Sequence[Path]) ->
     for path in files:
         image = read_image(path)
         size = size or image.size
-        _refuse_size(image.size, size, where=str(path))
+        require_size(image.size, size, where=str(path))
         if stage in COLOUR_STAGES:
             require_colour(image, where=str(path))
     refuse_copies(files)
-    known = {file_hash(path): path for path in _captured(session)}
+    known = {
+        file_hash(path): path for folder in FOLDERS.values() for path in session.captured(folder)
+    }
     for path in files:
         twin = known.get(file_hash(path))
         if twin is not None:
@@ -65,7 +66,7 @@ def refuse_other_size(session: SessionImages, size: tuple[int, int]) -> None:
     """
     wanted = image_size(session)
     if wanted is not None:
-        _refuse_size(size, wanted, where=tr("camera"))
+        require_size(size, wanted, where=tr("camera"))
 
 
 def image_size(session: SessionImages) -> tuple[int, int] | None:
@@ -77,36 +78,3 @@ def image_size(session: SessionImages) -> tuple[int, int] | None:
             except InputError:
                 continue  # a damaged image is refused by its own stage
     return None
-
-
-def read_bytes(path: Path) -> bytes:
-    """Return the content of a file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
-    try:
-        return read_file(path, FILE_LIMIT)
-    except OSError as error:
-        raise InputError(
-            tr("The file cannot be read ({reason})").format(reason=error.strerror or error),
-            where=str(path),
-            advice=tr("Check its permissions and the disk"),
-        ) from error
-
-
-def _captured(session: SessionImages) -> list[Path]:
-    return [path for folder in FOLDERS.values() for path in session.captured(folder)]
-
-
-def _refuse_size(size: tuple[int, int], wanted: tuple[int, int], *, where: str) -> None:
-    if size != wanted:
-        raise InputError(
-            tr("The image has {a} pixels, but the images of the session have {b}").format(
-                a="x".join(map(str, size)), b="x".join(map(str, wanted))
-            ),
-            where=where,
-            advice=tr("Capture all images of a session with the same camera and size"),
-        )

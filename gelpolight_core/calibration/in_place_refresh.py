@@ -11,8 +11,7 @@ from dataclasses import replace
 
 from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
 from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.errors import InputError
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.sensor_calibration import HandEdit
@@ -41,7 +40,8 @@ def with_background(
     InputError
         If the image has another size.
     """
-    _require_size(calibration, background)
+    camera = calibration.camera
+    require_size(background.size, (camera.width, camera.height), where=background.name)
     model = calibration.in_place
     changed = replace(model, background=model.grid.reduce(background.rgb))
     edit = HandEdit("background", CHANNEL_KEYS, made, operator)
@@ -74,15 +74,3 @@ def repaired(calibration: InPlaceCalibration, session: ClosedSession) -> InPlace
         As :func:`~gelpolight_core.calibration.in_place_session.calibrate_closed_session`.
     """
     return calibrate_closed_session(session, towards=calibration.in_place.coefficients)
-
-
-def _require_size(calibration: InPlaceCalibration, background: LinearImage) -> None:
-    size = (calibration.camera.width, calibration.camera.height)
-    if background.size != size:
-        raise InputError(
-            tr("the background is {a} pixels, the calibration is for {b}").format(
-                a="x".join(map(str, background.size)), b="x".join(map(str, size))
-            ),
-            where=background.name,
-            advice=tr("Use the camera format of the calibration"),
-        )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.in_place.ball import Ball
 from gelpolight_core.in_place.calibrate import (
     LEAST_PRESSES,
@@ -130,21 +130,23 @@ def _refuse_missing(session: ClosedSession) -> None:
 
 def _measured_scale(session: ClosedSession, background: LinearImage) -> MeasuredScale:
     """Return the scale by the images of ``scale/``."""
-    images = [image.rgb for image in session.images("scale")]
+    images = session.images("scale")
+    rgb = [image.rgb for image in images]
     where, pressed = str(session.folder / "scale"), session.pressed_scale
-    if images[0].shape != background.rgb.shape:
-        raise InputError(
-            tr("the images have another size than the background"),
-            where=where,
-            advice=tr("Capture all images of a session at the same size"),
-        )
+    require_size(images[0].size, background.size, where=where)
     if pressed.pin_spacing_mm is not None:
         return scale_from_pins(
-            images, background.rgb, spacing_mm=pressed.pin_spacing_mm, where=where
+            rgb,
+            background.rgb,
+            spacing_mm=pressed.pin_spacing_mm,
+            where=where,
         )
     assert pressed.punch_diameter_mm is not None
     return scale_from_punch(
-        images, background.rgb, diameter_mm=pressed.punch_diameter_mm, where=where
+        rgb,
+        background.rgb,
+        diameter_mm=pressed.punch_diameter_mm,
+        where=where,
     )
 
 
@@ -164,14 +166,7 @@ def _presses(
     images, unreadable = session.usable_images("balls")
     presses = []
     for image in images:
-        if image.size != background.size:
-            raise InputError(
-                tr("the ball images are {a} pixels and the background is {b}").format(
-                    a="x".join(map(str, image.size)), b="x".join(map(str, background.size))
-                ),
-                where=str(session.folder / "balls" / image.name),
-                advice=tr("Use a background of the same camera format and crop as the balls"),
-            )
+        require_size(image.size, background.size, where=str(session.folder / "balls" / image.name))
         drawn = session.decisions.balls.get(image.name)
         placed = None if drawn is None else Circle(drawn.u_px, drawn.v_px, drawn.radius_px)
         radius_mm = session.ball_radius_mm(image.name)

@@ -17,13 +17,13 @@ from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import Figure, QualityTable, Verdict, judge
+from gelpolight_core.quality import Figure, QualityTable, Verdict, judge, judge_left_out
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.response.stage import ResponseResult
 from gelpolight_core.sensor_calibration import FullModel
-from gelpolight_core.translation import joined, pattern, tr
+from gelpolight_core.translation import pattern, tr
 
 Map = NDArray[np.float32]
 T = TypeVar("T")
@@ -116,17 +116,7 @@ def judge_balls(results: StageResults) -> QualityTable:
         for ball in results.balls
         if ball.fault is not None
     ]
-    return QualityTable(
-        (
-            judge(
-                "balls_left_out",
-                tr("Captures left out"),
-                float(len(refused)),
-                warn=0.0,
-                advice=tr("Left out: {names}").format(names=joined("; ", refused)),
-            ),
-        )
-    )
+    return QualityTable((judge_left_out("balls_left_out", tr("Captures left out"), refused),))
 
 
 def judge_bad_pixels(bad: BadPixels) -> Figure:

@@ -5,7 +5,6 @@ A run does not keep it: it is a million numbers that can be computed from the se
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +16,6 @@ from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +32,13 @@ class ReflectanceScatter:
         Image names of the presses.
     """
 
-    cosines: tuple[Array, Array, Array]
-    values: tuple[Array, Array, Array]
-    presses: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
+    cosines: tuple[Array, ...]
+    values: tuple[Array, ...]
+    presses: tuple[NDArray[np.intp], ...]
     names: tuple[str, ...]
 
 
-def gather_scatter(
-    run: CalibrationRun, session: Session, *, progress: Progress | None = None
-) -> ReflectanceScatter:
+def gather_scatter(run: CalibrationRun, session: Session) -> ReflectanceScatter:
     """Gather the scatter of a run's ball presses, with the factors fed back (section V-E).
 
     Parameters
@@ -51,39 +47,24 @@ def gather_scatter(
         Made from `session`.
     session : Session
         The session with the ball images.
-    progress : callable, optional
-        Called with the press name and the share done, 0..1.
 
     Raises
     ------
     InputError
         If a ball image can no longer be read.
     """
-    progress = progress or (lambda _name, _share: None)
-    table = run.calibration.table
-    presses = run.reflectance.presses
-    parts: list[list[tuple[Array, Array, NDArray[np.intp]]]] = [[], [], []]
-    for index, press in enumerate(presses):
-        progress(press.name, index / len(presses))
-        image = table.apply(
-            read_image(session.folder / press.name, response=run.calibration.response).rgb
-        )
-        scatter = ball_scatter(
-            [press],
-            [image],
-            table,
-            run.lights.led_positions_mm,
-            run.radiance,
-            run.factors.factors,
-        )
-        for part, (cosines, values) in zip(parts, scatter, strict=True):
-            part.append((cosines, values, np.full(cosines.size, index)))
-    red, green, blue = (
-        tuple(np.concatenate(column) for column in zip(*p, strict=True)) for p in parts
-    )
+    table, presses = run.calibration.table, run.reflectance.presses
+    leds, factors = run.lights.led_positions_mm, run.factors.factors
+    found = []
+    for press in presses:
+        path = session.folder / press.name
+        image = table.apply(read_image(path, response=run.calibration.response).rgb)
+        found.append(ball_scatter([press], [image], table, leds, run.radiance, factors))
+    channels = list(zip(*found, strict=True))
+    numbers = np.arange(len(presses))
     return ReflectanceScatter(
-        (red[0], green[0], blue[0]),
-        (red[1], green[1], blue[1]),
-        (red[2], green[2], blue[2]),
+        tuple(np.concatenate([cosines for cosines, _ in channel]) for channel in channels),
+        tuple(np.concatenate([values for _, values in channel]) for channel in channels),
+        tuple(np.repeat(numbers, [len(cosines) for cosines, _ in c]) for c in channels),
         tuple(press.name for press in presses),
     )

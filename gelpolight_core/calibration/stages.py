@@ -28,7 +28,7 @@ from gelpolight_core.calibration.results import (
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import calibrate_factors
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.lights.crosstalk import find_crosstalk, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import locate_leds
@@ -108,7 +108,6 @@ def _run_lens(session: Session, results: StageResults, _progress: Progress) -> S
 def _run_top_pose(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     lens = need(results.lens, "top_pose")
     images, refused = session.usable_images("top_pose")
-    _same_size(images[0], lens, "top_pose")
     pose = estimate_top_pose(
         images,
         session.top_pose,
@@ -298,15 +297,8 @@ def _stage_image(session: Session, stage: str, lens: LensResult) -> LinearImage:
 
 
 def _same_size(image: LinearImage, lens: LensResult, stage: str) -> None:
-    width, height = lens.camera.width, lens.camera.height
-    if image.size != (width, height):
-        raise InputError(
-            tr("The image has {w}x{h} pixels, but the checkerboard images have {cw}x{ch}").format(
-                w=image.size[0], h=image.size[1], cw=width, ch=height
-            ),
-            where=f"{stage}/{image.name}",
-            advice=tr("Capture all stages at the same image size"),
-        )
+    size = lens.camera.width, lens.camera.height
+    require_size(image.size, size, where=f"{stage}/{image.name}")
 
 
 def _refuse_unlit(image: LinearImage) -> None:

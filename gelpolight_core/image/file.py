@@ -11,7 +11,7 @@ import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.header import PNG_HEAD, TIFF_HEADS, declared_sizes
-from gelpolight_core.io.reading import read_file
+from gelpolight_core.io.reading import missing_file, read_file
 from gelpolight_core.translation import tr
 
 MAX_PIXELS = 64_000_000
@@ -59,12 +59,7 @@ def decode_image(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[An
     InputError
         If the file is missing, cannot be read, or declares more pixels than any camera has.
     """
-    try:
-        data = read_file(path, FILE_LIMIT)
-    except FileNotFoundError as error:
-        raise InputError(
-            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
-        ) from error
+    data = read_image_file(path)
     _check_declared_size(path, data)
     if not is_complete_image(data):
         return None
@@ -73,6 +68,20 @@ def decode_image(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[An
     except cv2.error:
         return None
     return None if raw is None or (raw.ndim == 3 and raw.shape[2] not in (3, 4)) else raw
+
+
+def read_image_file(path: Path) -> bytes:
+    """Return the content of an image file.
+
+    Raises
+    ------
+    InputError
+        If it is missing, cannot be read, or is too large.
+    """
+    try:
+        return read_file(path, FILE_LIMIT)
+    except FileNotFoundError as error:
+        raise missing_file(path) from error
 
 
 def _check_declared_size(path: Path, data: bytes) -> None:

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.errors import InputError
 from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.translation import tr
 
 FloatArray = NDArray[np.floating]
 
@@ -41,6 +43,31 @@ class LinearImage:
     def size(self) -> tuple[int, int]:
         """(width, height) in pixels."""
         return self.rgb.shape[1], self.rgb.shape[0]
+
+
+def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str) -> None:
+    """Refuse an image whose size differs from that of the other images.
+
+    Parameters
+    ----------
+    size, expected : (int, int)
+        (width, height) in pixels.
+    where : str
+        The image.
+
+    Raises
+    ------
+    InputError
+        If it differs.
+    """
+    if size != expected:
+        raise InputError(
+            tr("The image has {a} pixels instead of {b}").format(
+                a="x".join(map(str, size)), b="x".join(map(str, expected))
+            ),
+            where=where,
+            advice=tr("Use images of the same camera and size everywhere"),
+        )
 
 
 def linear_image(

@@ -159,9 +159,7 @@ def read_toml(path: Path, *, missing: InputError | None = None) -> dict[str, Any
     try:
         return parse_toml(read_file(path))
     except FileNotFoundError as error:
-        raise missing or InputError(
-            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
-        ) from error
+        raise missing or missing_file(path) from error
     except ValueError as error:
         raise InputError(
             tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
@@ -307,6 +305,13 @@ def brief(value: Any, most: int = 60) -> str:
         return type(value).__name__
     text = ascii(text)[1:-1] if not text.isprintable() else text
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def missing_file(path: Path) -> InputError:
+    """Return the error for a file that does not exist."""
+    return InputError(
+        tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
+    )
 
 
 def unreadable(error: OSError, path: Path) -> InputError:

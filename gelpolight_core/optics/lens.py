@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.lens_fit import (
     HeldOutViews,
@@ -220,18 +220,7 @@ def _common_size(images: Sequence[LinearImage]) -> tuple[int, int]:
         )
     size = images[0].size
     for image in images:
-        if image.size != size:
-            raise InputError(
-                tr("The image has {a} x {b} pixels, but {name} has {c} x {d}").format(
-                    a=image.size[0],
-                    b=image.size[1],
-                    name=images[0].name,
-                    c=size[0],
-                    d=size[1],
-                ),
-                where=f"checkerboard/{image.name}",
-                advice=tr("Capture all images of a session at the same size"),
-            )
+        require_size(image.size, size, where=f"checkerboard/{image.name}")
     return size
 
 

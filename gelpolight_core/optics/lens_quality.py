@@ -12,8 +12,8 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_fit import LensFit
 from gelpolight_core.optics.lens_views import MIN_VIEWS, LensView, more_views_advice
-from gelpolight_core.quality import Figure, judge
-from gelpolight_core.translation import joined, pattern, tr
+from gelpolight_core.quality import Figure, judge, judge_left_out
+from gelpolight_core.translation import pattern, tr
 
 Array = NDArray[np.float64]
 
@@ -145,8 +145,7 @@ def view_figures(
     return (
         judge("views_used", tr("Views used"), used,
               warn=8, fail=MIN_VIEWS, higher_is_better=True, advice=more_views_advice()),
-        judge("views_left_out", tr("Views left out"), len(refused), warn=0,
-              advice=tr("Left out: {names}").format(names=joined("; ", refused))),
+        judge_left_out("views_left_out", tr("Views left out"), refused),
         judge("normal_spread", tr("Variation of the board tilt"), spread_deg, "deg",
               warn=10.0, fail=MIN_NORMAL_SPREAD_DEG, higher_is_better=True,
               advice=tr("Tilt the board more and in different directions")),

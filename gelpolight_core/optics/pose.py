@@ -16,16 +16,23 @@ from enum import StrEnum
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.board_exposure import EDGE_OF_SIGMA
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.mirrored_pose import SURE_MARGIN, choose_side, nearest_pose
-from gelpolight_core.optics.plane_pose import PlanePose, angle_between_deg, as_plane, find_poses
-from gelpolight_core.quality import Figure, QualityTable, judge
+from gelpolight_core.optics.plane_pose import (
+    SURE_MARGIN,
+    PlanePose,
+    angle_between_deg,
+    as_plane,
+    choose_side,
+    find_poses,
+    nearest_pose,
+)
+from gelpolight_core.quality import Figure, QualityTable, judge, judge_left_out
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.translation import joined, pattern, tr
+from gelpolight_core.translation import pattern, tr
 
 MOST_LENS_BLUR_PX = 1.0
 """The reconstruction removes up to this blur; the rest of a larger blur makes walls too flat."""
@@ -164,15 +171,7 @@ def _check_images(images: Sequence[LinearImage], camera: Camera) -> None:
             advice=tr("Lay the board on the top surface and capture an image"),
         )
     for image in images:
-        if image.size != (camera.width, camera.height):
-            raise InputError(
-                tr(
-                    "The image has {a} x {b} pixels, but the images of the calibrated camera "
-                    "have {c} x {d}"
-                ).format(a=image.size[0], b=image.size[1], c=camera.width, d=camera.height),
-                where=f"top_pose/{image.name}",
-                advice=tr("Capture all images of a session at the same size"),
-            )
+        require_size(image.size, (camera.width, camera.height), where=f"top_pose/{image.name}")
 
 
 def _find_board(image: LinearImage, board: BoardSpec) -> tuple[BoardView | None, InputError | None]:
@@ -345,8 +344,7 @@ def _view_figures(
               advice=tr("Use a flat board and check its square size; calibrate the lens again")),
         judge("view_spread", tr("Largest angle between a view and the average"), spread_deg, "deg",
               warn=0.25, fail=1.0, advice=tr("Press the board flat onto the surface in each view")),
-        judge("views_left_out", tr("Views left out"), len(refused), warn=0,
-              advice=tr("Left out: {names}").format(names=joined("; ", refused))),
+        judge_left_out("views_left_out", tr("Views left out"), refused),
     ]  # fmt: skip
     if decision is not Decision.SINGLE:
         figures.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.linear import require_size
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.translation import tr
@@ -35,15 +36,9 @@ def require_match(recording: Recording, calibration: AnyCalibration) -> None:
             where=str(recording.path),
             advice=tr("Choose a calibration of sensor {a}").format(a=recorded),
         )
-    size = (calibration.camera.width, calibration.camera.height)
-    if len(recording) and recording.size != size:
-        raise InputError(
-            tr("The frames have {a} pixels, but the calibration is for {b}").format(
-                a="x".join(map(str, recording.size)), b="x".join(map(str, size))
-            ),
-            where=str(recording.path),
-            advice=tr("Choose a calibration for frames of this size"),
-        )
+    if len(recording):
+        camera = calibration.camera
+        require_size(recording.size, (camera.width, camera.height), where=str(recording.path))
 
 
 def recording_notes(recording: Recording) -> list[str]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.closing import Closing
-from gelpolight_core.io.reading import open_file, parse_json, refuse_newer, unreadable
+from gelpolight_core.io.reading import missing_file, open_file, parse_json, refuse_newer, unreadable
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.layout import FrameMark
 from gelpolight_core.recording.pixels import strip_rows, unpack_strip
@@ -79,9 +79,7 @@ class Recording(Closing):
             with open_file(path) as stream:
                 file = os.dup(stream.fileno())
         except FileNotFoundError as error:
-            raise InputError(
-                tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
-            ) from error
+            raise missing_file(path) from error
         try:
             return cls(path, file)
         except OSError as error:

@@ -146,7 +146,6 @@ def indenter_record(
     calibration_id: str,
     size_limit_percent: float,
     height_limit_percent: float,
-    settings: Mapping[str, Any] | None = None,
     operator: str = "",
     picture: str = "",
     note: str = "",
@@ -160,7 +159,7 @@ def indenter_record(
         it.
     comparison : Comparison, optional
         Comparison with the truth, if known.
-    serial, calibration_id, settings, operator, picture, note
+    serial, calibration_id, operator, picture, note
         As in :class:`MeasurementRecord`.
     size_limit_percent, height_limit_percent : float
         Largest errors that pass.
@@ -190,7 +189,6 @@ def indenter_record(
         quantities=quantities,
         verdict=verdict_of(quantities, doubtful=measurement.verdict != "ok"),
         reason=measurement.reason,
-        settings=dict(settings or {}),
         details=measurement.as_json(comparison),
         operator=operator,
         picture=picture,

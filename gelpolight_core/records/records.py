@@ -19,8 +19,7 @@ from pathlib import Path
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.closing import Closing
 from gelpolight_core.io.reading import brief, written_text
-from gelpolight_core.records.database import connect, keep_aside
-from gelpolight_core.records.database_errors import in_plain_words, is_damage
+from gelpolight_core.records.database import connect, in_plain_words, is_damage, keep_aside
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of
 from gelpolight_core.records.table import write_csv
@@ -104,21 +103,14 @@ class Records(Closing):
         return number
 
     def measurements(
-        self,
-        serial: str | None = None,
-        shape: str | None = None,
-        since: datetime | None = None,
-        *,
-        removed: bool = False,
+        self, serial: str | None = None, *, removed: bool = False
     ) -> tuple[MeasurementRecord, ...]:
         """Return measurements in the order in which they were stored, independent of the clock.
 
         Parameters
         ----------
-        serial, shape : str, optional
-            Only those of this sensor, or of this shape.
-        since : datetime, optional
-            Only those at this time or later.
+        serial : str, optional
+            Only those of this sensor.
         removed : bool, optional
             Return the removed ones instead of the others.
 
@@ -127,23 +119,15 @@ class Records(Closing):
         InputError
             If they cannot be read.
         """
-        where, values = [f"m.removed IS {'NOT ' if removed else ''}NULL"], []
-        for column, value in (("m.serial = ?", serial), ("m.shape = ?", shape)):
-            if value is not None:
-                where.append(column)
-                values.append(value)
-        if since is not None:
-            where.append("m.time >= ?")
-            values.append(text_of(since))
-        chosen = " AND ".join(where)
+        chosen = f"m.removed IS {'NOT ' if removed else ''}NULL AND m.serial = ifnull(?, m.serial)"
         with self._reading() as connection:
             rows = connection.execute(
-                f"SELECT m.* FROM measurements m WHERE {chosen} ORDER BY m.id", values
+                f"SELECT m.* FROM measurements m WHERE {chosen} ORDER BY m.id", (serial,)
             ).fetchall()
             parts = connection.execute(
                 "SELECT q.* FROM quantities q JOIN measurements m ON m.id = q.measurement_id"
                 f" WHERE {chosen} ORDER BY q.measurement_id, q.position",
-                values,
+                (serial,),
             ).fetchall()
         try:
             return records_of(rows, parts)

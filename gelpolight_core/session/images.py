@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import decode_image
-from gelpolight_core.image.linear import LinearImage, linear_image
+from gelpolight_core.image.linear import LinearImage, linear_image, require_size
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.decisions import Decisions
@@ -86,16 +86,7 @@ class SessionImages:
         """
         images = tuple(in_parallel(self.image, self.files(stage)))
         for image in images[1:]:
-            if image.size != images[0].size:
-                raise InputError(
-                    tr("The image has {a} pixels, but {name} has {b}").format(
-                        a="x".join(map(str, image.size)),
-                        name=images[0].name,
-                        b="x".join(map(str, images[0].size)),
-                    ),
-                    where=str(self.folder / stage / image.name),
-                    advice=tr("Capture all images of a session at the same size"),
-                )
+            require_size(image.size, images[0].size, where=str(self.folder / stage / image.name))
         return images
 
     def usable_images(self, stage: str) -> tuple[tuple[LinearImage, ...], dict[str, InputError]]:
@@ -134,14 +125,10 @@ class SessionImages:
         sizes = [image.size for image in read]
         usual = max(sizes, key=sizes.count)
         for image in read:
-            if image.size != usual:
-                refused[image.name] = InputError(
-                    tr("The image has {a} pixels, but the others have {b}").format(
-                        a="x".join(map(str, image.size)), b="x".join(map(str, usual))
-                    ),
-                    where=str(self.folder / stage / image.name),
-                    advice=tr("Capture all images of a session at the same size"),
-                )
+            try:
+                require_size(image.size, usual, where=str(self.folder / stage / image.name))
+            except InputError as fault:
+                refused[image.name] = fault
         return tuple(image for image in read if image.size == usual), refused
 
     def _image_or_fault(self, path: Path) -> LinearImage | InputError:

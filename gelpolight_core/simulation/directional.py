@@ -23,6 +23,9 @@ from gelpolight_core.simulation.surface import PressedSurface
 Array = NDArray[np.float64]
 
 _AZIMUTHS_DEG = (90.0, 210.0, 330.0)
+ELEVATIONS_DEG = (15.0, 30.0, 45.0)
+"""Of the directional light above the surface."""
+DIAMETER_MM = 5.0
 _LIT = 0.5
 """A cell counts as shadow if less than half of a lamp's disc is visible from it."""
 
@@ -43,8 +46,6 @@ class ShadowRow:
         Area dark under one light, mean of the three.
     any_shadow_mm2 : float
         Area dark under at least one light, where the plain three-light solution fails.
-    two_dark_mm2 : float
-        Area dark under two or three lights, where no light-based solution exists.
     """
 
     lighting: str
@@ -52,7 +53,6 @@ class ShadowRow:
     depth_mm: float
     mean_shadow_mm2: float
     any_shadow_mm2: float
-    two_dark_mm2: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +61,6 @@ class ShadowComparison:
 
     rows: tuple[ShadowRow, ...]
     diameter_mm: float
-    x_mm: float
-    y_mm: float
 
     def curve(self, lighting: str, setting: float) -> tuple[Array, Array]:
         """Return (depth_mm, any_shadow_mm2) for one kind of light."""
@@ -76,15 +74,6 @@ class ShadowComparison:
 def directional_lamps(elevation_deg: float) -> tuple[ParallelLamp, ...]:
     """Return three parallel lights 120 degrees apart."""
     return tuple(ParallelLamp(azimuth, elevation_deg) for azimuth in _AZIMUTHS_DEG)
-
-
-def point_lamps(height_mm: float, circle_radius_mm: float) -> tuple[PointLamp, ...]:
-    """Return three small lamps on a circle, 120 degrees apart."""
-    angles = [math.radians(azimuth) for azimuth in _AZIMUTHS_DEG]
-    return tuple(
-        PointLamp(circle_radius_mm * math.cos(a), circle_radius_mm * math.sin(a), height_mm)
-        for a in angles
-    )
 
 
 def shadow_areas(surface: PressedSurface, lamps: tuple[Lamp, ...]) -> tuple[float, float, float]:
@@ -123,72 +112,40 @@ def shadow_areas(surface: PressedSurface, lamps: tuple[Lamp, ...]) -> tuple[floa
 
 
 def shadow_comparison(
+    leds: Sequence[LedDesign],
     *,
-    leds: Sequence[LedDesign] = (),
-    led_heights_mm: Sequence[float] = (8.0, 13.7, 20.0),
-    elevations_deg: Sequence[float] = (15.0, 30.0, 45.0),
+    decay_mm: float,
     depths_mm: Sequence[float] = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5),
-    diameter_mm: float = 5.0,
-    circle_radius_mm: float = 12.0,
-    x_mm: float = 0.0,
-    y_mm: float = 0.0,
-    decay_mm: float = 0.7,
     pitch_mm: float = 0.04,
 ) -> ShadowComparison:
-    """Measure the shadow of a pressed cylinder under both kinds of light.
+    """Measure the shadow of a pressed cylinder under the LEDs and under directional light.
 
     Parameters
     ----------
-    leds : sequence of LedDesign, optional
-        The LEDs of a design; they replace the lamps on a circle.
-    led_heights_mm : sequence of float, optional
-        Heights below the top surface of lamps on a circle, each tested in turn.
-    elevations_deg : sequence of float, optional
-        Elevations of the directional light above the surface.
+    leds : sequence of LedDesign
+        The LEDs of a design.
+    decay_mm : float
+        Decay length of the membrane.
     depths_mm : sequence of float, optional
         Indentation depths.
-    diameter_mm, x_mm, y_mm : float, optional
-        The cylinder and its position.
-    circle_radius_mm : float, optional
-        Radius of the circle of point lamps.
-    decay_mm, pitch_mm : float, optional
-        Decay length of the membrane, cell size of the surface.
-
-    Returns
-    -------
-    ShadowComparison
+    pitch_mm : float, optional
+        Cell size of the surface.
     """
-    own = tuple(PointLamp(led.x_mm, led.y_mm, led.height_mm) for led in leds)
+    lamps = tuple(PointLamp(led.x_mm, led.y_mm, led.height_mm) for led in leds)
     lightings: list[tuple[str, float, tuple[Lamp, ...]]] = [
-        ("point", height, point_lamps(height, circle_radius_mm)) for height in led_heights_mm
+        ("point", float(np.mean([lamp.height_mm for lamp in lamps])), lamps),
+        *(("directional", elevation, directional_lamps(elevation)) for elevation in ELEVATIONS_DEG),
     ]
-    if own:
-        lightings = [("point", float(np.mean([lamp.height_mm for lamp in own])), own)]
-    lightings += [
-        ("directional", elevation, directional_lamps(elevation)) for elevation in elevations_deg
-    ]
-    surfaces = [
-        press(
-            Cylinder(diameter_mm, depth),
-            x_mm=x_mm,
-            y_mm=y_mm,
-            decay_mm=decay_mm,
-            pitch_mm=pitch_mm,
-            margin_mm=_longest_shadow(depth, min(elevations_deg, default=90.0)),
+    rows = []
+    for depth in depths_mm:
+        # The shadow from the lowest directional light, with some margin.
+        margin_mm = 0.5 + depth / math.tan(math.radians(min(ELEVATIONS_DEG)))
+        surface = press(
+            Cylinder(DIAMETER_MM, depth), decay_mm=decay_mm, pitch_mm=pitch_mm, margin_mm=margin_mm
         )
-        for depth in depths_mm
-    ]
-    rows = tuple(
-        ShadowRow(name, float(setting), float(depth), *shadow_areas(surface, lamps))
-        for name, setting, lamps in lightings
-        for depth, surface in zip(depths_mm, surfaces, strict=True)
-    )
-    return ShadowComparison(rows, diameter_mm, x_mm, y_mm)
-
-
-def _longest_shadow(depth_mm: float, elevation_deg: float) -> float:
-    """Length of the shadow from the lowest directional light, with some margin."""
-    return 0.5 + depth_mm / math.tan(math.radians(elevation_deg))
+        for name, setting, lit_by in lightings:
+            rows.append(ShadowRow(name, setting, depth, *shadow_areas(surface, lit_by)[:2]))
+    return ShadowComparison(tuple(rows), DIAMETER_MM)
 
 
 @in_drawing_thread

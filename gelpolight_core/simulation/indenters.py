@@ -306,9 +306,9 @@ def _turned_drape(
     return np.clip(turned, 0.0, indenter.depth_mm), touched
 
 
-def _heights(half_mm: float, pitch_mm: float, height: Callable[[Array, Array], Array]) -> Array:
-    count = math.ceil(half_mm / pitch_mm)
-    cells = pitch_mm * np.arange(-count, count + 1)
+def _heights(half_mm: float, height: Callable[[Array, Array], Array]) -> Array:
+    count = math.ceil(half_mm / PITCH_MM)
+    cells = PITCH_MM * np.arange(-count, count + 1)
     return height(*np.meshgrid(cells, cells))
 
 
@@ -318,17 +318,15 @@ def _ramp(inside_mm: Array, width_mm: float) -> Array:
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
-def coin(diameter_mm: float = 8.0, depth_mm: float = 0.6, *, pitch_mm: float = PITCH_MM) -> Relief:
+def coin(diameter_mm: float, depth_mm: float) -> Relief:
     """Return a coin with a raised rim, a ring of beads and a six-petalled flower.
 
     Parameters
     ----------
-    diameter_mm : float, optional
+    diameter_mm : float
         Diameter of the coin.
-    depth_mm : float, optional
+    depth_mm : float
         Depth of its highest point when pressed.
-    pitch_mm : float, optional
-        Grid spacing of the heights.
     """
     radius = 0.5 * diameter_mm
     flank = 0.02 * diameter_mm
@@ -344,19 +342,17 @@ def coin(diameter_mm: float = 8.0, depth_mm: float = 0.6, *, pitch_mm: float = P
         relief = 0.45 + 0.15 * np.maximum(np.maximum(rim, flower), 0.7 * beads)
         return np.where(r <= radius, relief, np.nan)
 
-    return Relief(_heights(radius, pitch_mm, height), pitch_mm, depth_mm)
+    return Relief(_heights(radius, height), PITCH_MM, depth_mm)
 
 
-def nut(
-    across_flats_mm: float = 5.5, depth_mm: float = 0.8, *, pitch_mm: float = PITCH_MM
-) -> Relief:
+def nut(across_flats_mm: float, depth_mm: float) -> Relief:
     """Return a hexagonal nut with a bevelled crown and a countersunk hole.
 
     Parameters
     ----------
-    across_flats_mm : float, optional
+    across_flats_mm : float
         Width between opposite sides.
-    depth_mm, pitch_mm : float, optional
+    depth_mm : float
         As for :func:`coin`.
     """
     flat = 0.5 * across_flats_mm
@@ -371,4 +367,4 @@ def nut(
         sink = np.clip(1.15 * hole - r, 0.0, None)
         return np.where((inside >= 0.0) & (r >= hole), 1.0 - crown - sink, np.nan)
 
-    return Relief(_heights(1.16 * flat, pitch_mm, height), pitch_mm, depth_mm)
+    return Relief(_heights(1.16 * flat, height), PITCH_MM, depth_mm)

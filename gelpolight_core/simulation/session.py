@@ -22,7 +22,6 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically, write_text
 from gelpolight_core.simulation.boards import BoardPose, board_views
-from gelpolight_core.simulation.closed import CLOSED_STAGES, closed_session_toml
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.indenters import (
     PITCH_MM,
@@ -39,6 +38,7 @@ from gelpolight_core.simulation.indenters import (
 )
 from gelpolight_core.simulation.plan import (
     AVERAGED,
+    camera_table,
     exposure_series,
     press_names,
     response_tables,
@@ -60,6 +60,8 @@ from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
 
+CLOSED_STAGES = ("background", "balls", "presses")
+"""Image folders of a closed sensor's session; presses are for checking it."""
 TRUTH_PITCH_MM = 0.05
 
 _TEXTS = ("session.toml", "truth.json")
@@ -360,3 +362,44 @@ square_mm = {_TOP_SQUARE_MM}
 [balls]
 {balls}
 {response_tables(design)}"""
+
+
+def mm_per_px(sensor: VirtualSensor) -> tuple[float, float]:
+    """Return the mean size of a pixel on the membrane, and how much it varies over the image.
+
+    Parameters
+    ----------
+    sensor : VirtualSensor
+        Its rays know where each pixel sees the flat membrane.
+    """
+    rays = sensor.rays
+    inside = np.hypot(rays.x_mm, rays.y_mm) < 0.5 * sensor.design.membrane.working_diameter_mm
+    steps = np.stack(
+        [
+            np.hypot(np.gradient(rays.x_mm, axis=axis), np.gradient(rays.y_mm, axis=axis))
+            for axis in (0, 1)
+        ]
+    )[:, inside]
+    return float(steps.mean()), float(steps.std())
+
+
+def closed_session_toml(sensor: VirtualSensor) -> str:
+    """Return the content of session.toml of the closed sensor."""
+    design = sensor.design
+    scale, spread = mm_per_px(sensor)
+    balls = "\n".join(
+        f'"ball_{number:02d}.png" = {ball.radius_mm!r}' for number, ball in enumerate(design.balls)
+    )
+    return f"""format = "gelpolight-session"
+version = 1
+
+[sensor]
+serial = {json.dumps(design.serial)}
+
+[in_place]
+mm_per_px = {scale:.7f}
+mm_per_px_sd = {spread:.7f}
+
+[balls]
+{balls}
+{camera_table(design)}"""

@@ -176,9 +176,7 @@ class VirtualSensor:
             light *= self.exposure
         return blurred(mixed(light, photometry.crosstalk), camera.blur_sigma_px)
 
-    def frame(
-        self, state: State, *, averaged: int = 1, stream: str | None = None, samples: int = 3
-    ) -> Frame:
+    def frame(self, state: State, *, averaged: int = 1, stream: str | None = None) -> Frame:
         """Return the camera image, (rows, columns, 3) in RGB order.
 
         Parameters
@@ -190,15 +188,13 @@ class VirtualSensor:
         stream : str, optional
             Name of the noise; the same name gives the same noise. Without a name, each call gives
             the next noise of the sensor's sequence.
-        samples : int, optional
-            Rays per pixel and side at the edges of the pressed object; 1 is fastest.
         """
         if stream is None:
             self._count += 1
             key = [self.seed, 0, self._count]
         else:
             key = [self.seed, 1, zlib.crc32(stream.encode())]
-        image = self.brightness(state, samples=samples)
+        image = self.brightness(state)
         rng = np.random.default_rng(key)
         if isinstance(state, (Checkerboard, BoardOnTop)):
             grey = exposed(image[..., 0], self.design.camera, rng, averaged=averaged)

@@ -176,7 +176,7 @@ def test_without_a_usable_image_the_reason_is_given() -> None:
     with pytest.raises(InputError, match="black") as refusal:
         estimate_top_pose([black], BOARD, CAMERA)
     assert refusal.value.where == "top_pose/top_pose.png"
-    with pytest.raises(InputError, match="480 x 200"):
+    with pytest.raises(InputError, match="480x200"):
         estimate_top_pose([LinearImage("cut.png", image.rgb[:200])], BOARD, CAMERA)
 
 

@@ -35,5 +35,5 @@ def test_another_sensor_or_size_is_refused_by_name(tmp_path: Path) -> None:
             require_match(recording, calibration)
     write_recording(tmp_path / "b.gplrec", shape=(5, 7))
     with Recording.open(tmp_path / "b.gplrec") as recording:
-        with pytest.raises(InputError, match="The frames have 7x5 pixels"):
+        with pytest.raises(InputError, match="has 7x5 pixels instead of"):
             require_match(recording, calibration)

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.directional import (
     directional_lamps,
     shadow_areas,
@@ -13,28 +14,26 @@ from gelpolight_core.simulation.directional import (
 )
 from gelpolight_core.simulation.indenters import Cylinder, press
 
+DEPTHS_MM = (0.0, 0.5, 1.0, 1.5)
+
 
 @pytest.fixture(scope="module")
 def comparison():
     """Return a small table."""
-    return shadow_comparison(
-        led_heights_mm=(8.0, 20.0),
-        elevations_deg=(15.0, 45.0),
-        depths_mm=(0.0, 0.5, 1.0, 1.5),
-        pitch_mm=0.08,
-    )
+    return shadow_comparison(SensorDesign().leds, decay_mm=0.7, depths_mm=DEPTHS_MM, pitch_mm=0.08)
 
 
-@pytest.mark.parametrize("lighting, setting", [("point", 8.0), ("directional", 15.0)])
-def test_shadow_grows_with_depth(comparison, lighting: str, setting: float) -> None:
-    depth, area = comparison.curve(lighting, setting)
-    assert list(depth) == [0.0, 0.5, 1.0, 1.5]
-    assert (area[1:] > area[:-1]).all()
+def test_shadow_grows_with_depth(comparison) -> None:
+    for lighting in ("point", "directional"):
+        setting = next(row.setting for row in comparison.rows if row.lighting == lighting)
+        depth, area = comparison.curve(lighting, setting)
+        assert tuple(depth) == DEPTHS_MM
+        assert (area[1:] >= area[:-1]).all() and area[-1] > area[-2] > 0.0
 
 
 def test_steeper_light_throws_less_shadow(comparison) -> None:
-    for lighting, low, high in (("point", 8.0, 20.0), ("directional", 15.0, 45.0)):
-        assert comparison.curve(lighting, high)[1][-1] < comparison.curve(lighting, low)[1][-1]
+    low, middle, high = (comparison.curve("directional", e)[1][-1] for e in (15.0, 30.0, 45.0))
+    assert high < middle < low
 
 
 def test_low_light_shadow_has_the_size_that_the_outline_gives() -> None:
