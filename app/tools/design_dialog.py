@@ -12,16 +12,13 @@ from app.tools.work_dialog import WorkDialog
 from app.widgets.quality_table import limit_text, value_text
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.design_check.check import DesignCheckResult, check_design
-from gelpolight_core.design_check.lighting import LightingRow, compare_lighting, lighting_name
 from gelpolight_core.quality import Verdict, verdict_word
 from gelpolight_core.studies.files import write_table
 from gelpolight_core.translation import tr
 
-Result = tuple[DesignCheckResult, tuple[LightingRow, ...]]
-
 
 class DesignDialog(WorkDialog):
-    """Checks a design, and presses a cylinder under its LEDs and under directional light.
+    """Checks a design.
 
     Parameters
     ----------
@@ -46,13 +43,7 @@ class DesignDialog(WorkDialog):
         column.addLayout(self.button_row())
         column.addWidget(self.table, 1)
         column.addLayout(self.foot_row())
-        self.say(
-            tr(
-                "Checks the design of the virtual sensor, and presses a cylinder under its LEDs "
-                "and under directional light: shadow, and the depth error of the near-light and "
-                "of the directional method."
-            )
-        )
+        self.say(tr("Checks the design of the virtual sensor."))
         self.allow()
 
     def run(self) -> None:
@@ -61,42 +52,29 @@ class DesignDialog(WorkDialog):
             return
         design = self._design
 
-        def work(progress: Callable[[float], None]) -> Result:
-            check = check_design(design)
-            rows = compare_lighting(design, progress=lambda _what, share: progress(share))
-            return check, rows
+        def work(_progress: Callable[[float], None]) -> DesignCheckResult:
+            return check_design(design)
 
         self.submit(self.windowTitle(), work)
 
-    def show_result(self, result: Result) -> None:
+    def show_result(self, result: DesignCheckResult) -> None:
         """Show the figures, and the verdict of the design."""
         self.fill(self.table, _rows(result))
-        verdict = verdict_word(result[0].quality.verdict)
+        verdict = verdict_word(result.quality.verdict)
         self.say(tr("The design: {verdict}").format(verdict=verdict))
 
-    def files_of(self, result: Result, folder: Path) -> Sequence[Path]:
+    def files_of(self, result: DesignCheckResult, folder: Path) -> Sequence[Path]:
         """Write the table as CSV."""
         path = folder / "design-check.csv"
         write_table([dict(zip(self.heads, row, strict=True)) for row in _rows(result)], path)
         return [path]
 
 
-def _rows(result: Result) -> list[tuple[str, ...]]:
-    """Return one row for each figure, then one for each kind of light."""
-    check, lighting = result
+def _rows(result: DesignCheckResult) -> list[tuple[str, ...]]:
+    """Return one row for each figure."""
     rows = []
-    for figure in check.quality.figures:
+    for figure in result.quality.figures:
         advice = "" if figure.verdict is Verdict.PASS else figure.advice
         texts = value_text(figure), limit_text(figure), verdict_word(figure.verdict)
         rows.append((figure.label, *texts, advice))
-    for light in lighting:
-        shadow = tr("{p:.1f} % in shadow").format(p=light.shadow_percent)
-        errors = tr("depth error: near light {near}, directional {parallel}").format(
-            near=_um(light.near_um), parallel=_um(light.parallel_um)
-        )
-        rows.append((lighting_name(light), shadow, "", "", errors))
     return rows
-
-
-def _um(value: float | None) -> str:
-    return tr("refused") if value is None else tr("{v:.1f} um").format(v=value)

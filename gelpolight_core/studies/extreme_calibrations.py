@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.design_check.known_sensor import KnownSensor
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.studies.known_sensor import KnownSensor
 from gelpolight_core.studies.stability import Case, Seen, group, seen_once
 from gelpolight_core.studies.trial import (
     flagged,

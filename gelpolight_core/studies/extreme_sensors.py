@@ -12,10 +12,10 @@ import numpy as np
 
 from gelpolight_core.design.parts import LedDesign
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.optics.refraction import camera_to_membrane
 from gelpolight_core.simulation.indenters import Ball, Cylinder, Indenter
 from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 from gelpolight_core.studies.stability import Case, Seen, group
 from gelpolight_core.studies.trial import BALL, BALL_AT_MM, SCALE, judged
 

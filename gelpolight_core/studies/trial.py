@@ -11,12 +11,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.design_check.known_sensor import (
-    KnownPress,
-    KnownSensor,
-    known_sensor,
-    matt_design,
-)
 from gelpolight_core.lights.positions import direction_condition
 from gelpolight_core.measurement.indenter_tools import mode_error
 from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
@@ -26,6 +20,12 @@ from gelpolight_core.reconstruction.height_map import FLAG_NAMES, Flag, HeightMa
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball
+from gelpolight_core.studies.known_sensor import (
+    KnownPress,
+    KnownSensor,
+    known_sensor,
+    matt_design,
+)
 from gelpolight_core.studies.stability import MODES, Mode, Seen
 
 SCALE = 0.25

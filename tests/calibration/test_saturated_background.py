@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.saturated_background import beyond_saturation
-from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 
 @pytest.fixture(scope="module")

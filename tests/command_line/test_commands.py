@@ -197,32 +197,9 @@ def test_a_design_is_checked_from_its_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "d.toml").write_text("")
-    figure = tmp_path / "shadows.png"
-    assert main(["design", str(tmp_path / "d.toml"), "--shadows", str(figure)]) == 0
+    assert main(["design", str(tmp_path / "d.toml")]) == 0
     shown = capsys.readouterr().out
     assert "design" in shown
-    assert "directional" in shown
     assert "pixel (" in shown
-    assert cv2.imread(str(figure)) is not None
     (tmp_path / "bad.toml").write_text("nonsense = 1\n")
     assert "nonsense" in refusal(capsys, "design", str(tmp_path / "bad.toml"))
-
-
-def test_shadows_come_from_the_leds_of_the_design(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Lower LEDs throw longer shadows; directional light is the same for all designs."""
-    shadows = {}
-    for height in (7.0, 13.0):
-        file = tmp_path / f"{height}.toml"
-        places = ((0.0, 12.0), (-10.4, -6.0), (10.4, -6.0))
-        file.write_text(
-            "".join(f"[[leds]]\nx_mm = {x}\ny_mm = {y}\nheight_mm = {height}\n" for x, y in places)
-        )
-        assert main(["design", str(file), "--shadows", str(tmp_path / "shadows.png")]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        point = [line.split() for line in lines if line.startswith("point")]
-        assert {row[1] for row in point} == {f"{height:g}"}
-        shadows[height] = [float(row[-1]) for row in point]
-    assert sum(shadows[7.0]) > sum(shadows[13.0])
-    assert shadows[7.0][-1] > shadows[13.0][-1] > 0.0

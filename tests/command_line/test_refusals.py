@@ -154,7 +154,6 @@ def test_no_result_overwrites_its_input(
     shutil.copy(press, image)
     shutil.copy(calibration, cal)
     (tmp_path / "link.gplcal").symlink_to(cal)
-    (tmp_path / "d.toml").write_text("")
     ball = session / "balls" / "ball_00.png"
     kept = [path.read_bytes() for path in (image, cal, ball)]
     measure = ("measure", str(cal), str(image), "--shape", "ball", "--json")
@@ -167,7 +166,6 @@ def test_no_result_overwrites_its_input(
         ("benchmark", str(cal), str(image), "--json", str(cal)),
         ("calibrate", str(session), "-o", str(ball)),
         ("calibrate", str(session), *both),
-        ("design", str(tmp_path / "d.toml"), "--shadows", str(tmp_path / "d.toml")),
     ):
         assert "overwrite" in refusal(capsys, *arguments)
     assert [path.read_bytes() for path in (image, cal, ball)] == kept
@@ -208,9 +206,6 @@ def test_system_errors_are_one_sentence(
     assert "too long" in refusal(capsys, "simulate", str(tmp_path / long))
     inside = str(press / "session")
     assert "A file has the name" in refusal(capsys, "simulate", inside)
-    (tmp_path / "d.toml").write_text("")
-    shadows = ("design", str(tmp_path / "d.toml"), "--shadows", str(tmp_path))
-    assert "A folder has the name" in refusal(capsys, *shadows)
     shutil.copy(press, tmp_path)
     evaluate = ("evaluate", str(calibration), str(tmp_path), "-o", str(tmp_path / "e"))
     assert "truth.csv" in refusal(capsys, *evaluate)

@@ -41,7 +41,7 @@ def test_a_mesh_has_its_size_in_mm(name: str, tmp_path: Path) -> None:
     assert bounds == pytest.approx((*x, *y, -deepest, 0.0), abs=1e-3)
 
 
-def test_a_height_rampis_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_height_map_is_read_as_it_was_written(tmp_path: Path) -> None:
     heightmap = _ramp()
     (path,) = write_heightmap(heightmap, tmp_path, formats=("npz",))
     again = read_npz(path)

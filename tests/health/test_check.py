@@ -12,12 +12,12 @@ from scipy.ndimage import gaussian_filter
 from scipy.ndimage import shift as moved
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.design_check.known_sensor import KnownSensor, known_sensor, matt_design
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.finding import KEYS
 from gelpolight_core.quality import Verdict
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
+from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
 
 Map = NDArray[np.float32]
 Change = Callable[[Map], Map]

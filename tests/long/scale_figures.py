@@ -19,9 +19,9 @@ import time
 from probes import resident_mb
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.design_check.known_sensor import known_sensor
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cylinder
+from gelpolight_core.studies.known_sensor import known_sensor
 
 METHODS = (("paper", "best"), ("full", "fast"), ("full", "balanced"), ("full", "best"))
 

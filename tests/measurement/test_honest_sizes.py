@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.design_check.known_sensor import KnownSensor, known_sensor, matt_design
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.result import Measurement
@@ -18,6 +17,7 @@ from gelpolight_core.measurement.spread import BALL_SLOPE, calibration_sd
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cuboid, Cylinder, press
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane
+from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
 
 DECAY_MM = 0.7
 

@@ -11,7 +11,6 @@ from app.command_line.main import main
 from app.measure.measuring import apply_tool
 from gelpolight_core import measure, read_height_map, write_height_map
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.measurement.indenter_tools import Cylinder
 from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.tools import ToolResult
@@ -21,6 +20,7 @@ from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation import indenters
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 PRESS = "cylinder_s5_d100.png"
 

@@ -9,12 +9,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.design_check.known_sensor import (
-    KnownPress,
-    KnownSensor,
-    known_sensor,
-    matt_design,
-)
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.checks import (
@@ -28,6 +22,12 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.studies.known_sensor import (
+    KnownPress,
+    KnownSensor,
+    known_sensor,
+    matt_design,
+)
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 Array = NDArray[np.float64]

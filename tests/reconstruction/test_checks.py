@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from gelpolight_core.bad_pixels import BadPixels
-from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 from gelpolight_core.studies.trial import standard_press, standard_sensor
 
 TINY = known_sensor(matt_design(0.06))

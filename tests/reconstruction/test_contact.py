@@ -8,17 +8,17 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from gelpolight_core.design_check.known_sensor import (
-    KnownPress,
-    KnownSensor,
-    known_sensor,
-    matt_design,
-)
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.checks import small_image_notes, visible_depth_notes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
+from gelpolight_core.studies.known_sensor import (
+    KnownPress,
+    KnownSensor,
+    known_sensor,
+    matt_design,
+)
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 AT_MM = (1.0, -2.0)

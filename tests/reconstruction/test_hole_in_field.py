@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gelpolight_core.design_check.known_sensor import known_sensor, matt_design
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cylinder
+from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 
 def test_a_hole_on_a_face_is_filled_in_and_flagged() -> None:

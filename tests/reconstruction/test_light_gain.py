@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.design_check.known_sensor import KnownPress, KnownSensor, known_sensor
 from gelpolight_core.image.response import gamma_response
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.trust import judged
@@ -17,6 +16,7 @@ from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder
+from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 TEN_UM = 10.0

@@ -1,0 +1,125 @@
+"""The paper's Fig. 1 in numbers: one object under point and under directional light.
+
+``python -m tests.studies.point_light [DESIGN.toml]`` prints how much of a pressed cylinder is in
+shadow under both kinds of light, and the depth error of the near-light model and of the same model
+with its LEDs moved far away, as directional methods assume.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.score import TrueDepth, score_depth, scored_radius_mm
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.simulation.indenters import Cylinder, press
+from gelpolight_core.simulation.lamps import Lamp, ParallelLamp, lamp_table, lamps_of
+from gelpolight_core.simulation.occlusion import lit_share
+from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.virtual_sensor import VirtualSensor
+from gelpolight_core.studies.known_sensor import KnownSensor, exact_calibration, matt
+
+AZIMUTHS_DEG = (90.0, 210.0, 330.0)
+DEPTH_MM = 1.0
+WIDTH_PX = 320
+TOUCHED_MM, FAR_MM = 0.02, 1e4
+HEIGHT_SHARES, ELEVATIONS_DEG = (0.6, 1.0, 1.5), (15.0, 30.0, 45.0)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Shares of the contact that are dark, and RMS errors in um; None where it is refused."""
+
+    light: str
+    shadow_percent: float
+    unsolved_percent: float
+    near_um: float | None
+    directional_um: float | None
+
+
+def directional_lamps(elevation_deg: float) -> tuple[ParallelLamp, ...]:
+    """Return three parallel lights 120 degrees apart."""
+    return tuple(ParallelLamp(azimuth, elevation_deg) for azimuth in AZIMUTHS_DEG)
+
+
+def shadow_areas(surface: PressedSurface, lamps: tuple[Lamp, ...]) -> tuple[float, float, float]:
+    """Return the areas dark under one lamp (mean), under any, and under two or more, in mm2."""
+    deepest = float(surface.depth_mm.max(initial=0.0))
+    grid = (surface.x0_mm, surface.y0_mm, surface.pitch_mm, deepest)
+    slopes = surface.slope_x, surface.slope_y
+    share = lit_share(surface.depth_mm, surface.tile_max, grid, slopes, lamp_table(lamps))
+    dark = np.asarray(share) < 0.5
+    number, cell = dark.sum(axis=2), surface.pitch_mm**2
+    areas = dark.sum(axis=(0, 1)).mean(), (number >= 1).sum(), (number >= 2).sum()
+    mean, some, two = (float(area * cell) for area in areas)
+    return mean, some, two
+
+
+def rows(
+    design: SensorDesign,
+    height_shares: tuple[float, ...] = HEIGHT_SHARES,
+    elevations_deg: tuple[float, ...] = ELEVATIONS_DEG,
+) -> Iterator[Row]:
+    """Press a cylinder, off the middle so that no symmetry helps, under each light."""
+    plain = matt(design).scaled(WIDTH_PX / design.camera.width_px)
+    decay_mm = plain.membrane.decay_length_mm
+    surface = press(Cylinder(5.0, DEPTH_MM), x_mm=2.0, y_mm=1.0, decay_mm=decay_mm)
+    for share in height_shares:
+        leds = tuple(replace(led, height_mm=share * led.height_mm) for led in plain.leds)
+        lit = replace(plain, leds=leds)
+        places = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in leds])
+        name = f"point, LEDs at {-places[:, 2].mean():.1f} mm"
+        yield _row(name, VirtualSensor(lit, lamps=lamps_of(lit)), lamps_of(lit), places, surface)
+    for elevation in elevations_deg:
+        lamps = directional_lamps(elevation)
+        azimuth, rise = np.radians(AZIMUTHS_DEG), np.radians(elevation)
+        towards = np.column_stack(
+            [
+                np.cos(rise) * np.cos(azimuth),
+                np.cos(rise) * np.sin(azimuth),
+                np.full(3, -np.sin(rise)),
+            ]
+        )
+        # The near-light model has its LEDs in these directions, at the design's height.
+        height = np.mean([led.height_mm for led in plain.leds])
+        places = towards * (height / -towards[:, 2:])
+        name = f"directional, {elevation:.0f} degrees"
+        yield _row(name, VirtualSensor(plain, lamps=lamps), lamps, places, surface)
+
+
+def _row(
+    name: str,
+    sensor: VirtualSensor,
+    lamps: tuple[Lamp, ...],
+    leds_mm: np.ndarray,
+    surface: PressedSurface,
+) -> Row:
+    _, dark, two_dark = shadow_areas(surface, lamps)
+    pressed = (surface.depth_mm > TOUCHED_MM).sum() * surface.pitch_mm**2
+    far_mm = leds_mm * (FAR_MM / np.linalg.norm(leds_mm, axis=1, keepdims=True))
+    near, directional = (_rms_um(sensor, places, surface) for places in (leds_mm, far_mm))
+    return Row(name, 100.0 * dark / pressed, 100.0 * two_dark / pressed, near, directional)
+
+
+def _rms_um(sensor: VirtualSensor, leds_mm: np.ndarray, surface: PressedSurface) -> float | None:
+    try:
+        known = KnownSensor(sensor, exact_calibration(sensor, leds_mm=leds_mm))
+        frame = known.showing(surface, samples=1).frame
+        found = Reconstructor(known.calibration).depth(frame, normals=False)
+    except InputError:
+        return None
+    truth = TrueDepth(surface.depth_mm, surface.x_mm, surface.y_mm)
+    radius_mm = scored_radius_mm(known.calibration.sensor)
+    places = found.depth_mm, found.x_mm, found.y_mm
+    return score_depth(*places, truth, height_mm=DEPTH_MM, radius_mm=radius_mm).rms_um
+
+
+if __name__ == "__main__":
+    for row in rows(read_design(Path(sys.argv[1])) if sys.argv[1:] else SensorDesign()):
+        print(row)
