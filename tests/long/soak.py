@@ -6,12 +6,12 @@
 The real program runs on the virtual sensor, whose camera makes 15 frames a second. What is compiled
 when it is used first is used once; then a random person comes. Every half minute the program is
 brought to the same state, and when nothing is computed any more it is left in peace for some
-seconds, in which it is measured: memory, threads, open files, objects and timers, frames made,
-processed and shown in a second, how late the user interface is, what the log says, and the room on
-disk. Every fourth time the session, the protocol's run and the image that is measured are put
-away: these times say whether memory grows, apart from what the C library keeps of what was given
-back to it. Every action is written to actions.log in the scratch folder. The exit status is 1 where
-memory grows, the rate drifts, or the log holds an error; the files are kept then.
+seconds, in which it is measured: memory, threads, open files, objects and timers, frames shown in a
+second, how late the user interface is, what the log says, and the room on disk. Every fourth time
+the session, the protocol's run and the image that is measured are put away: these times say whether
+memory grows, apart from what the C library keeps of what was given back to it. Every action is
+written to actions.log in the scratch folder. The exit status is 1 where memory grows, the rate
+drifts, or the log holds an error; the files are kept then.
 """
 
 from __future__ import annotations
@@ -60,12 +60,11 @@ class Soak:
 
     def __init__(self, options: argparse.Namespace, scratch: Path, hung: int) -> None:
         # Heavy, and only after the folders of the user are set.
-        from soak_figures import HEAD, Counts
+        from soak_figures import HEAD
 
         self.options, self.scratch, self._hung = options, scratch, hung
         self.rows: list = []
         self.troubles: list[str] = []
-        self.counts = Counts()
         self.spent = Spent()
         self._began_s = time.monotonic()
         print(HEAD, flush=True)
@@ -88,7 +87,7 @@ class Soak:
         self.person = Person(self.window, self.scratch, self._actions, self.options.seed)
         context.source.bench = Bench()
         context.source.bench.adjust(rate_hz=RATE_HZ)
-        self.rest = Rest(self.window, self.person, self.counts, self.options.calibration)
+        self.rest = Rest(self.window, self.person, self.options.calibration)
         self.rest.use_calibration()
         self.lateness = Lateness()
         self._look_after = QTimer(self.window)
@@ -148,7 +147,7 @@ class Soak:
     def _measure(self) -> None:
         from soak_figures import Look
 
-        self._looked = Look(self.counts, self.lateness)
+        self._looked = Look(lambda: self.rest.shown, self.lateness)
         self._later(MEASURED_S, self._measured)
 
     def _measured(self) -> None:

@@ -8,7 +8,7 @@ import os
 import threading
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
@@ -18,12 +18,8 @@ from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 from scipy.stats import theilslopes
 
-from app.inspect.page import InspectPage
-from app.live.frame_results import Maker, Shown
 from app.services.log import Log
 from app.shell.memory import give_back
-from app.sources.source import Frame
-from app.sources.stream import Stream
 from app.widgets.qt_tree import below
 
 # What is loaded, compiled and cached late belongs to the warm-up.
@@ -39,7 +35,7 @@ COUNTED = ("rss_mb", "needed_mb", "threads", "files", "widgets", "objects", "tim
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Figures of one rest: rates in frames per second while nothing but the live path runs."""
+    """Figures of one rest, in which nothing but the live path runs."""
 
     minutes: float
     emptied: bool  # sessions, runs and images that were open are put away
@@ -51,11 +47,8 @@ class Row:
     objects: int
     timers: int
     windows: int
-    made_hz: float
-    processed_hz: float
-    shown_hz: float
-    cpu_ms: float  # processor time of the whole program for each frame shown
-    late_ms: float  # 99th percentile, at rest
+    shown_hz: float  # frames
+    late_ms: float  # of the user interface: 99th percentile, at rest
     late_at_work_ms: float  # largest since the last rest
     errors: int
     warnings: int
@@ -72,37 +65,6 @@ class Row:
 
 
 HEAD = " ".join(field.name for field in fields(Row))
-
-
-class Counts:
-    """Counts frames at the three places that they pass."""
-
-    def __init__(self) -> None:
-        self.made = self.processed = self.shown = 0
-        hand_on, make = Stream._hand_on, Maker.__call__
-
-        def handed_on(stream: Stream, frame: Frame) -> None:
-            self.made += 1
-            hand_on(stream, frame)
-
-        def made(maker: Maker, frame: Frame) -> Shown:
-            self.processed += 1
-            return make(maker, frame)
-
-        Stream._hand_on = handed_on  # type: ignore[method-assign]
-        Maker.__call__ = made  # type: ignore[method-assign]
-
-    def watch(self, page: InspectPage) -> None:
-        """Count what a page shows."""
-
-        def shown(_item: Shown) -> None:
-            self.shown += 1
-
-        page.depth.shown.connect(shown)
-
-    def now(self) -> tuple[int, int, int]:
-        """Return the counts."""
-        return self.made, self.processed, self.shown
 
 
 class LogWatch:
@@ -130,25 +92,16 @@ class LogWatch:
 class Look:
     """Measures from one moment to another, while the program rests."""
 
-    def __init__(self, counts: Counts, lateness: Lateness) -> None:
-        self._counts, self._lateness = counts, lateness
+    def __init__(self, shown: Callable[[], int], lateness: Lateness) -> None:
+        self._count, self._lateness = shown, lateness
         self.late_at_work_ms = max(lateness.late_ms, default=0.0)
         lateness.late_ms.clear()
-        self._before, self._wall_s, self._cpu_s = (
-            counts.now(),
-            time.monotonic(),
-            time.process_time(),
-        )
+        self._shown, self._began_s = shown(), time.monotonic()
 
     def row(self, began_s: float, log: LogWatch, scratch: Path, *, emptied: bool) -> Row:
         """Return the figures since it was made."""
-        span_s = time.monotonic() - self._wall_s
-        cpu_s = time.process_time() - self._cpu_s
-        made, processed, shown = (
-            after - before for after, before in zip(self._counts.now(), self._before, strict=True)
-        )
+        shown_hz = (self._count() - self._shown) / (time.monotonic() - self._began_s)
         late_ms = float(np.percentile(self._lateness.late_ms or [0.0], 99))
-        self._lateness.late_ms.clear()
         log.look()
         objects = [o for w in QApplication.topLevelWidgets() for o in below(w, QObject)]
         if emptied:
@@ -164,10 +117,7 @@ class Look:
             len(objects),
             sum(isinstance(o, QTimer) for o in objects),
             len(QApplication.topLevelWidgets()),
-            made / span_s,
-            processed / span_s,
-            shown / span_s,
-            1e3 * cpu_s / max(shown, 1),
+            shown_hz,
             late_ms,
             self.late_at_work_ms,
             len(log.errors),
@@ -229,9 +179,9 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
     output.append(f"needed_mb at {len(alike)} rests ({which}): {reported}")
     if low > MOST_GROWTH_MB_PER_H:
         wrong.append(f"memory grows by {slope:.0f} MB per hour, at least by {low:.0f}")
-    for name in ("made_hz", "processed_hz", "shown_hz", "cpu_ms", "late_ms", "late_at_work_ms"):
+    for name in ("shown_hz", "late_ms", "late_at_work_ms"):
         first, last = thirds([getattr(row, name) for row in warm])
         output.append(f"{name}: median {first:.1f} in the first third, {last:.1f} in the last")
-        if name in ("made_hz", "shown_hz") and last < LEAST_RATE * first:
+        if name == "shown_hz" and last < LEAST_RATE * first:
             wrong.append(f"the rate drifts: {name} from {first:.1f} to {last:.1f}")
     return output, wrong

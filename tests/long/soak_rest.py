@@ -7,7 +7,6 @@ from pathlib import Path
 
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QComboBox, QDialog
-from soak_figures import Counts
 from soak_person import Person
 
 from app.measure.press_view import PressView
@@ -34,24 +33,21 @@ class Rest:
         Of the program.
     person : Person
         Uses its buttons.
-    counts : Counts
-        Of frames.
     calibration : Path or None
         Of the virtual sensor.
     """
 
-    def __init__(
-        self, window: MainWindow, person: Person, counts: Counts, calibration: Path | None
-    ) -> None:
-        self.window, self.person, self.counts = window, person, counts
+    def __init__(self, window: MainWindow, person: Person, calibration: Path | None) -> None:
+        self.window, self.person = window, person
         self._wanted, self._calibration = calibration, None
+        self.shown = 0  # frames
         self._watched = False
         self.begin(emptied=False)
 
     def begin(self, *, emptied: bool) -> None:
         """Come to rest anew; emptied: nothing that a person opened is left open."""
         self._emptied, self._arranged, self._advised = emptied, False, False
-        self._shown_before = self.counts.shown
+        self._shown_before = self.shown
 
     @property
     def computes(self) -> bool:
@@ -124,7 +120,7 @@ class Rest:
         page, source = self.window.page("inspect"), self.window.context.source
         if not self._watched:
             self._watched = True
-            self.counts.watch(page)
+            page.depth.shown.connect(self._count)
         if page.recorder.busy:
             page.recorder.stop()
             return "it records"
@@ -153,10 +149,10 @@ class Rest:
             if self._emptied:
                 self._put_away()
             # What was shown before says nothing of the arranged scene.
-            self._shown_before = self.counts.shown
+            self._shown_before = self.shown
         if self.computes:
             return COMPUTES
-        if self.counts.shown - self._shown_before < 5:
+        if self.shown - self._shown_before < 5:
             return "nothing is shown"
         if page.depth.last is None or not page.depth.last.frame.settled:
             return UNSETTLED
@@ -169,6 +165,9 @@ class Rest:
                 button.click()
             return "there is no depth"
         return ""
+
+    def _count(self, _shown: object) -> None:
+        self.shown += 1
 
     def _arrange(self) -> None:
         page = self.window.page("inspect")
