@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,17 +11,21 @@ from app.command_line.main import main
 
 
 @pytest.fixture(scope="session")
-def session(virtual_session: Path) -> Path:
-    """Return a session folder of the virtual sensor, at half the image size."""
-    return virtual_session
+def session(small_session: Path) -> Path:
+    """Return a session folder of the virtual sensor, at a quarter of the image size."""
+    return small_session
 
 
 @pytest.fixture(scope="session")
-def calibration(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calibration(session: Path, made_once: Callable[..., Path]) -> Path:
     """Return the calibration that the command makes from it."""
-    path = tmp_path_factory.mktemp("made") / "c.gplcal"
-    assert main(["calibrate", str(session), "-o", str(path), "--model", "paper"]) == 0
-    return path
+
+    def make(folder: Path) -> Path:
+        arguments = ["calibrate", str(session), "-o", str(folder / "c.gplcal"), "--model", "paper"]
+        assert main(arguments) == 0
+        return folder / "c.gplcal"
+
+    return made_once("command-calibration", make)
 
 
 @pytest.fixture

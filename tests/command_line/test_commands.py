@@ -25,10 +25,11 @@ from gelpolight_core.sensor_calibration import Calibration
 
 
 def test_a_calibration_of_the_virtual_sensor_finds_its_true_values(
-    session: Path, virtual_run: CalibrationRun
+    virtual_session: Path, virtual_run: CalibrationRun
 ) -> None:
     """The limits are those for a full image, doubled for an image of half the size."""
-    found, truth = run_as_json(virtual_run), json.loads((session / "truth.json").read_text())
+    found = run_as_json(virtual_run)
+    truth = json.loads((virtual_session / "truth.json").read_text())
     assert found["camera"]["fx"] == pytest.approx(truth["camera"]["fx"], rel=0.002)
     plane = truth["top_plane"]
     assert found["top_plane"]["distance_mm"] == pytest.approx(plane["offset_mm"], rel=0.002)

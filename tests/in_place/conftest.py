@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,6 +13,7 @@ from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_c
 from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.session.session import read_session
 
+MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 MM_PER_PX = 0.0989
 """Apparent distance of the design's membrane over its focal length, at a quarter of its size."""
 
@@ -44,12 +47,13 @@ def close_session(opened: Path, folder: Path, mm_per_px: float) -> Path:
 
 
 @pytest.fixture(scope="session")
-def closed_folder(
-    small_session_of_ten_balls: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def closed_folder(small_session_of_ten_balls: Path, made_once: MadeOnce) -> Path:
     """Return a closed sensor's session folder."""
-    folder = tmp_path_factory.mktemp("closed") / "session"
-    return close_session(small_session_of_ten_balls, folder, MM_PER_PX)
+
+    def make(folder: Path) -> Path:
+        return close_session(small_session_of_ten_balls, folder / "session", MM_PER_PX)
+
+    return made_once("closed-session", make)
 
 
 @pytest.fixture(scope="session")
@@ -61,6 +65,6 @@ def closed_session(closed_folder: Path) -> ClosedSession:
 
 
 @pytest.fixture(scope="session")
-def closed_run(closed_session: ClosedSession) -> InPlaceRun:
-    """Return the closed sensor's calibration with its presses."""
-    return calibrate_closed_session(closed_session)
+def closed_run(closed_session: ClosedSession, made_once: MadeOnce) -> InPlaceRun:
+    """Return the closed sensor's calibration with its presses; not to be changed."""
+    return made_once("closed-run", lambda _: calibrate_closed_session(closed_session))
