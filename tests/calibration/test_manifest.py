@@ -79,31 +79,6 @@ def test_a_list_of_calibrations_loads_no_numerical_library() -> None:
     assert done.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        (("format",), "something else"),
-        (("version",), 0),
-        (("identity",), 7),
-        (("sensor", "serial"), None),
-        (("provenance",), None),
-        (("quality", "lens"), 3),
-        (("plane",), None),
-        (("grid",), None),
-        (("arrays",), None),
-        (("arrays", "missing"), {"shape": [1], "kind": "<f4", "sha256": ""}),
-        (("camera", "width"), "wide"),
-    ],
-    ids=lambda x: ".".join(x) if isinstance(x, tuple) else str(x),
-)
-def test_a_forged_manifest_is_refused(
-    whole: Path, tmp_path: Path, path: tuple[str, ...], value: Any
-) -> None:
-    file = forged(whole, tmp_path / "forged.gplcal", path, value)
-    with pytest.raises(InputError, match=r"forged\.gplcal"):
-        read_summary(file)
-
-
 @settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_a_truncated_file_is_refused(

@@ -15,9 +15,8 @@ from scipy.ndimage import map_coordinates
 
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.near_light.maps import light_levels
-from gelpolight_core.reconstruction.near_light.sampling import block_means, halve, sample_rows
+from gelpolight_core.reconstruction.near_light.sampling import halve, sample_rows
 from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE, RatioImage
-from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 
 Array = NDArray[np.float64]
@@ -79,23 +78,6 @@ def dented(membrane: Membrane, seed: int) -> tuple[ShadedField, Map]:
         Y,
     )
     return field, depth.astype(np.float32)
-
-
-@settings(max_examples=6, deadline=None)
-@given(membranes, st.integers(0, 999))
-def test_a_start_from_other_normals_ends_at_the_same(membrane: Membrane, seed: int) -> None:
-    field, depth = dented(membrane, seed)
-    cold = compiled.solve(field, depth, LEDS, membrane, steps=compiled.QUICK)
-    random = np.random.default_rng(seed)
-    near = [
-        np.clip(cold.normals[..., k] + random.normal(0.0, 0.05, depth.shape), -0.7, 0.7)
-        for k in (0, 1)
-    ]
-    start = (near[0].astype(np.float32), near[1].astype(np.float32))
-    warm = compiled.solve(field, depth, LEDS, membrane, steps=compiled.QUICK, start=start)
-    for name in ("slope_x", "slope_y"):
-        off = np.abs(getattr(warm, name) - getattr(cold, name))[2:-2, 2:-2]
-        assert np.percentile(off, 95) < 2e-3
 
 
 def test_a_channel_seen_at_a_cosine_that_no_ball_showed_is_flagged() -> None:
@@ -189,16 +171,6 @@ def test_a_spoilt_pixel_marks_its_channel_in_the_nodes_about_it(
     np.testing.assert_allclose(small.ratio[1], _means_of_numbers(found))
     # An average of four has half the noise.
     np.testing.assert_allclose(small.noise, 0.005, rtol=1e-5)
-
-
-@pytest.mark.parametrize("workers", [1, 2, 3])
-def test_block_means_are_the_means(workers: int) -> None:
-    raw = np.random.default_rng(2).integers(0, 255, (50, 66, 3)).astype(np.uint8)
-    means = np.empty((10, 13, 3), np.float32)
-    flat = raw.reshape(50, -1)
-    RowWorkers(workers).run(10, block_means, flat, np.float32(1 / 255), 5, means)
-    plain = raw[:50, :65].reshape(10, 5, 13, 5, 3).mean(axis=(1, 3)) / 255
-    np.testing.assert_allclose(means, plain, rtol=1e-5)
 
 
 def test_a_strong_lobe_does_not_lead_a_solve_astray() -> None:

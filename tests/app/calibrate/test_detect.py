@@ -308,17 +308,3 @@ def test_the_image_of_another_stage_is_rejected_with_a_sentence(
     assert not seen.ready
     assert not seen.sentence[0].islower()
     assert seen.sentence.endswith(".")
-
-
-@pytest.mark.parametrize("stage", ["checkerboard", "top_pose", "mirror", "whiteboard", "balls"])
-@pytest.mark.parametrize("level", [0, 128, 255])
-def test_empty_images_are_rejected_by_every_stage(
-    stage: str,
-    level: int,
-    images: dict[str, np.ndarray],
-    session: Session,
-    known: Known,
-    setting: BallSetting,
-) -> None:
-    empty = np.full_like(images["mirror"], level)
-    assert not detect_in(stage, empty, session, known, setting).ready

@@ -16,7 +16,7 @@ from app.context.context import AppContext
 from app.context.source_button import SourceButton
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.provenance import provenance_of
-from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
+from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.session.session import read_session
 
 WAIT_MS = 60_000
@@ -183,20 +183,6 @@ def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
     context.source.choose_virtual_sensor()
     assert form.stated().sensor == virtual_session().sensor
     context.source.choose(None)
-
-
-@pytest.mark.parametrize("stored", ["046d:081b@SN2", "virtual:virtual-2", "virtual:virtual-1"])
-def test_the_virtual_sensor_is_a_camera_of_its_own(
-    technician: Technician, context: AppContext, computed_project: Made, stored: str
-) -> None:
-    """Images of another camera are not mixed with those of the virtual sensor, and vice versa."""
-    project = computed_project()
-    project.set_camera(CameraSettings("first", stored))
-    context.source.choose_virtual_sensor()
-    technician.begin(project, "background")
-    fault = technician.wizard.session_camera.fault()
-    assert (stored in fault) is (stored != "virtual:virtual-1")
-    technician.rest()
 
 
 def test_a_recording_of_another_sensor_is_rejected(

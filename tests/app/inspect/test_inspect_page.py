@@ -281,19 +281,6 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     qtbot.waitUntil(lambda: page.views.height.map.shown_images > shown, timeout=WAIT_MS)
 
 
-def test_reopening_the_camera_ends_the_recording(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    page.recorder.start()
-    qtbot.wait(300)
-    page.live.open()
-    assert not page.recorder.action.isChecked()
-    qtbot.waitUntil(lambda: not page.recorder.busy, timeout=WAIT_MS)
-
-
 def test_zero_uses_the_present_background_and_can_be_undone(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
     qtbot: QtBot,

@@ -32,9 +32,3 @@ def test_a_press_is_requested_and_a_frozen_one_needs_no_advice() -> None:
     assert (noted.text, noted.role) == ("It is dim. It is cut off.", "warn")
     refused = measuring_advice(ready, frozen=True, refused="it is grey")
     assert (refused.text, refused.act) == ("it is grey", "live")
-
-
-def test_a_calibration_being_read_is_not_reported_missing() -> None:
-    for frozen in (False, True):
-        found = measuring_advice(LiveState(reading=True), frozen=frozen, refused="")
-        assert "calibration" in found.text and not found.act

@@ -8,16 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import pytest
 from pytestqt.qtbot import QtBot
 
 from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
-from app.measure.sheet import Sheet
 from app.measure.work import Work
 from app.services.newest_wins import Finished, NewestWins
-from app.sources.source import Frame
-from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 
@@ -85,17 +81,3 @@ def test_results_of_an_earlier_calibration_are_not_shown(
     assert work.heightmap is not None
     assert work.heightmap.calibration_id == second.identity
     work.close()
-
-
-def test_a_frame_of_another_sensor_is_refused_though_its_size_fits(
-    small_calibration: Calibration, small_session: Path
-) -> None:
-    path = next((small_session / "presses").glob("cylinder*.png"))
-    frame = Frame(cv2.imread(str(path))[..., ::-1].copy(), 0, 0.0)
-    measuring, model = Measuring(), small_calibration.model
-    for serial in ("", small_calibration.sensor.serial):
-        image = MeasuredImage("press", frame=frame, serial=serial)
-        assert measuring(MeasureRequest(small_calibration, model, image, Sheet())) is not None
-    image = MeasuredImage("press", frame=frame, serial="B-2")
-    with pytest.raises(InputError, match="sensor B-2"):
-        measuring(MeasureRequest(small_calibration, model, image, Sheet()))

@@ -267,20 +267,3 @@ def test_a_camera_of_another_size_is_refused_before_anything_is_pressed(
     sizes = "160x240", "320x240"
     qtbot.waitUntil(lambda: all(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
     assert not panel.capture.isEnabled()
-
-
-def test_a_run_that_cannot_be_opened_shows_the_reason(
-    view: ProtocolView, context: AppContext, qtbot: QtBot
-) -> None:
-    choose(view, repeats=1)
-    begin(view, qtbot)
-    folder = view.work.run.folder
-    view.pressing.panel.leave.click()
-    for entry in context.workspace.entries():
-        context.workspace.remove(entry.path)
-    view.open_run(folder)
-    qtbot.waitUntil(lambda: "not in the library" in view.setup.problem.text(), timeout=WAIT_MS)
-    (folder / "protocol.toml").write_text("damaged [")
-    view.enter()
-    assert "damaged" in view.findChild(QPushButton, "protocol.run.0").text()
-    assert not view.setup.begin.isEnabled()

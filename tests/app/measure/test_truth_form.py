@@ -36,21 +36,6 @@ def test_an_indenter_that_is_corrected_in_the_list_is_corrected_where_it_is_chos
     assert form.stated == Stated(5.0, 0.75, "Rod")
 
 
-def test_typed_or_unlisted_values_keep_their_numbers_without_a_name(qtbot: QtBot) -> None:
-    form = TruthForm()
-    qtbot.addWidget(form)
-    form.show_indenters((BALL, ROD))
-    form.show_kind("ball", "diameter", "mm")
-    _choose(form, "Ball 8 mm")
-    form.show_indenters((ROD,))
-    assert form.stated == Stated(8.0)
-    form.show_kind("cylinder", "diameter", "mm")
-    _choose(form, "Rod")
-    form.size.setValue(5.1)
-    form.show_indenters((BALL, ROD))
-    assert form.stated == Stated(5.1, 1.0)
-
-
 def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot: QtBot) -> None:
     form = TruthForm()
     qtbot.addWidget(form)

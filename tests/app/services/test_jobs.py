@@ -45,21 +45,6 @@ def test_only_the_caller_keeps_the_result_of_a_job(qtbot: QtBot) -> None:
     assert jobs.close()
 
 
-@pytest.mark.usefixtures("no_collection")
-def test_the_error_of_a_job_is_released_after_it_is_reported(qtbot: QtBot) -> None:
-    jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
-
-    def fail(_progress: Tell) -> None:
-        heavy = Heavy()
-        found.append(weakref.ref(heavy))
-        raise InputError("the image is grey", where="a.png", advice="Take it in colour")
-
-    with qtbot.waitSignal(jobs.refused):
-        jobs.submit(Job("look", fail))
-    qtbot.waitUntil(lambda: found[0]() is None)
-    assert jobs.close()
-
-
 def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:
     jobs, done = Jobs("jobs"), list[Any]()
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -72,61 +70,3 @@ def test_the_window_releases_memory_after_a_page_change_and_regularly(
     given.clear()
     qtbot.waitUntil(lambda: len(given) > 2, timeout=20_000)
     window.close()
-
-
-HOARD = """
-import ctypes, sys, threading
-from app.shell.memory import keep_little
-if sys.argv[1] == "few":
-    keep_little()
-library = ctypes.CDLL(None)
-library.malloc.restype = ctypes.c_void_p
-places = [0] * 8
-all_run = threading.Barrier(8)
-
-def take(number):
-    all_run.wait()
-    places[number] = library.malloc(ctypes.c_size_t(1000))
-    all_run.wait()
-
-threads = [threading.Thread(target=take, args=(n,)) for n in range(8)]
-[thread.start() for thread in threads]
-[thread.join() for thread in threads]
-# Stores of threads lie at multiples of 64 MB.
-print(len({place >> 26 for place in places}))
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="other C libraries have no such stores")
-def test_threads_share_few_memory_arenas() -> None:
-    stores = {
-        how: int(subprocess.check_output([sys.executable, "-c", HOARD, how]))
-        for how in ("few", "many")
-    }
-    assert stores["few"] <= 2 < stores["many"]
-
-
-LARGE = """
-import ctypes, sys
-from app.shell.memory import LARGE_BYTES, keep_little
-sys.path.insert(0, "tests/long")
-from allocated import ask_allocator
-keep_little()
-library = ctypes.CDLL(None)
-library.malloc.restype = ctypes.c_void_p
-library.malloc.argtypes = [ctypes.c_size_t]
-library.free.argtypes = [ctypes.c_void_p]
-library.free(library.malloc(3 * LARGE_BYTES))  # by itself it raises the bound to that
-before = ask_allocator().hblks
-place = library.malloc(2 * LARGE_BYTES)
-print(ask_allocator().hblks - before)
-"""
-
-
-@pytest.mark.skipif(
-    not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="a call of the GNU C library"
-)
-def test_large_blocks_come_from_the_system_after_any_free() -> None:
-    """Without the option threads almost never share one, so no comparison is possible."""
-    found = subprocess.check_output([sys.executable, "-c", LARGE], cwd=ROOT)
-    assert int(found) == 1

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -14,7 +14,7 @@ import scene
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.workspace.entries import parse_time, read_entry
+from app.workspace.entries import read_entry
 from app.workspace.validation import (
     Comparison,
     Validation,
@@ -149,15 +149,6 @@ def test_only_files_of_the_library_are_used_or_removed(workspace: Workspace, sou
     assert source.is_file()
 
 
-def test_the_selection_ends_with_its_file(workspace: Workspace, source: Path) -> None:
-    place = workspace.import_calibration(source)
-    workspace.use(place)
-    assert [entry.in_use for entry in workspace.entries()] == [True]
-    assert Workspace(workspace.folder).in_use == place
-    place.unlink()
-    assert workspace.in_use is None
-
-
 def test_each_window_of_the_program_has_its_own_calibration_in_use(
     workspace: Workspace, source: Path
 ) -> None:
@@ -178,14 +169,6 @@ def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: P
     moved = Workspace(tmp_path / "moved")
     shutil.move(workspace.folder, moved.folder)
     assert moved.in_use == moved.folder / place.relative_to(workspace.folder)
-
-
-@given(st.text(max_size=200))
-def test_every_serial_has_a_folder_of_its_own_inside(serial: str) -> None:
-    name = folder_name(serial)
-    assert name not in ("", ".", "..")
-    assert "/" not in name
-    assert Path("a") / name != Path("a")
 
 
 def test_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
@@ -286,11 +269,6 @@ def test_age_is_counted_in_days(workspace: Workspace, source: Path) -> None:
     assert entry.age_days(made - timedelta(days=1)) == 0.0
 
 
-def test_times_without_a_zone_are_utc_and_nonsense_is_unknown() -> None:
-    assert parse_time("2026-01-02T03:04:05") == datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
-    assert parse_time("yesterday") is None
-
-
 def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace: Workspace) -> None:
     for number, (serial, name) in enumerate((("B-1", "old"), ("B-1", "new"), ("A-1", "x"))):
         folder = workspace.sessions_folder(serial) / name
@@ -327,17 +305,6 @@ def test_the_records_are_created_at_first_use(workspace: Workspace) -> None:
     workspace.close()
     assert [record.serial for record in workspace.records.measurements()] == ["A"]
     workspace.close()
-
-
-def test_every_recording_has_its_own_path(workspace: Workspace) -> None:
-    paths = set()
-    for _ in range(3):
-        path = workspace.recording_path("A/1")
-        path.touch()
-        paths.add(path)
-    assert len(paths) == 3
-    assert {path.parent for path in paths} == {workspace.recordings_folder("A/1")}
-    assert {path.suffix for path in paths} == {".gplrec"}
 
 
 def test_a_calibration_is_not_imported_without_its_validation(
