@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from app.calibrate.closed_setup.form import new_closed_session
+from app.calibrate.closed_form import new_closed_session
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.errors import InputError

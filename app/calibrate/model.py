@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QUndoStack
+from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from app.calibrate.commands import Correction
 from app.calibrate.states import StepState
 from app.context.context import AppContext
 from app.live.live_detection import LiveDetection
@@ -19,7 +18,62 @@ from app.services.jobs import Job, Jobs
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
+
+
+class Correction(QUndoCommand):
+    """One correction and its reverse; each changes only the data that it is about.
+
+    A command that cannot be written to disk has no effect and leaves the history.
+
+    Parameters
+    ----------
+    text : str
+        Text in the history list.
+    act, revert : callable
+        Written to disk before they return; raise InputError on failure.
+    done : callable
+        Called after either of them.
+    refused : callable
+        Called with the reason when the command failed.
+    is_done : bool, optional
+        Whether the change is already done when the command enters the history, as for a capture.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        act: Callable[[], None],
+        revert: Callable[[], None],
+        *,
+        done: Callable[[], None],
+        refused: Callable[[str], object],
+        is_done: bool = False,
+    ) -> None:
+        super().__init__(text)
+        self._is_done = is_done
+        self._act, self._revert = act, revert
+        self._done, self._refused = done, refused
+
+    def redo(self) -> None:
+        """Apply the correction."""
+        if self._is_done:
+            self._is_done = False
+            return
+        self._run(self._act)
+
+    def undo(self) -> None:
+        """Undo the correction."""
+        self._run(self._revert)
+
+    def _run(self, change: Callable[[], None]) -> None:
+        try:
+            change()
+        except InputError as error:
+            self.setObsolete(True)
+            self._refused(str(error))
+        self._done()
 
 
 class WizardModel(QObject):

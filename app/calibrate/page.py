@@ -8,12 +8,12 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
+from app.calibrate.closed_form import ClosedForm, new_closed_session
 from app.calibrate.closed_offer import closed_offer, copy_images
-from app.calibrate.closed_setup.form import ClosedForm, new_closed_session
+from app.calibrate.form_page import FormPage
 from app.calibrate.question_view import QuestionView
 from app.calibrate.session_camera import SetupCamera
-from app.calibrate.setup.form import SetupForm, new_session
-from app.calibrate.setup.form_page import FormPage
+from app.calibrate.setup_form import SetupForm, new_session
 from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext

@@ -7,8 +7,8 @@ from functools import partial
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
+from app.calibrate.form_page import FormPage
 from app.calibrate.model import WizardModel
-from app.calibrate.setup.form_page import FormPage
 from app.context.context import AppContext
 from app.context.source_button import show_settings_of_source
 from app.sources.camera.applying import is_locked

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from app.calibrate.background.presenter import BackgroundStep
-from app.calibrate.balls.presenter import BallsStep
-from app.calibrate.closed_background.presenter import ClosedBackgroundStep
-from app.calibrate.closed_balls.presenter import ClosedBallsStep
-from app.calibrate.closed_setup.presenter import ClosedSetupStep
-from app.calibrate.closed_validation.presenter import ClosedValidationStep
-from app.calibrate.lens.presenter import LensStep
-from app.calibrate.lights.presenter import LightsStep
-from app.calibrate.radiance.presenter import RadianceStep
+from app.calibrate.background import BackgroundStep, ClosedBackgroundStep
+from app.calibrate.balls import BallsStep
+from app.calibrate.closed_balls import ClosedBallsStep
+from app.calibrate.lens import LensStep
+from app.calibrate.lights import LightsStep
+from app.calibrate.radiance import RadianceStep
 from app.calibrate.reflectance.presenter import ReflectanceStep
-from app.calibrate.refraction.presenter import RefractionStep
-from app.calibrate.result.presenter import ResultStep
-from app.calibrate.setup.presenter import SetupStep
+from app.calibrate.refraction import RefractionStep
+from app.calibrate.result import ResultStep
+from app.calibrate.setup import ClosedSetupStep, SetupStep
 from app.calibrate.step import StepPresenter
 from app.calibrate.step_data import Step
-from app.calibrate.top_pose.presenter import TopPoseStep
-from app.calibrate.validation.presenter import ValidationStep
+from app.calibrate.top_pose import TopPoseStep
+from app.calibrate.validation import ClosedValidationStep, ValidationStep
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.project import CalibrationProject
 

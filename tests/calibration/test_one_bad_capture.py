@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from app.calibrate.balls.presenter import judge_ball
+from app.calibrate.balls import judge_ball
 from app.calibrate.image_step import Judgement
-from app.calibrate.lens.presenter import judge_view
-from app.calibrate.top_pose.presenter import judge_top_view
+from app.calibrate.lens import judge_view
+from app.calibrate.top_pose import judge_top_view
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.status import StageState

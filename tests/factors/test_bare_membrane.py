@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.calibrate.background.detector import detect_background
+from app.calibrate.background import detect_background
 from app.calibrate.detection import read_raw
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject

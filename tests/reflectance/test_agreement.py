@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.calibrate.balls.presenter import judge_ball
+from app.calibrate.balls import judge_ball
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.results import StageResults

@@ -128,9 +128,9 @@ class Curves(QWidget):
 def _nodes(state: CurveEdit, fitted: CurveEdit) -> Nodes:
     """Return the nodes of the curves that differ from the fit of the session's stage."""
     return {
-        channel: tuple(zip(curve.cosines, curve.values, strict=True))
-        for channel, (curve, fit) in enumerate(zip(state.curves, fitted.curves, strict=True))
-        if curve != fit
+        channel: tuple(zip(now.curve.cosines, now.curve.values, strict=True))
+        for channel, (now, fit) in enumerate(zip(state, fitted, strict=True))
+        if now.curve != fit.curve
     }
 
 

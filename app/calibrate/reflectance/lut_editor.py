@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -12,14 +13,11 @@ from PySide6.QtGui import (
     QKeyEvent,
     QKeySequence,
     QResizeEvent,
-    QUndoCommand,
-    QUndoStack,
 )
-from PySide6.QtWidgets import QSplitter, QToolBar, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QToolBar, QVBoxLayout, QWidget
 
 from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_effect import Effect
-from app.calibrate.reflectance.lut_hints import HINT, LASSO_HINT, node_hint
 from app.calibrate.reflectance.lut_live import LivePanel
 from app.calibrate.reflectance.lut_model import CurveEdit
 from app.calibrate.reflectance.lut_plot import CurvePlot
@@ -41,24 +39,11 @@ NUDGES = {
     Qt.Key.Key_Up: (0.0, 1.0),
     Qt.Key.Key_Down: (0.0, -1.0),
 }
-
-
-class _Swap(QUndoCommand):
-    """Undo command that shows one of two states."""
-
-    def __init__(
-        self, text: str, before: CurveEdit, after: CurveEdit, show: Callable[[CurveEdit], None]
-    ) -> None:
-        super().__init__(text)
-        self._before, self._after, self._show = before, after, show
-
-    def undo(self) -> None:
-        """Show the older state."""
-        self._show(self._before)
-
-    def redo(self) -> None:
-        """Show the newer state."""
-        self._show(self._after)
+HINT = tr(
+    "Drag a node to move it, click it to select it, double-click the curve to add a node, use the "
+    "wheel to zoom. A node stays between its neighbours; click Fewer nodes to get more room."
+)
+LASSO_HINT = tr("Draw a line around the points to exclude. Press Esc to leave the lasso.")
 
 
 class LutEditor(QWidget):
@@ -72,12 +57,12 @@ class LutEditor(QWidget):
         The ball pixels that the curves were fitted to.
     previous : CurveEdit, optional
         An older version to compare with; by default `start`.
-    effect : callable, optional
+    effect : callable
         From (state, press's name) to :class:`~app.calibrate.reflectance.lut_effect.Effect`.
-    history : callable, optional
+    history : callable
         Called with the text of an edit, the state before it and the state after it, to add the edit
-        to a shared history. It must call :meth:`show_state` with the new state, and again after
-        each undo or redo. Without it the editor keeps its own history.
+        to a history. It must call :meth:`show_state` with the new state, and again after each undo
+        or redo.
     parent : QWidget, optional
         Parent of the editor.
     """
@@ -90,8 +75,8 @@ class LutEditor(QWidget):
         scatter: ReflectanceScatter,
         *,
         previous: CurveEdit | None = None,
-        effect: Callable[[CurveEdit, str], Effect] | None = None,
-        history: Callable[[str, CurveEdit, CurveEdit], None] | None = None,
+        effect: Callable[[CurveEdit, str], Effect],
+        history: Callable[[str, CurveEdit, CurveEdit], None],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -101,10 +86,9 @@ class LutEditor(QWidget):
         self._scatter = scatter
         self.channel = 0
         self.chosen: int | None = None
-        self.undo_stack = QUndoStack(self)
         self.plot = named(CurvePlot(scatter), "lut.plot", tr("Reflectance curve"))
         self.plot.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.live = None if effect is None else LivePanel(start, scatter.names, effect)
+        self.live = LivePanel(start, scatter.names, effect)
         self._repaint = QTimer(self, interval=1, singleShot=True)
         self._repaint.timeout.connect(self._follow_theme)
         self._notice = named(RoomyLabel(), "lut.notice", tr("Result of the last edit"))
@@ -139,7 +123,7 @@ class LutEditor(QWidget):
 
     def stop(self) -> bool:
         """Stop the panel's thread; return whether it has stopped."""
-        return self.live is None or self.live.stop()
+        return self.live.stop()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Stop the panel's thread."""
@@ -152,8 +136,7 @@ class LutEditor(QWidget):
         narrow = self.width() < NARROW
         orientation = Qt.Orientation.Vertical if narrow else Qt.Orientation.Horizontal
         self._split.setOrientation(orientation)
-        if self.live is not None:
-            self.live.show_plots(not narrow)
+        self.live.show_plots(not narrow)
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply a changed theme."""
@@ -172,126 +155,82 @@ class LutEditor(QWidget):
         elif key in (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown):
             self._choose_neighbour(1 if key == Qt.Key.Key_PageUp else -1)
         elif key == Qt.Key.Key_Escape and self._actions["lasso"].isChecked():
-            self._actions["lasso"].setChecked(False)
+            self._actions["lasso"].trigger()
         else:
             super().keyPressEvent(event)
 
     def _make_actions(self) -> dict[str, QAction]:
-        actions: dict[str, QAction] = {}
-
-        def add(key: str, text: str, tip: str, shortcut: str = "", check: bool = False) -> QAction:
-            action = QAction(text, self)
-            action.setObjectName(f"lut.{key}")
-            action.setCheckable(check)
-            action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-            if shortcut:
-                action.setShortcut(QKeySequence(shortcut))
-            action.setToolTip(plain_tip(tip, shortcut))
-            actions[key] = action
-            self.addAction(action)
-            return action
-
+        """Return the tools; each is (key, text, tool tip, shortcut, what it does)."""
+        table: list[tuple[str, str, str, str, Callable[[], object]]] = [
+            (f"channel.{key}", channel_name(k).capitalize(),
+             tr("Show the curve of the {name} channel").format(name=channel_name(k)),
+             f"{k + 1}", partial(self.choose_channel, k))
+            for k, key in enumerate(CHANNEL_KEYS)
+        ]  # fmt: skip
+        table += [
+            ("lasso", tr("Lasso"),
+             tr("Draw around points to exclude them; the curve is then fitted again"),
+             "L", self._on_lasso),
+            ("reset", tr("Reset channel"), tr("Reset this channel to its initial curve"), "",
+             partial(self._do, tr("reset channel"), model.reset_channel, self._start, keep=False)),
+            ("compare", tr("Compare"), tr("Show the previous version of the curve as well"), "C",
+             self._refresh),
+            ("view", tr("Whole curve"), tr("Show the whole curve"), "Home",
+             lambda: self.plot.whole(self._state, self.channel)),
+            ("add", tr("Add node"), tr("Add a node in the wider gap next to the selected node"),
+             "Ins", self._on_add),
+            ("remove", tr("Remove node"), tr("Remove the selected node"), "Del", self._on_remove),
+            ("thin", tr("Fewer nodes"),
+             tr("Keep only the nodes that are needed to draw the same curve"), "F",
+             partial(self._do, tr("fewer nodes"), model.thin_nodes, keep=False)),
+            ("snap", tr("Snap to fit"),
+             tr("Move the selected node, or all nodes, onto the fitted curve"), "S",
+             lambda: self._do(tr("snap to fit"), model.snap_to_fit, self.chosen)),
+            ("smooth", tr("Smooth"), tr("Reduce the bumps of the curve by half"), "M",
+             partial(self._do, tr("smooth"), model.smooth)),
+        ]  # fmt: skip
         group = QActionGroup(self)
-        for k, name in enumerate(CHANNEL_KEYS):
-            action = add(
-                f"channel.{name}",
-                channel_name(k).capitalize(),
-                tr("Show the curve of the {name} channel").format(name=channel_name(k)),
-                f"{k + 1}",
-                check=True,
-            )
-            action.triggered.connect(lambda _on, k=k: self.choose_channel(k))
-            group.addAction(action)
-        add(
-            "add",
-            tr("Add node"),
-            tr("Add a node in the wider gap next to the selected node"),
-            "Ins",
-        )
-        add("remove", tr("Remove node"), tr("Remove the selected node"), "Del")
-        add(
-            "thin",
-            tr("Fewer nodes"),
-            tr("Keep only the nodes that are needed to draw the same curve"),
-            "F",
-        )
-        add(
-            "snap",
-            tr("Snap to fit"),
-            tr("Move the selected node, or all nodes, onto the fitted curve"),
-            "S",
-        )
-        add("smooth", tr("Smooth"), tr("Reduce the bumps of the curve by half"), "M")
-        add(
-            "lasso",
-            tr("Lasso"),
-            tr("Draw around points to exclude them; the curve is then fitted again"),
-            "L",
-            check=True,
-        )
-        add("reset", tr("Reset channel"), tr("Reset this channel to its initial curve"))
-        add(
-            "compare",
-            tr("Compare"),
-            tr("Show the previous version of the curve as well"),
-            "C",
-            check=True,
-        )
-        add("view", tr("Whole curve"), tr("Show the whole curve"), "Home")
+        actions = {}
+        for key, text, tip, shortcut, act in table:
+            action = actions[key] = QAction(text, self)
+            action.setObjectName(f"lut.{key}")
+            action.setCheckable(key in ("lasso", "compare") or key.startswith("channel"))
+            action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            action.setShortcut(QKeySequence(shortcut))
+            action.setToolTip(plain_tip(tip, shortcut))
+            action.triggered.connect(lambda _on, act=act: act())
+            self.addAction(action)
+            if key.startswith("channel"):
+                group.addAction(action)
         return actions
 
-    def _add_undo(self) -> None:
-        undo = self.undo_stack.createUndoAction(self, tr("Undo"))
-        redo = self.undo_stack.createRedoAction(self, tr("Redo"))
-        for key, action, shortcut in (
-            ("undo", undo, QKeySequence.StandardKey.Undo),
-            ("redo", redo, QKeySequence.StandardKey.Redo),
-        ):
-            action.setObjectName(f"lut.{key}")
-            action.setShortcut(QKeySequence(shortcut))
-            action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-            self._actions[key] = action
-            self.addAction(action)
-
-    def _groups(self) -> tuple[list[str], ...]:
-        return (
-            [f"channel.{name}" for name in CHANNEL_KEYS],
-            ["lasso", "reset"],
-            ["compare", "view"],
-            ["add", "remove", "thin", "snap", "smooth"],
-            ["undo", "redo"] if self._history is None else [],
-        )
-
-    def _fill_bar(self, bar: QToolBar, groups: Sequence[Sequence[str]]) -> None:
-        for number, keys in enumerate(filter(None, groups)):
+    def _bar(self, name: str, accessible: str, groups: Sequence[Sequence[str]]) -> QToolBar:
+        bar = named(QToolBar(), name, accessible)
+        for number, keys in enumerate(groups):
             if number:
                 bar.addSeparator()
             for key in keys:
                 bar.addAction(self._actions[key])
                 button = bar.widgetForAction(self._actions[key])
-                if isinstance(button, QToolButton):
-                    named(button, f"lut.{key}.button", self._actions[key].text())
-                    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+                named(button, f"lut.{key}.button", self._actions[key].text())
+                button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        return bar
 
     def _lay_out(self) -> None:
-        if self._history is None:
-            self._add_undo()
-        rows = (
-            ("lut.tools", tr("Tools for the reflectance curve"), self._groups()[:3]),
-            ("lut.more_tools", tr("More tools for the reflectance curve"), self._groups()[3:]),
-        )
+        channels = [f"channel.{name}" for name in CHANNEL_KEYS]
+        first = (channels, ("lasso", "reset"), ("compare", "view"))
+        second = (("add", "remove", "thin", "snap", "smooth"),)
         layout = QVBoxLayout(self)
-        for name, accessible, groups in rows:
-            bar = named(QToolBar(), name, accessible)
-            layout.addWidget(bar)
-            self._fill_bar(bar, groups)
+        layout.addWidget(self._bar("lut.tools", tr("Tools for the reflectance curve"), first))
+        layout.addWidget(
+            self._bar("lut.more_tools", tr("More tools for the reflectance curve"), second)
+        )
         self._split = split = QSplitter(Qt.Orientation.Horizontal)
         split.addWidget(self.plot)
+        split.addWidget(self.live)
         split.setStretchFactor(0, 3)
-        if self.live is not None:
-            split.addWidget(self.live)
-            split.setStretchFactor(1, 1)
-            split.setSizes([860, 400])
+        split.setStretchFactor(1, 1)
+        split.setSizes([860, 400])
         layout.addWidget(split, 1)
         layout.addWidget(self._hint)
         layout.addWidget(self._notice)
@@ -301,21 +240,6 @@ class LutEditor(QWidget):
         self.plot.node_moved.connect(self._on_node_moved)
         self.plot.outlined.connect(self._on_outlined)
         self.plot.asked_for_node.connect(self._add_at)
-        handlers: dict[str, Callable[[], None]] = {
-            "add": self._on_add,
-            "remove": self._on_remove,
-            "thin": lambda: self._do(tr("fewer nodes"), model.thin_nodes, keep=False),
-            "snap": lambda: self._do(tr("snap to fit"), model.snap_to_fit, self.chosen),
-            "smooth": lambda: self._do(tr("smooth"), model.smooth),
-            "reset": lambda: self._do(
-                tr("reset channel"), model.reset_channel, self._start, keep=False
-            ),
-            "view": lambda: self.plot.whole(self._state, self.channel),
-        }
-        for key, handler in handlers.items():
-            self._actions[key].triggered.connect(lambda _on=False, handler=handler: handler())
-        self._actions["lasso"].toggled.connect(self._on_lasso)
-        self._actions["compare"].toggled.connect(lambda _on: self._refresh())
 
     def _follow_theme(self) -> None:
         self._apply_theme()
@@ -323,8 +247,7 @@ class LutEditor(QWidget):
 
     def _apply_theme(self) -> None:
         self.plot.apply_theme()
-        if self.live is not None:
-            self.live.apply_theme()
+        self.live.apply_theme()
 
     def _do(
         self,
@@ -348,17 +271,13 @@ class LutEditor(QWidget):
         if after == self._state:
             self.show_state(after)
             return
-        name = channel_name(self.channel)
-        if self._history is not None:
-            self._history(f"{text} ({name})", self._state, after)
-        else:
-            self.undo_stack.push(_Swap(f"{text} ({name})", self._state, after, self.show_state))
+        self._history(f"{text} ({channel_name(self.channel)})", self._state, after)
 
     def show_state(self, state: CurveEdit) -> None:
         """Make a state the present one."""
         changed = state != self._state
         self._state = self._shown = state
-        if self.chosen is not None and self.chosen >= len(state.curves[self.channel].cosines):
+        if self.chosen is not None and self.chosen >= len(state[self.channel].curve.cosines):
             self.chosen = None
         self._refresh()
         if changed:
@@ -366,26 +285,22 @@ class LutEditor(QWidget):
 
     def _refresh(self) -> None:
         compare = self._actions["compare"].isChecked()
-        previous = self._previous.curves[self.channel] if compare else None
+        previous = self._previous[self.channel].curve if compare else None
         self.plot.show_state(self._shown, self.channel, chosen=self.chosen, previous=previous)
         self._hint.setText(self._hint_text())
-        curve = self._state.curves[self.channel]
+        curve = self._state[self.channel].curve
         inner = self.chosen is not None and 0 < self.chosen < len(curve.cosines) - 1
         self._actions["remove"].setEnabled(inner)
-        changed = (
-            curve != self._start.curves[self.channel]
-            or self._state.left_out[self.channel] != self._start.left_out[self.channel]
-        )
+        changed = self._state[self.channel] != self._start[self.channel]
         self._actions["reset"].setEnabled(changed)
-        if self.live is not None:
-            self.live.show_state(self._shown)
+        self.live.show_state(self._shown)
 
     def _hint_text(self) -> str:
         if self._actions["lasso"].isChecked():
             return LASSO_HINT
         if self.chosen is None:
             return HINT
-        curve, chosen = self._shown.curves[self.channel], self.chosen
+        curve, chosen = self._shown[self.channel].curve, self.chosen
         count = len(curve.cosines)
         return node_hint(chosen + 1, count, curve.cosines[chosen], curve.values[chosen])
 
@@ -398,7 +313,7 @@ class LutEditor(QWidget):
         self._refresh()
 
     def _nudge(self, node: int, across: float, up: float) -> None:
-        curve = self._state.curves[self.channel]
+        curve = self._state[self.channel].curve
         cosine = curve.cosines[node] + NUDGE * across
         value = curve.values[node] + NUDGE * up * curve.values[-1]
         moved = model.move_node(self._state, self.channel, node, cosine, value)
@@ -408,13 +323,13 @@ class LutEditor(QWidget):
             self._commit(tr("move node by key"), moved)
 
     def _choose_neighbour(self, step: int) -> None:
-        count = len(self._state.curves[self.channel].cosines)
+        count = len(self._state[self.channel].curve.cosines)
         start = (-1 if step > 0 else count) if self.chosen is None else self.chosen
         self.choose_node(min(max(start + step, 0), count - 1))
 
     def _on_add(self) -> None:
         """Add a node in the wider gap next to the selected node, or in the widest gap."""
-        cosines: Sequence[float] = self._state.curves[self.channel].cosines
+        cosines: Sequence[float] = self._state[self.channel].curve.cosines
         gaps = range(len(cosines) - 1)
         if self.chosen is not None:
             gaps = range(max(self.chosen - 1, 0), min(self.chosen + 1, len(cosines) - 1))
@@ -434,7 +349,8 @@ class LutEditor(QWidget):
         if self.chosen is not None:
             self._do(tr("remove node"), model.remove_node, self.chosen, keep=False)
 
-    def _on_lasso(self, on: bool) -> None:
+    def _on_lasso(self) -> None:
+        on = self._actions["lasso"].isChecked()
         self.plot.box.lasso = on
         self.plot.nodes.setVisible(not on)
         self._refresh()
@@ -444,10 +360,26 @@ class LutEditor(QWidget):
         self._do(tr("exclude points"), model.leave_out, outline, self._scatter, keep=False)
         if self._state is not before:
             out = model.left_out_points(
-                self._state.left_out[self.channel], self._scatter, self.channel
+                self._state[self.channel].left_out, self._scatter, self.channel
             )
             self._notice.setText(
                 tr("{n} of {all} points are excluded; the curve was fitted again").format(
                     n=int(out.sum()), all=out.size
                 )
             )
+
+
+def node_hint(number: int, count: int, cosine: float, value: float) -> str:
+    """Return the hint for the selected node.
+
+    Parameters
+    ----------
+    number, count : int
+        Number of the node, from 1, and number of nodes.
+    cosine, value : float
+        Position of the node.
+    """
+    return tr(
+        "Node {number} of {all}: cosine {cosine:.4f}, value {value:.4f}. Arrow keys move it "
+        "(Shift: ten times as far), Page Up and Page Down select its neighbours, Del removes it."
+    ).format(number=number, all=count, cosine=cosine, value=value)

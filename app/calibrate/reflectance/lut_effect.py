@@ -94,7 +94,7 @@ def ball_effect(
 
 def _maps(maps: ShadingMaps, calibration: Calibration, edit: CurveEdit) -> ShadingMaps:
     """Return the maps with the edited curves, and with the reflectance factors that result."""
-    curves = {k: (np.array(c.cosines), np.array(c.values)) for k, c in enumerate(edit.curves)}
+    curves = {k: (np.array(c.curve.cosines), np.array(c.curve.values)) for k, c in enumerate(edit)}
     changed = edited(calibration, curves, operator="", made="")
     lookup, scale = changed.reflectance.lookup(LOOKUP_SIZE)
     old, new = calibration.factors, changed.factors

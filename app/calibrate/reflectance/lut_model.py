@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
+from matplotlib.path import Path
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
@@ -21,7 +21,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable, fit_channel
 from gelpolight_core.translation import tr
 
-T = TypeVar("T")
 Array = NDArray[np.float64]
 Outline = tuple[tuple[float, float], ...]
 LEAST_NODES = 4
@@ -67,51 +66,55 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class CurveEdit:
-    """One state of the editor.
+class Channel:
+    """One channel of a state of the editor.
 
     Attributes
     ----------
-    curves : tuple of 3 Curve
-        Edited curves.
-    fits : tuple of 3 Curve
-        Fits to the points that are not excluded.
-    coverage : tuple of 3 (low, high)
+    curve : Curve
+        The edited curve.
+    fit : Curve
+        Fit to the points that are not excluded.
+    coverage : (low, high)
         Range of cosines that these points cover; outside of it the curve is extrapolated.
-    left_out : tuple of 3 tuples of outlines
-        Points inside any of a channel's outlines (cosine, value) are excluded.
+    left_out : tuple of outlines
+        Points inside any of these outlines (cosine, value) are excluded.
     """
 
-    curves: tuple[Curve, Curve, Curve]
-    fits: tuple[Curve, Curve, Curve]
-    coverage: tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
-    left_out: tuple[tuple[Outline, ...], tuple[Outline, ...], tuple[Outline, ...]]
+    curve: Curve
+    fit: Curve
+    coverage: tuple[float, float]
+    left_out: tuple[Outline, ...] = ()
 
-    def table(self) -> ReflectanceTable:
-        """Return the edited curves as a reflectance table."""
-        red, green, blue = self.curves
-        return ReflectanceTable(
-            (np.array(red.cosines), np.array(green.cosines), np.array(blue.cosines)),
-            (np.array(red.values), np.array(green.values), np.array(blue.values)),
-            np.array(self.coverage),
-        )
+
+CurveEdit = tuple[Channel, Channel, Channel]
+"""One state of the editor: red, green and blue."""
 
 
 def start_edit(table: ReflectanceTable) -> CurveEdit:
     """Return the initial state of the editor for a calibration's table."""
-    curves = _three(
-        [
-            Curve(tuple(c.tolist()), tuple(v.tolist()))
-            for c, v in zip(table.cosines, table.values, strict=True)
-        ]
+    channels = []
+    for cosines, values, (low, high) in zip(
+        table.cosines, table.values, table.coverage.tolist(), strict=True
+    ):
+        curve = Curve(tuple(cosines.tolist()), tuple(values.tolist()))
+        channels.append(Channel(curve, curve, (low, high)))
+    red, green, blue = channels
+    return red, green, blue
+
+
+def table_of(edit: CurveEdit) -> ReflectanceTable:
+    """Return the edited curves as a reflectance table."""
+    red, green, blue = (
+        (np.array(channel.curve.cosines), np.array(channel.curve.values)) for channel in edit
     )
-    coverage = _three([(float(low), float(high)) for low, high in table.coverage])
-    return CurveEdit(curves, curves, coverage, ((), (), ()))
+    coverage = np.array([channel.coverage for channel in edit])
+    return ReflectanceTable((red[0], green[0], blue[0]), (red[1], green[1], blue[1]), coverage)
 
 
 def move_node(edit: CurveEdit, channel: int, index: int, cosine: float, value: float) -> CurveEdit:
     """Move a node as far as its neighbours allow; the end nodes keep their cosine."""
-    curve = edit.curves[channel]
+    curve = edit[channel].curve
     cosines, values = list(curve.cosines), list(curve.values)
     last = len(cosines) - 1
     gap = _value_gap(curve)
@@ -131,7 +134,7 @@ def add_node(edit: CurveEdit, channel: int, cosine: float) -> tuple[CurveEdit, i
     InputError
         If there is a node already, or no room next to one.
     """
-    curve = edit.curves[channel]
+    curve = edit[channel].curve
     cosines, values = list(curve.cosines), list(curve.values)
     index = int(np.searchsorted(cosines, cosine))
     inside = 0.0 < cosine < 1.0
@@ -154,7 +157,7 @@ def remove_node(edit: CurveEdit, channel: int, index: int) -> CurveEdit:
     InputError
         If it is an end node, or too few nodes would remain.
     """
-    curve = edit.curves[channel]
+    curve = edit[channel].curve
     if index in (0, len(curve.cosines) - 1):
         raise InputError(
             tr("the end nodes of the curve cannot be removed"),
@@ -174,7 +177,7 @@ def remove_node(edit: CurveEdit, channel: int, index: int) -> CurveEdit:
 
 def snap_to_fit(edit: CurveEdit, channel: int, index: int | None = None) -> CurveEdit:
     """Move one node, or all nodes, onto the fitted curve as far as the neighbours allow."""
-    curve, fit = edit.curves[channel], edit.fits[channel]
+    curve, fit = edit[channel].curve, edit[channel].fit
     if index is not None:
         cosine = curve.cosines[index]
         return move_node(edit, channel, index, cosine, float(fit.at(cosine)))
@@ -188,7 +191,7 @@ def smooth(edit: CurveEdit, channel: int) -> CurveEdit:
     Halfway keeps the order of any two neighbours: their target lines are strictly below the
     upper one and strictly above the lower one.
     """
-    curve = edit.curves[channel]
+    curve = edit[channel].curve
     c, v = np.array(curve.cosines), np.array(curve.values)
     share = (c[1:-1] - c[:-2]) / (c[2:] - c[:-2])
     line = v[:-2] + share * (v[2:] - v[:-2])
@@ -206,7 +209,7 @@ def thin_nodes(edit: CurveEdit, channel: int, *, tolerance: float = TOLERANCE) -
     tolerance : float, optional
         Largest change of the curve, as a share of its highest value.
     """
-    curve = edit.curves[channel]
+    curve = edit[channel].curve
     c, v = np.array(curve.cosines), np.array(curve.values)
     kept = sorted({0, c.size // 3, 2 * c.size // 3, c.size - 1})
     while len(kept) < c.size:
@@ -219,14 +222,7 @@ def thin_nodes(edit: CurveEdit, channel: int, *, tolerance: float = TOLERANCE) -
 
 def reset_channel(edit: CurveEdit, channel: int, start: CurveEdit) -> CurveEdit:
     """Reset a channel to its state in `start`, including its excluded points."""
-    return _with_channel(
-        edit,
-        channel,
-        start.curves[channel],
-        start.fits[channel],
-        start.coverage[channel],
-        start.left_out[channel],
-    )
+    return _with(edit, channel, start[channel])
 
 
 def leave_out(
@@ -249,8 +245,8 @@ def leave_out(
         If the outline contains no point, or the remaining points cannot be fitted.
     """
     polygon = tuple((float(x), float(y)) for x, y in outline)
-    outlines = (*edit.left_out[channel], polygon)
-    before = left_out_points(edit.left_out[channel], scatter, channel)
+    outlines = (*edit[channel].left_out, polygon)
+    before = left_out_points(edit[channel].left_out, scatter, channel)
     out = left_out_points(outlines, scatter, channel)
     if np.array_equal(before, out):
         raise InputError(
@@ -263,34 +259,18 @@ def leave_out(
     )
     curve = Curve(tuple(fit.cosines.tolist()), tuple(fit.values.tolist()))
     low, high = fit.coverage.tolist()
-    return _with_channel(edit, channel, curve, curve, (low, high), outlines)
+    return _with(edit, channel, Channel(curve, curve, (low, high), outlines))
 
 
 def left_out_points(
     outlines: Sequence[Outline], scatter: ReflectanceScatter, channel: int
 ) -> NDArray[np.bool_]:
     """Return which of a channel's points (N,) lie inside any of the outlines."""
-    x, y = scatter.cosines[channel], scatter.values[channel]
-    out = np.zeros(x.size, dtype=bool)
+    points = np.stack([scatter.cosines[channel], scatter.values[channel]], axis=-1)
+    out = np.zeros(len(points), dtype=bool)
     for outline in outlines:
-        out |= _inside(x, y, np.asarray(outline, np.float64))
+        out |= Path(outline).contains_points(points)
     return out
-
-
-def _inside(x: Array, y: Array, polygon: Array) -> NDArray[np.bool_]:
-    """Return which points are inside a polygon, by the number of sides that their rays cross."""
-    (left, low), (right, high) = polygon.min(axis=0), polygon.max(axis=0)
-    near = np.flatnonzero((x >= left) & (x <= right) & (y >= low) & (y <= high))
-    px, py = x[near], y[near]
-    odd = np.zeros(near.size, dtype=bool)
-    for (x0, y0), (x1, y1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        if y0 == y1:
-            continue
-        crosses = (y0 > py) != (y1 > py)
-        odd ^= crosses & (px < x0 + (py - y0) * (x1 - x0) / (y1 - y0))
-    result = np.zeros(x.size, dtype=bool)
-    result[near[odd]] = True
-    return result
 
 
 def _value_gap(curve: Curve) -> float:
@@ -307,31 +287,17 @@ def _between(value: float, low: float, high: float, gap: float) -> float:
 def _with_nodes(
     edit: CurveEdit, channel: int, cosines: Sequence[float], values: Sequence[float]
 ) -> CurveEdit:
-    curves = list(edit.curves)
-    curves[channel] = Curve(tuple(cosines), tuple(values))
-    return replace(edit, curves=_three(curves))
+    curve = Curve(tuple(cosines), tuple(values))
+    return _with(edit, channel, replace(edit[channel], curve=curve))
 
 
-def _with_channel(
-    edit: CurveEdit,
-    channel: int,
-    curve: Curve,
-    fit: Curve,
-    coverage: tuple[float, float],
-    outlines: tuple[Outline, ...],
-) -> CurveEdit:
-    curves, fits = list(edit.curves), list(edit.fits)
-    ranges, left_out = list(edit.coverage), list(edit.left_out)
-    curves[channel], fits[channel] = curve, fit
-    ranges[channel], left_out[channel] = coverage, outlines
-    return CurveEdit(_three(curves), _three(fits), _three(ranges), _three(left_out))
-
-
-def _three(items: Sequence[T]) -> tuple[T, T, T]:
-    first, second, third = items
-    return first, second, third
+def _with(edit: CurveEdit, channel: int, changed: Channel) -> CurveEdit:
+    red, green, blue = (changed if k == channel else edit[k] for k in range(3))
+    return red, green, blue
 
 
 def with_curves(edit: CurveEdit, curves: Mapping[int, Curve]) -> CurveEdit:
     """Return an edit with the curves of some channels replaced, such as stored ones."""
-    return replace(edit, curves=_three([curves.get(k, edit.curves[k]) for k in range(3)]))
+    for channel, curve in curves.items():
+        edit = _with(edit, channel, replace(edit[channel], curve=curve))
+    return edit

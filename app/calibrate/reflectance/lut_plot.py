@@ -212,16 +212,16 @@ class CurvePlot(pg.PlotWidget):
         self._show_scatter(edit, channel)
         self._show_coverage(edit, channel)
         cosine = np.linspace(0.0, 1.0, SAMPLES)
-        curve = edit.curves[channel]
+        curve = edit[channel].curve
         value = curve.at(cosine)
-        low, high = edit.coverage[channel]
+        low, high = edit[channel].coverage
         seen = (cosine >= low) & (cosine <= high)
         self._solid.setData(cosine[seen], value[seen], pen=pg.mkPen(colour, width=3))
         self._dashed.setData(
             cosine, value, pen=pg.mkPen(colour, width=2, style=Qt.PenStyle.DashLine)
         )
         dots = pg.mkPen(theme.colour("text"), width=1.5, style=Qt.PenStyle.DotLine)
-        fit = edit.fits[channel]
+        fit = edit[channel].fit
         self._fit.setData(cosine, fit.at(cosine), pen=dots)
         self._fit.setVisible(fit != curve)
         if previous is not None:
@@ -233,7 +233,7 @@ class CurvePlot(pg.PlotWidget):
 
     def whole(self, edit: CurveEdit, channel: int) -> None:
         """Show the whole curve."""
-        top = max(edit.curves[channel].values[-1], edit.fits[channel].values[-1])
+        top = max(edit[channel].curve.values[-1], edit[channel].fit.values[-1])
         self.setRange(xRange=(-0.02, 1.02), yRange=(-0.02 * top, 1.12 * top), padding=0.0)
 
     def apply_theme(self) -> None:
@@ -258,17 +258,17 @@ class CurvePlot(pg.PlotWidget):
 
     def _show_scatter(self, edit: CurveEdit, channel: int) -> None:
         """Show density and outliers; recomputed only if channel, fit or theme have changed."""
-        state = (channel, edit.left_out[channel], edit.fits[channel], theme.is_dark())
+        state = (channel, edit[channel].left_out, edit[channel].fit, theme.is_dark())
         if state == self._density_of:
             return
         self._density_of = state
         x, y = self._scatter.cosines[channel], self._scatter.values[channel]
-        out = left_out_points(edit.left_out[channel], self._scatter, channel)
-        top = 1.12 * float(max(edit.fits[channel].values[-1], np.quantile(y, 0.9999)))
+        out = left_out_points(edit[channel].left_out, self._scatter, channel)
+        top = 1.12 * float(max(edit[channel].fit.values[-1], np.quantile(y, 0.9999)))
         counts, _, _ = np.histogram2d(x[~out], y[~out], BINS, ((0.0, 1.0), (0.0, top)))
         self._image.setImage(_density(counts), autoLevels=False)
         self._image.setRect(QRectF(0.0, 0.0, 1.0, top))
-        off = y / np.maximum(edit.fits[channel].at(np.clip(x, 0.0, 1.0)), 1e-9) - 1.0
+        off = y / np.maximum(edit[channel].fit.at(np.clip(x, 0.0, 1.0)), 1e-9) - 1.0
         spread = 1.4826 * float(np.median(np.abs(off[~out])))
         far = np.flatnonzero(~out & (np.abs(off) > OUTLIER_SPREADS * spread))
         warn, fail = theme.colour("warn"), theme.colour("fail")
@@ -280,7 +280,7 @@ class CurvePlot(pg.PlotWidget):
             item.setData(x[which], y[which], pen=pg.mkPen(hue), brush=pg.mkBrush(hue))
 
     def _show_coverage(self, edit: CurveEdit, channel: int) -> None:
-        low, high = edit.coverage[channel]
+        low, high = edit[channel].coverage
         shade, muted = QColor(theme.colour("muted")), theme.colour("muted")
         shade.setAlpha(90)
         # Much higher than the curve, so that its end is not visible when zoomed out.
@@ -296,7 +296,7 @@ class CurvePlot(pg.PlotWidget):
             word.setText(tr("extrapolated: no ball data here"), color=theme.colour("text"))
             word.fill = pg.mkBrush(theme.colour("base"))
             middle = 0.5 * (max(start, 0.0) + min(stop, 1.0))
-            word.setPos(middle, 0.62 * edit.fits[channel].values[-1])
+            word.setPos(middle, 0.62 * edit[channel].fit.values[-1])
             # A narrow strip has no room for text.
             word.setVisible(min(stop, 1.0) - max(start, 0.0) > 0.04)
 

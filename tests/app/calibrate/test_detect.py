@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board, true_corners
 
-from app.calibrate.background.detector import detect_background
-from app.calibrate.balls.detector import BallSetting, detect_ball
+from app.calibrate.background import detect_background
+from app.calibrate.balls import BallSetting, detect_ball
 from app.calibrate.detection import Detection
-from app.calibrate.lens.detector import detect_board
-from app.calibrate.lights.detector import detect_mirror
+from app.calibrate.lens import detect_board
+from app.calibrate.lights import detect_mirror
 from app.calibrate.marks import mirror_positions_px
-from app.calibrate.radiance.detector import detect_whiteboard
-from app.calibrate.top_pose.detector import detect_top_pose
+from app.calibrate.radiance import detect_whiteboard
+from app.calibrate.top_pose import detect_top_pose
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.camera import Camera

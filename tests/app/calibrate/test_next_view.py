@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from app.calibrate.balls.detector import next_press_mm
-from app.calibrate.lens.next_view import TILT_DEG, next_view, uncovered_ninth
+from app.calibrate.balls import next_press_mm
+from app.calibrate.lens import TILT_DEG, next_view, uncovered_ninth
 from gelpolight_core.optics.board_grid import foreshortening_tilt_deg
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_quality import coverage_counts

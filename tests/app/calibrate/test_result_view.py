@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pytestqt.qtbot import QtBot
 
-from app.calibrate.lens.presenter import LensStep
-from app.calibrate.result.view import ResultView
+from app.calibrate.lens import LensStep
+from app.calibrate.result import ResultView
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.quality import QualityTable

@@ -10,9 +10,9 @@ import pytest
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
-from app.calibrate.closed_balls.learning import Progress
-from app.calibrate.closed_setup.form import ClosedForm, new_closed_session
-from app.calibrate.validation.trial import KnownObject
+from app.calibrate.closed_balls import Progress
+from app.calibrate.closed_form import ClosedForm, new_closed_session
+from app.calibrate.validation import KnownObject
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.in_place_session import SETTLED

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtGui import QMouseEvent, QUndoStack
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from test_lut_model import scatter, start
 
+from app.calibrate.model import Correction
 from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_editor import NUDGE, LutEditor
 from app.calibrate.reflectance.lut_effect import Effect
@@ -27,14 +29,22 @@ def effect(edit: CurveEdit, press: str) -> Effect:
     """Return an artificial effect whose depth is the middle value of the red curve."""
     position = np.linspace(-3.0, 3.0, 61)
     ball = np.where(np.abs(position) < 1.5, 1.0 - 0.1 * position**2, np.nan)
-    depth = np.full(61, float(edit.curves[0].at(0.5)))
+    depth = np.full(61, float(edit[0].curve.at(0.5)))
     return Effect(press, position, depth, ball, float(depth[0]), 0.0)
 
 
 @pytest.fixture
 def editor(qtbot: QtBot) -> Iterator[LutEditor]:
     """Return a visible editor with few nodes."""
-    widget = LutEditor(model.thin_nodes(start(), 0), scatter(), effect=effect)
+    stack = QUndoStack()
+
+    def history(text: str, before: CurveEdit, after: CurveEdit) -> None:
+        show = partial(partial, widget.show_state)
+        swap = Correction(text, show(after), show(before), done=list, refused=pytest.fail)
+        stack.push(swap)
+
+    widget = LutEditor(model.thin_nodes(start(), 0), scatter(), effect=effect, history=history)
+    widget.undo_stack = stack
     qtbot.addWidget(widget)
     widget.resize(1100, 700)
     with qtbot.waitExposed(widget):
@@ -91,7 +101,7 @@ def click(editor: LutEditor, cosine: float, value: float, *, double: bool = Fals
 
 def node(editor: LutEditor, index: int) -> tuple[float, float]:
     """Return a node of the shown channel."""
-    curve = editor.state.curves[editor.channel]
+    curve = editor.state[editor.channel].curve
     return curve.cosines[index], curve.values[index]
 
 
@@ -111,13 +121,13 @@ def test_a_node_follows_the_mouse_and_one_undo_restores_it(editor: LutEditor) ->
 
 
 def test_a_click_selects_a_node_and_del_removes_it(qtbot: QtBot, editor: LutEditor) -> None:
-    count = len(editor.state.curves[0].cosines)
+    count = len(editor.state[0].curve.cosines)
     click(editor, *node(editor, 2))
     assert editor.chosen == 2
     gone = node(editor, 2)
     qtbot.keyClick(editor.plot, Qt.Key.Key_Delete)
-    assert len(editor.state.curves[0].cosines) == count - 1
-    assert gone[0] not in editor.state.curves[0].cosines
+    assert len(editor.state[0].curve.cosines) == count - 1
+    assert gone[0] not in editor.state[0].curve.cosines
 
 
 @pytest.mark.parametrize(
@@ -140,16 +150,16 @@ def test_arrow_keys_move_the_selected_node(
     editor.choose_node(3)
     cosine, value = node(editor, 3)
     qtbot.keyClick(editor.plot, key, modifier)
-    top = editor.state.curves[0].values[-1]
+    top = editor.state[0].curve.values[-1]
     expected = (cosine + NUDGE * across, value + NUDGE * up * top)
     assert node(editor, 3) == pytest.approx(expected)
 
 
 def test_a_double_click_on_the_curve_adds_a_node_there(editor: LutEditor) -> None:
-    curve = editor.state.curves[0]
+    curve = editor.state[0].curve
     cosine = 0.5 * (curve.cosines[3] + curve.cosines[4])
     click(editor, cosine, float(curve.at(cosine)), double=True)
-    assert len(editor.state.curves[0].cosines) == len(curve.cosines) + 1
+    assert len(editor.state[0].curve.cosines) == len(curve.cosines) + 1
     assert node(editor, 4)[0] == pytest.approx(cosine, abs=0.01)
 
 
@@ -157,10 +167,10 @@ def test_the_lasso_excludes_points_and_reports_how_many(editor: LutEditor) -> No
     editor.findChild(type(editor._actions["lasso"]), "lut.lasso").trigger()
     outline = [(0.48, 0.62), (0.62, 0.75), (0.62, 0.95), (0.48, 0.8)]
     drag(editor, *outline)
-    assert float(editor.state.curves[0].at(0.55)) == pytest.approx(0.05 + 0.9 * 0.55**1.3, abs=0.02)
+    assert float(editor.state[0].curve.at(0.55)) == pytest.approx(0.05 + 0.9 * 0.55**1.3, abs=0.02)
     assert "points are excluded" in editor._notice.text()
     editor.undo_stack.undo()
-    assert editor.state.left_out == ((), (), ())
+    assert [channel.left_out for channel in editor.state] == [(), (), ()]
 
 
 @pytest.mark.parametrize("name", ["add", "thin", "snap", "smooth", "reset", "compare", "view"])
@@ -174,6 +184,6 @@ def test_every_tool_has_a_button_and_none_fails(editor: LutEditor, name: str) ->
 
 
 def test_an_impossible_edit_is_explained_in_one_sentence(editor: LutEditor) -> None:
-    editor._add_at(editor.state.curves[0].cosines[2])
+    editor._add_at(editor.state[0].curve.cosines[2])
     assert "no room" in editor._notice.text()
     assert not editor.undo_stack.canUndo()

@@ -42,10 +42,10 @@ def test_a_wrong_table_changes_the_press(
     start = model.start_edit(virtual_run.reflectance.table)
     name = virtual_run.reflectance.presses[0].name
     bent = model.thin_nodes(start, 0)
-    index = int(np.argmin(np.abs(np.subtract(bent.curves[0].cosines, 0.4))))  # on the ball's side
-    low, value = bent.curves[0].values[index - 1 : index + 1]
+    index = int(np.argmin(np.abs(np.subtract(bent[0].curve.cosines, 0.4))))  # on the ball's side
+    low, value = bent[0].curve.values[index - 1 : index + 1]
     bent = model.move_node(
-        bent, 0, index, bent.curves[0].cosines[index], value - 0.6 * (value - low)
+        bent, 0, index, bent[0].curve.cosines[index], value - 0.6 * (value - low)
     )
     before, after = effect(start, name), effect(bent, name)
     assert after.rms_mm > 1.5 * before.rms_mm

@@ -49,9 +49,7 @@ def start() -> CurveEdit:
 
 def index_of(edit: CurveEdit, channel: int, share: float) -> int:
     """Return a node index by the share of nodes before it."""
-    return min(
-        int(share * len(edit.curves[channel].cosines)), len(edit.curves[channel].cosines) - 1
-    )
+    return min(int(share * len(edit[channel].curve.cosines)), len(edit[channel].curve.cosines) - 1)
 
 
 OPERATIONS = st.one_of(
@@ -96,7 +94,7 @@ def test_every_edit_keeps_the_table_invertible(operations: list[tuple]) -> None:
     edit = start()
     for operation in operations:
         edit = apply(edit, operation)
-    table = edit.table()
+    table = model.table_of(edit)
     cosine = np.linspace(0.0, 1.0, 50)
     for k in range(3):
         assert np.all(np.diff(table.cosines[k]) > 0.0)
@@ -112,16 +110,16 @@ def test_an_edit_changes_neither_the_old_state_nor_other_channels(
     first: tuple, second: tuple
 ) -> None:
     before = apply(start(), first)
-    curves, text = before.curves, repr(before)
+    text = repr(before)
     after = apply(before, second)
     assert repr(before) == text
     for k in range(3):
         if k != second[1]:
-            assert after.curves[k] is curves[k]
+            assert after[k] is before[k]
 
 
 def test_an_unedited_table_is_returned_unchanged() -> None:
-    assert model.start_edit(start().table()) == start()
+    assert model.start_edit(model.table_of(start())) == start()
 
 
 @given(SHARE, st.floats(-1.0, 2.0), st.floats(-1.0, 2.0))
@@ -129,8 +127,8 @@ def test_a_dragged_node_stays_between_its_neighbours(
     share: float, cosine: float, value: float
 ) -> None:
     index = index_of(start(), 0, share)
-    old = start().curves[0]
-    new = model.move_node(start(), 0, index, cosine, value).curves[0]
+    old = start()[0].curve
+    new = model.move_node(start(), 0, index, cosine, value)[0].curve
     for name in ("cosines", "values"):
         before, after = list(getattr(old, name)), list(getattr(new, name))
         moved = after.pop(index)
@@ -146,10 +144,10 @@ def test_an_added_node_hardly_changes_the_curve_and_can_be_removed(cosine: float
     try:
         more, index = model.add_node(thin, 0, cosine)
     except InputError:
-        assert np.abs(np.array(thin.curves[0].cosines) - cosine).min() < model.LEAST_GAP
+        assert np.abs(np.array(thin[0].curve.cosines) - cosine).min() < model.LEAST_GAP
         return
-    assert more.curves[0].cosines[index] == cosine
-    assert more.curves[0].values[index] == pytest.approx(float(thin.curves[0].at(cosine)))
+    assert more[0].curve.cosines[index] == cosine
+    assert more[0].curve.values[index] == pytest.approx(float(thin[0].curve.at(cosine)))
     assert model.remove_node(more, 0, index) == thin
 
 
@@ -157,7 +155,7 @@ def test_end_nodes_and_the_last_nodes_cannot_be_removed() -> None:
     edit = start()
     with pytest.raises(InputError, match="end nodes"):
         model.remove_node(edit, 0, 0)
-    while len(edit.curves[0].cosines) > model.LEAST_NODES:
+    while len(edit[0].curve.cosines) > model.LEAST_NODES:
         edit = model.remove_node(edit, 0, 1)
     with pytest.raises(InputError, match="at least 4 nodes"):
         model.remove_node(edit, 0, 1)
@@ -165,23 +163,23 @@ def test_end_nodes_and_the_last_nodes_cannot_be_removed() -> None:
 
 def test_snap_moves_a_bent_curve_back_to_the_fit() -> None:
     edit = model.thin_nodes(start(), 2)
-    index = len(edit.curves[2].cosines) // 2
-    bent = model.move_node(edit, 2, index, edit.curves[2].cosines[index], 9.0)
+    index = len(edit[2].curve.cosines) // 2
+    bent = model.move_node(edit, 2, index, edit[2].curve.cosines[index], 9.0)
     assert bent != edit
     for snapped in (model.snap_to_fit(bent, 2, index), model.snap_to_fit(bent, 2)):
-        fit = edit.fits[2].at(edit.curves[2].cosines[index])
-        assert snapped.curves[2].values[index] == pytest.approx(float(fit))
+        fit = edit[2].fit.at(edit[2].curve.cosines[index])
+        assert snapped[2].curve.values[index] == pytest.approx(float(fit))
 
 
 def test_excluded_points_no_longer_bend_the_curve() -> None:
     true = 0.05 + 0.9 * 0.55**1.3
     # The fit goes through the dirt, which has more points than the membrane.
-    assert start().curves[0].at(0.55) > true + 0.1
+    assert start()[0].curve.at(0.55) > true + 0.1
     outline = [(0.48, 0.62), (0.62, 0.75), (0.62, 0.95), (0.48, 0.8)]
     edit = model.leave_out(start(), 0, outline, scatter())
-    assert edit.curves[0] == edit.fits[0]
-    assert float(edit.curves[0].at(0.55)) == pytest.approx(true, abs=0.01)
-    assert edit.curves[1:] == start().curves[1:]
+    assert edit[0].curve == edit[0].fit
+    assert float(edit[0].curve.at(0.55)) == pytest.approx(true, abs=0.01)
+    assert edit[1:] == start()[1:]
     assert model.reset_channel(edit, 0, start()) == start()
 
 

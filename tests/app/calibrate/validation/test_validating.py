@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from technician import Technician
 
-from app.calibrate.validation import validating
+from app.calibrate import validation as validating
 from app.workspace.validation import Comparison, Validation, validation_path, write_validation
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.manifest import read_summary

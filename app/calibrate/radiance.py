@@ -1,20 +1,22 @@
-"""Live check of the whiteboard: well lit, even, and not the membrane.
-
-It uses the raw image at a quarter of its size and the limits of the core. Specks and saturated
-areas are marked in the image.
-"""
+"""The light intensity step: a white board on the elastomer, well lit and even."""
 
 from __future__ import annotations
+
+from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, judged, or_refusal, share
-from app.calibrate.light_checks import enlarged, marked, refuse_grey
+from app.calibrate.detection import Detection, Detector, judged, or_refusal, share
+from app.calibrate.image_step import ImageStep
+from app.calibrate.light_checks import KnownImage, enlarged, marked, refuse_grey
+from app.calibrate.maps import Panel, three_maps
 from app.calibrate.marks import working_circle
+from app.calibrate.step_data import Step
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.bare_membrane import (
     CHANGE,
@@ -108,3 +110,43 @@ def _refuse_membrane(small: Float, background: Float, area: Mask2) -> None:
             where=tr("Image"),
             advice=tr("Remove the membrane and press the white board onto the elastomer"),
         )
+
+
+class RadianceStep(ImageStep):
+    """Checks the light on the white board."""
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "radiance",
+            tr("Light intensity"),
+            (Stage.RADIANCE,),
+            tr(
+                "Insert the elastomer without the membrane. Press the white board onto it without "
+                "air bubbles. Set the exposure so that nothing is saturated, and do not change it "
+                "afterwards."
+            ),
+            "whiteboard",
+            frames=16,
+            wanted=1,
+        )
+
+    def detector(self, name: str) -> Detector:
+        """Return the check of the light."""
+        project = self.model.project
+        known = KnownImage(project.session.found(FOLDERS[Stage.BACKGROUND]))
+        return partial(_check, table=project.results.table, known=known)
+
+    def result_panels(self) -> tuple[Panel, ...]:
+        """Return the light intensity of each LED."""
+        results = self.model.project.results
+        found, table = results.radiance, results.table
+        if found is None or table is None:
+            return ()
+        text = tr("Light intensity in percent of full scale")
+        return three_maps(found.radiance, found.usable, table.grid, text, unit="%", factor=100.0)
+
+
+def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detection:
+    return or_refusal(lambda: detect_whiteboard(rgb, table=table, background=known.rgb))

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.setup.form_page import FormPage, length_box
+from app.calibrate.form_page import FormPage, length_box
 from app.widgets.folding_row import FoldingRow
 from app.widgets.inputs import DoubleSpinBox, SpinBox
 from app.widgets.label import PlainLabel, plain_tip

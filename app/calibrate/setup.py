@@ -6,9 +6,11 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
+from app.calibrate.closed_form import ClosedForm
+from app.calibrate.form_page import FormPage
 from app.calibrate.session_camera import SetupCamera
-from app.calibrate.setup.form import SetupForm
-from app.calibrate.setup.form_page import FormPage
+from app.calibrate.setup_form import SetupForm
+from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from gelpolight_core.calibration.inputs import Stage
@@ -82,3 +84,24 @@ class SetupStep(StepPresenter):
         self.form.show_session(project.session, new=False)
         text = tr("Applied. The stages that depend on these values are computed again.")
         self.panel.show_notice(text, "pass")
+
+
+class ClosedSetupStep(SetupStep):
+    """Shows the form of a closed sensor."""
+
+    form_type = ClosedForm
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "setup",
+            tr("Set-up"),
+            (),
+            tr("State the scale and the ball diameter. Both scale the result."),
+            "complete",
+        )
+
+    def state(self) -> StepState:
+        """Return that nothing is missing: a session is created with all values."""
+        return "pass", tr("Stated")

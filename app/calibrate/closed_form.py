@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QWidget
 
-from app.calibrate.setup.form_page import FormPage, length_box
+from app.calibrate.form_page import FormPage, length_box
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named

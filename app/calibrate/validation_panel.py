@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.step_data import Step
 from app.calibrate.step_panel import WIDTH, help_button, lay_button, side_scroll
-from app.calibrate.validation.trial import KnownObject, Trial
+from app.calibrate.trial import KnownObject, Trial
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.meaning import make_bold, show_meaning

@@ -1,4 +1,4 @@
-"""Validate a saved calibration on an object of known size, and record the result."""
+"""The validation step: an object of known size, measured with the saved calibration."""
 
 from __future__ import annotations
 
@@ -9,16 +9,21 @@ from typing import Any
 
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.calibrate.detection import read_raw
-from app.calibrate.maps import depth_panel
+from app.calibrate.maps import Panel, depth_panel
 from app.calibrate.model import WizardModel
-from app.calibrate.validation.panel import ValidationPanel
-from app.calibrate.validation.trial import KnownObject, Trial, run_trial
+from app.calibrate.result import ResultView, Saving
+from app.calibrate.states import StepState
+from app.calibrate.step import Parts, StepPresenter
+from app.calibrate.step_data import Step
+from app.calibrate.trial import KnownObject, Trial, run_trial
+from app.calibrate.validation_panel import ValidationPanel
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
+from app.sources.bench import Scene
 from app.workspace.entries import read_entry
 from app.workspace.validation import Validation, read_validation, write_validation
 from gelpolight_core.calibration.file import read_calibration
@@ -289,3 +294,112 @@ def _known_in_folder(path: Path) -> KnownObject | None:
         if row.file == path.name:
             return KnownObject(row.truth.shape, row.truth.size_mm, row.truth.height_mm)
     return None
+
+
+class ValidationStep(StepPresenter):
+    """Shows the live image and the measured press."""
+
+    uses_camera = True
+
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts)
+        self.form = ValidationPanel(self.step)
+        self.validating = Validating(self.model, self.form, context=self.context)
+        self.form.lay_wanted.connect(self.lay_wanted)
+        guide = self.context.requests.guide
+        self.form.help_wanted.connect(lambda: guide.emit("guide/validate", "Validate"))
+        self.validating.tried.connect(self._on_tried)
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "validation",
+            tr("Validation"),
+            (),
+            tr(
+                "Press an indenter of known size into the membrane. The calibration is validated "
+                "only if the measured size is within the limits."
+            ),
+            "indenter",
+        )
+
+    @property
+    def side(self) -> QWidget:
+        """The form for the known object."""
+        return self.form
+
+    def focus(self) -> QWidget:
+        """Return the Measure button."""
+        return self.form.measure
+
+    def state(self) -> StepState:
+        """Return whether the saved calibration is validated."""
+        return self.validating.state
+
+    def show_bench(self, there: bool) -> None:
+        """Offer the virtual bench if there is one."""
+        self.form.lay.setVisible(there)
+        self.validating.refresh()
+
+    def on_bench(self, scene: Scene) -> None:
+        """Fill in the object on the virtual bench."""
+        self.form.show_known(KnownObject(scene.item, scene.size_mm, scene.depth_mm))
+
+    def close(self) -> None:
+        """Stop the measurement."""
+        self.validating.close()
+
+    def refresh(self) -> None:
+        """Show nothing else: the form follows the model."""
+
+    def _on_tried(self, panel: Panel) -> None:
+        if self.form.isVisibleTo(self.form.parentWidget()):
+            self.area.show_result(panel)
+
+
+class ClosedValidationStep(ValidationStep):
+    """Shows the figures until the calibration is saved, then the live image."""
+
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts)
+        self.view = ResultView(parts.steps)
+        self.view.report.hide()  # a report describes the optics of an open sensor
+        self.view.step_wanted.connect(self.step_wanted)
+        self._saving = Saving(self.model, self.view, context=self.context)
+        self._shown = self.centre
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "validation",
+            tr("Validation"),
+            (),
+            tr(
+                "Save the calibration. Then press an object of known size into the membrane. The "
+                "calibration is validated only if the measured size is within the limits."
+            ),
+            "indenter",
+        )
+
+    @property
+    def centre(self) -> QWidget:
+        """The figures of an unsaved calibration, or the image."""
+        return self.area if self.model.saved else self.view
+
+    def focus(self) -> QWidget:
+        """Return the Save or the Measure button."""
+        return self.form.measure if self.model.saved else self.view.save
+
+    def enter(self) -> None:
+        """Show the step."""
+        self._shown = self.centre
+        super().enter()
+
+    def refresh(self) -> None:
+        """Show the present figures; a saved calibration shows the image instead."""
+        model = self.model
+        self.view.show_states(model.states, model.statuses, busy=model.jobs.busy, saved=model.saved)
+        if self.centre is not self._shown:
+            self.step_wanted.emit(self.step.key)

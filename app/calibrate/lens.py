@@ -1,24 +1,27 @@
-"""Find the checkerboard of a lens view in an image, and suggest which view to show next.
-
-Pure functions from a frame (rows, columns, 3) uint8 or uint16 RGB and earlier results to a
-:class:`~app.calibrate.detection.Detection`. They run in the processing thread. The stage itself
-judges each captured image again.
-"""
+"""The lens step: views of a checkerboard in front of the camera, and which view to show next."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, as_image, or_refusal
-from app.calibrate.lens.next_view import next_view, uncovered_ninth
+from app.calibrate.detection import Detection, Detector, as_image, or_refusal
+from app.calibrate.image_step import WAITING, ImageStep, Judgement
 from app.calibrate.marks import board_corners, board_outline
+from app.calibrate.step import Parts
+from app.calibrate.step_data import Step
 from app.live.image_checks import Rgb
 from app.live.overlay import Line, Marker, Overlay
+from app.services.jobs import Job
+from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
@@ -30,11 +33,83 @@ from gelpolight_core.optics.board_exposure import (
 from gelpolight_core.optics.board_search import find_rough_corners, search_rough_corners
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.optics.lens_quality import coverage_counts
+from gelpolight_core.optics.lens_views import (
+    MIN_VIEWS,
+    LensRefusal,
+    LensView,
+    find_view,
+    refused_view,
+)
 from gelpolight_core.quality import Figure, judge
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
+Ninth = tuple[int, int]
+
+ORDER: tuple[Ninth, ...] = (
+    (0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0), (1, 1),
+)  # fmt: skip
+"""(row, column) of the ninths of the image, the outer ones first."""
+BOARD_OF_WIDTH = 0.45
+FOCAL_OF_WIDTH = 1.0
+TILT_DEG = 25.0
+# The golden angle: any number of successive directions is spread evenly.
+TURN_DEG = 137.5
+MARGIN_OF_WIDTH = 0.02
+
+
+def uncovered_ninth(views: Sequence[BoardView]) -> Ninth | None:
+    """Return (row, column) of a ninth of the image without any corner, outer ninths first."""
+    if not views:
+        return ORDER[0]
+    counts = coverage_counts(views, views[0].image_size)
+    rows = [part.sum(axis=0) for part in np.array_split(counts, 3, axis=0)]
+    ninths = np.array([[p.sum() for p in np.array_split(row, 3)] for row in rows])
+    return next((ninth for ninth in ORDER if ninths[ninth] == 0), None)
+
+
+def next_view(board: BoardSpec, size: tuple[int, int], earlier: Sequence[BoardView]) -> Array:
+    """Return the outermost inner corners (4, 2) of a board in the suggested pose, in pixels.
+
+    Each view has another tilt direction; it is placed where no view has corners yet.
+
+    Parameters
+    ----------
+    board : BoardSpec
+        The board.
+    size : (width, height)
+        Of the image, in pixels.
+    earlier : sequence of BoardView
+        Views captured before.
+    """
+    width, height = size
+    across, down = (count - 1 for count in board.inner_corners)
+    x, y = 0.5 * across, 0.5 * down
+    corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
+    turn = math.radians(TURN_DEG * len(earlier))
+    axis = np.array([math.cos(turn), math.sin(turn), 0.0])
+    tilted = _rotated(corners, axis, math.radians(TILT_DEG))
+    focal = FOCAL_OF_WIDTH * width
+    tilted[:, 2] += focal * across / (BOARD_OF_WIDTH * width)
+    quad = focal * tilted[:, :2] / tilted[:, 2:]
+    row, column = uncovered_ninth(earlier) or ORDER[len(earlier) % len(ORDER)]
+    quad += [(column + 0.5) * width / 3.0, (row + 0.5) * height / 3.0]
+    return _moved_inside(quad, np.array(size, np.float64), MARGIN_OF_WIDTH * width)
+
+
+def _rotated(points: Array, axis: Array, angle: float) -> Array:
+    along = np.outer(points @ axis, axis)
+    turned = np.cross(axis, points) * math.sin(angle)
+    return np.asarray(along + (points - along) * math.cos(angle) + turned)
+
+
+def _moved_inside(quad: Array, size: Array, margin: float) -> Array:
+    """Return a quadrilateral shifted into the image."""
+    low = np.maximum(margin - quad.min(axis=0), 0.0)
+    high = np.minimum(size - 1.0 - margin - quad.max(axis=0), 0.0)
+    return np.asarray(quad + low + high)
+
 
 # The slow search uses a small copy, so that a frame without a board stays quick. Below 400 pixels
 # it begins to miss boards that the image border cuts off, and then takes longer.
@@ -173,3 +248,99 @@ def _view_figures(view: BoardView, earlier: Sequence[BoardView]) -> tuple[Figure
         judge("coverage", tr("Image covered by corners"), 100.0 * float(covered.mean()), "%"),
         judge("views", tr("Captured views"), len(earlier)),
     )  # fmt: skip
+
+
+class LensStep(ImageStep):
+    """Analyses each view at once, before there are enough of them to compute the lens."""
+
+    judges_focus = True
+
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts)
+        self._views: dict[str, LensView] = {}
+        self.model.captured.connect(self._on_captured)
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "lens",
+            tr("Lens"),
+            (Stage.LENS,),
+            tr(
+                "Use the camera alone. Hold the checkerboard in front of it. Tilt it by 15 to 40 "
+                "degrees in a new direction for each image, until its corners have covered the "
+                "whole image."
+            ),
+            "camera",
+            wanted=12,
+            least=MIN_VIEWS,
+        )
+
+    def start(self) -> None:
+        """Analyse the views that the session has."""
+        self._find_boards()
+
+    def views(self) -> dict[str, LensView]:
+        """Return what was found in each analysed view, by image name."""
+        project = self.model.project
+        fault, lens = project.fault(Stage.LENS), project.results.lens
+        views = () if lens is None else lens.views
+        if isinstance(fault, LensRefusal):
+            views = fault.views  # the reasons survive a refusal
+        return {**self._views, **{view.name: view for view in views}}
+
+    def detector(self, name: str) -> Detector:
+        """Return the detection of the board, with the earlier views."""
+        session = self.model.project.session
+        used = {path.name for path in session.found(self.step.folder)} - {name}
+        found = [view.board for n, view in self.views().items() if n in used]
+        earlier = [board for board in found if board is not None]
+        return partial(
+            detect_board, board=session.checkerboard, earlier=earlier, patient=bool(name)
+        )
+
+    def depends_on(self) -> tuple[Any, ...]:
+        """Return the names of the analysed views."""
+        return (frozenset(self.views()),)
+
+    def judge(self, path: Path) -> Judgement:
+        """Return what was found in a view."""
+        return judge_view(self.views().get(path.name))
+
+    @property
+    def residual_heading(self) -> str:
+        """The reprojection error of a view."""
+        return tr("Corner error, px")
+
+    def _on_captured(self, stage: str, _name: str) -> None:
+        if stage == Stage.LENS:
+            self._find_boards()
+
+    def _find_boards(self) -> None:
+        def work(_progress: Callable[[float], None]) -> None:
+            session, known = self.model.project.session, self.views()
+            for path in session.found(self.step.folder):
+                if path.name not in known:
+                    try:
+                        view = find_view(session.image(path), session.checkerboard)
+                    except InputError as fault:
+                        view = refused_view(path.name, fault)
+                    self._views = {**self._views, path.name: view}
+
+        self.model.short_jobs.submit(
+            Job(tr("Analysing the lens views"), work, lambda _: self.model.changed.emit())
+        )
+
+
+def judge_view(view: LensView | None) -> Judgement:
+    """Return how a lens view was judged; None: it was not analysed yet."""
+    if view is None:
+        return WAITING
+    if not view.used:
+        return Judgement("fail", view.reason, tr("not used"))
+    if math.isnan(view.rms_px):
+        return Judgement("pass", tr("Board found."), tr("board found"))
+    note = tr("{r:.2f} px").format(r=view.rms_px)
+    sentence = tr("Corner error {r:.3f} px.").format(r=view.rms_px)
+    return Judgement("pass", sentence, note, view.rms_px)

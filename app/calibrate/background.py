@@ -1,0 +1,125 @@
+"""The background step: the membrane with nothing touching it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from app.calibrate.detection import Detection, Detector, judged, or_refusal
+from app.calibrate.image_step import ImageStep
+from app.calibrate.light_checks import KnownImage, enlarged, marked, refuse_grey
+from app.calibrate.maps import Panel, three_maps
+from app.calibrate.marks import working_circle
+from app.calibrate.step_data import Step
+from app.live.image_checks import Rgb, saturated
+from app.live.overlay import Overlay
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.translation import tr
+
+
+def detect_background(
+    rgb: Rgb, *, table: ResamplingTable | None = None, whiteboard: Rgb | None = None
+) -> Detection:
+    """Check the bare membrane: well lit, not saturated, no contact.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    table : ResamplingTable, optional
+        As for :func:`~app.calibrate.radiance.detect_whiteboard`.
+    whiteboard : (rows, columns, 3), optional
+        Image of the whiteboard stage; a press differs from it. Without it, contact is not checked.
+    """
+    circle = Overlay(lines=() if table is None else (working_circle(table),))
+
+    def detect() -> Detection:
+        refuse_grey(rgb)
+        found = check_bare_membrane(rgb, table=table, whiteboard=whiteboard)
+        compared = whiteboard is not None and whiteboard.shape == rgb.shape
+        good = tr("The membrane is well lit and nothing touches it.")
+        if not compared:
+            good = tr(
+                "The membrane is well lit. Contact can be checked once the whiteboard has been "
+                "captured."
+            )
+        marks = Overlay(
+            lines=circle.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
+        )
+        result = judged(marks, found.quality.figures, good)
+        return result if compared else replace(result, warns=True)
+
+    return or_refusal(detect, marks=circle)
+
+
+class BackgroundStep(ImageStep):
+    """Checks that the membrane is well lit and untouched."""
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "background",
+            tr("Background"),
+            (Stage.BACKGROUND,),
+            tr(
+                "Mount the membrane. Nothing must touch it. Do not change the exposure or the "
+                "light."
+            ),
+            "membrane",
+            frames=16,
+            wanted=1,
+        )
+
+    def detector(self, name: str) -> Detector:
+        """Return the check of the bare membrane."""
+        project = self.model.project
+        known = KnownImage(project.session.found(FOLDERS[Stage.RADIANCE]))
+        return partial(_check, table=project.results.table, known=known)
+
+    def result_panels(self) -> tuple[Panel, ...]:
+        """Return the reflectance factor of each LED."""
+        results = self.model.project.results
+        found, table = results.factors, results.table
+        if found is None or table is None:
+            return ()
+        return three_maps(found.factors, found.usable, table.grid, tr("Reflectance factor"))
+
+
+def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detection:
+    return or_refusal(lambda: detect_background(rgb, table=table, whiteboard=known.rgb))
+
+
+class ClosedBackgroundStep(ImageStep):
+    """Checks that the membrane is well lit."""
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "background",
+            tr("Background"),
+            (Stage.BACKGROUND,),
+            tr(
+                "Nothing must touch the membrane. Switch automatic exposure and white balance "
+                "off, and do not change the exposure or the light afterwards."
+            ),
+            "membrane",
+            frames=16,
+            wanted=1,
+        )
+
+    def detector(self, name: str) -> Detector:
+        """Return the check of the light; without other images contact cannot be seen."""
+        return _check_light
+
+
+def _check_light(rgb: Rgb) -> Detection:
+    found = detect_background(rgb)
+    if not found.ready or QualityTable(found.figures).verdict is not Verdict.PASS:
+        return found
+    text = tr("The membrane is well lit. Make sure nothing touches it, then click Capture.")
+    return replace(found, sentence=text, warns=True)  # contact cannot be seen

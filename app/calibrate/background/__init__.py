@@ -1,1 +1,0 @@
-"""The step `background` of the wizard."""

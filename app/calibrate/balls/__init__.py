@@ -1,1 +1,0 @@
-"""The step `balls` of the wizard."""

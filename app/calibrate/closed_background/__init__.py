@@ -1,1 +1,0 @@
-"""The background step of a closed sensor."""

@@ -1,0 +1,347 @@
+"""The step of the ball presses on a closed sensor, with the benefit of one more press."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from app.calibrate.balls import BallsStep
+from app.calibrate.detection import (
+    Detection,
+    Detector,
+    or_refusal,
+    read_raw,
+    sentence_of,
+    too_early,
+)
+from app.calibrate.image_step import WAITING, Judgement
+from app.calibrate.maps import Panel
+from app.calibrate.states import is_done
+from app.calibrate.step_data import Step
+from app.live.image_checks import Rgb
+from app.live.overlay import Circle, Marker, Overlay
+from app.view2d.map_view import extent_of
+from gelpolight_core.calibration.in_place_session import (
+    ENOUGH_BALLS,
+    SETTLED,
+    InPlaceRun,
+    expected_gain,
+)
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.status import StageState
+from gelpolight_core.errors import InputError
+from gelpolight_core.image.linear import linear_image
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.in_place.calibrate import LEAST_PRESSES
+from gelpolight_core.in_place.press import find_contact
+from gelpolight_core.quality import QualityTable
+from gelpolight_core.reconstruction.in_place.change import Reference, reference
+from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
+from gelpolight_core.translation import tr
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Untouched:
+    """The background, read and prepared when it is first needed, in the processing thread.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    mm_per_px : float
+        Scale of the images.
+    response : CameraResponse or None
+        Response of the camera.
+    """
+
+    path: Path
+    mm_per_px: float
+    response: CameraResponse | None
+
+    @cached_property
+    def grid(self) -> WorkingGrid:
+        """The grid on which images are compared."""
+        rows, columns = self._image.shape[:2]
+        return WorkingGrid(ImageSize(columns, rows), self.mm_per_px)
+
+    @cached_property
+    def base(self) -> Reference:
+        """The background on the grid, with its printed markers."""
+        return reference(
+            self.grid.reduce(linear_image(self._image, "", response=self.response).rgb)
+        )
+
+    @cached_property
+    def _image(self) -> Rgb:
+        return read_raw(self.path)
+
+
+def detect_closed_ball(
+    rgb: Rgb,
+    untouched: Untouched,
+    *,
+    radius_mm: float,
+    earlier_px: Sequence[Point] = (),
+    next_px: Point | None = None,
+) -> Detection:
+    """Find a pressed ball.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    untouched : Untouched
+        The background.
+    radius_mm : float
+        Radius of the ball.
+    earlier_px : sequence of (u, v)
+        Centres of the presses captured before.
+    next_px : (u, v), optional
+        Where the next press helps most.
+    """
+    marks = Overlay(markers=tuple(Marker(*at, "dot", "info") for at in earlier_px))
+    if next_px is not None:
+        ring = Marker(*next_px, "ring", "expected", text=tr("next press"))
+        marks = replace(marks, markers=(*marks.markers, ring))
+
+    def detect() -> Detection:
+        grid = untouched.grid
+        _refuse_size(rgb, grid.image)
+        seen = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
+        radius = radius_mm / grid.pitch_mm
+        found, _ = find_contact(seen, untouched.base, ball_radius=radius, name=tr("Image"))
+        size = grid.factor
+        u, v = (size * c + 0.5 * (size - 1) for c in (found.x, found.y))
+        contact = Circle(u, v, size * found.radius, "good")
+        text = tr("Ball found: contact radius {c:.2f} mm.")
+        return Detection(
+            replace(marks, circles=(contact,)),
+            text.format(c=found.radius * grid.pitch_mm),
+            True,
+        )
+
+    return or_refusal(detect, marks=marks)
+
+
+def _refuse_size(rgb: Rgb, size: ImageSize) -> None:
+    if (rgb.shape[1], rgb.shape[0]) != (size.width, size.height):
+        raise InputError(
+            tr("The image has {a} x {b} pixels, but the background has {c} x {d}").format(
+                a=rgb.shape[1], b=rgb.shape[0], c=size.width, d=size.height
+            ),
+            where=tr("Image"),
+            advice=tr("Set the camera to the image size of the background"),
+        )
+
+
+def to_px(x_mm: float, y_mm: float, grid: WorkingGrid) -> Point:
+    """Return the camera pixel of a place on the membrane."""
+    image, scale = grid.image, grid.mm_per_px
+    u, v = x_mm / scale + 0.5 * (image.width - 1), y_mm / scale + 0.5 * (image.height - 1)
+    return float(np.clip(u, 0, image.width - 1)), float(np.clip(v, 0, image.height - 1))
+
+
+GOOD_DEG, FAIR_DEG = 4.0, 8.0
+"""Residuals of a press up to which its mark is green, and yellow."""
+COLOURS = ((60, 200, 90), (240, 190, 50), (230, 70, 60))
+SHOWN_PX = 640
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Accuracy of an in-place calibration, and whether more presses help.
+
+    Attributes
+    ----------
+    error_deg : float
+        Mean error of the normals of presses that were left out.
+    gain : float or None
+        Relative decrease of the error by one more press; None with too few presses.
+    curve : tuple of (int, float)
+        Numbers of presses, and the typical errors with them, degrees.
+    next_px : (u, v) or None
+        Where the next press helps most; None if more presses do not help.
+    """
+
+    error_deg: float
+    gain: float | None
+    curve: tuple[tuple[int, float], ...]
+    next_px: tuple[float, float] | None
+
+    @property
+    def settled(self) -> bool:
+        """Whether more presses do not help."""
+        return self.gain is not None and self.gain < SETTLED
+
+    def sentence(self) -> str:
+        """Return the state and what to do next."""
+        text = tr("Expected error of the normals: {e:.1f} degrees.").format(e=self.error_deg)
+        if self.curve:
+            text += " " + tr("With {counts} presses it was about {errors}.").format(
+                counts=", ".join(str(n) for n, _ in self.curve),
+                errors=", ".join(f"{e:.1f}" for _, e in self.curve),
+            )
+        if self.gain is None:
+            return text + " " + tr("Press more balls. The next one helps most at the ring.")
+        if self.settled:
+            return text + " " + tr("More presses do not help. Go to the next step.")
+        more = tr("One more press lowers the error by about {g:.0f} %, most at the ring.")
+        return text + " " + more.format(g=100.0 * self.gain)
+
+
+def progress_of(run: InPlaceRun) -> Progress:
+    """Return the progress of an in-place calibration."""
+    result, gain = run.result, expected_gain(run.result)
+    errors = [press.held_out.normal_deg for press in result.presses]
+    settled = gain is not None and gain < SETTLED
+    return Progress(
+        float(np.mean(errors)),
+        gain,
+        tuple((n, math.degrees(math.atan(error))) for n, error in result.learning),
+        None if settled else to_px(*result.next_position_mm, result.model.grid),
+    )
+
+
+def residual_panel(run: InPlaceRun) -> Panel:
+    """Return the presses on the background, coloured by their residuals."""
+    grid, progress = run.result.model.grid, progress_of(run)
+    background = run.result.model.background
+    rgb = (255.0 * np.clip(background / max(float(background.max()), 1e-6), 0, 1)).astype(np.uint8)
+    scale = max(1, round(SHOWN_PX / rgb.shape[1]))
+    rgb = cv2.resize(rgb // 2, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR)
+    for press in run.result.presses:
+        at = round(scale * press.ball.x), round(scale * press.ball.y)
+        error = press.held_out.normal_deg
+        colour = COLOURS[(error > GOOD_DEG) + (error > FAIR_DEG)]
+        cv2.circle(rgb, at, round(scale * press.ball.contact), colour, 2, cv2.LINE_AA)
+        _write(rgb, f"{error:.1f}", at, colour)
+    if progress.next_px is not None:
+        u, v = (scale * c / grid.factor for c in progress.next_px)
+        cv2.circle(rgb, (round(u), round(v)), 12, (255, 255, 255), 2, cv2.LINE_AA)
+        _write(rgb, tr("next"), (round(u), round(v) + 26), (255, 255, 255))
+    return Panel(
+        tr("Presses and their residual"),
+        np.ascontiguousarray(rgb),
+        extent_of(grid),
+        caption=tr("Mean error of the normals of each press, in degrees, found without that press"),
+    )
+
+
+def _write(rgb: np.ndarray, text: str, at: tuple[int, int], colour: tuple[int, ...]) -> None:
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    (width, height), _ = cv2.getTextSize(text, font, 0.45, 1)
+    corner = at[0] - width // 2, at[1] + height // 2
+    cv2.putText(rgb, text, corner, font, 0.45, colour, 1, cv2.LINE_AA)
+
+
+USUAL_MM_PER_PX = 0.06
+ASKED = ("next_ball_gain_percent", "balls_used")
+"""Figures whose advice is in the sentence about the next press."""
+
+
+class ClosedBallsStep(BallsStep):
+    """Asks for presses until more do not help."""
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "balls",
+            tr("Ball presses"),
+            (Stage.BALLS,),
+            tr(
+                "Press a ball of known diameter into the membrane, at a different place for each "
+                "image. Its slopes must be as steep as what you want to measure. The ring in the "
+                "image shows where the next press helps most."
+            ),
+            "ball",
+            frames=4,
+            wanted=ENOUGH_BALLS,
+            least=LEAST_PRESSES,
+        )
+
+    def detector(self, name: str) -> Detector:
+        """Return the detection of a pressed ball beside the background."""
+        session = self.model.project.session
+        files = session.found(FOLDERS[Stage.BACKGROUND])
+        if not files:
+            return too_early
+        run = self._run()
+        scale = session.mm_per_px or (run and run.result.model.grid.mm_per_px) or USUAL_MM_PER_PX
+        detect = partial(
+            detect_closed_ball,
+            untouched=Untouched(files[-1], scale, session.response),
+            radius_mm=self.radius.radius_mm,
+        )
+        if name or run is None:
+            return detect
+        grid = run.result.model.grid
+        earlier = [to_px(x, y, grid) for _name, x, y, _c, _r in run.calibration.balls]
+        return partial(detect, earlier_px=earlier, next_px=progress_of(run).next_px)
+
+    def _run(self) -> InPlaceRun | None:
+        """Return the calibration of the present presses."""
+        state = self.model.statuses[Stage.BALLS].state
+        stale = state in (StageState.EMPTY, StageState.WAITING, StageState.FAIL)
+        return None if stale else self.model.project.results.run
+
+    @property
+    def progress(self) -> Progress | None:
+        """Accuracy from the present presses; None without an up-to-date calibration."""
+        run = self._run()
+        present = self.model.statuses[Stage.BALLS].state is not StageState.STALE
+        return progress_of(run) if run is not None and present else None
+
+    def judge(self, path: Path) -> Judgement:
+        """Return how well the other presses explain a press."""
+        run = self._run()
+        if run is None:
+            return WAITING
+        fault = run.result.refused.get(path.name)
+        if fault is not None:
+            return Judgement("fail", sentence_of(fault), tr("not used"))
+        for press in run.result.presses:
+            if press.name == path.name:
+                error = press.held_out.normal_deg
+                text = tr("Without this press, its normals are found with an error of {e:.1f} deg.")
+                note = tr("{e:.1f} deg").format(e=error)
+                return Judgement("pass", text.format(e=error), note, error)
+        return WAITING
+
+    @property
+    def residual_heading(self) -> str:
+        """The error of the normals of a press that the others predict."""
+        return tr("Normal error, deg")
+
+    def is_finished(self, state: str) -> bool:
+        """Return whether more presses do not help."""
+        progress = self.progress
+        return is_done(state) and progress is not None and progress.settled
+
+    def show_state(self, state: str, sentence: str) -> None:
+        """Show the state, and the benefit of one more press."""
+        progress = self.progress
+        if progress is not None:
+            figures = self.model.statuses[Stage.BALLS].quality.figures
+            others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).advice
+            sentence = " ".join((progress.sentence(), *(f"{advice}." for advice in others)))
+        super().show_state(state, sentence)
+
+    def result_panels(self) -> tuple[Panel, ...]:
+        """Return the presses with their residuals."""
+        run = self._run()
+        return () if run is None else (residual_panel(run),)
+
+    def depends_on(self) -> tuple[Any, ...]:
+        """Return the radius and the background."""
+        found = self.model.project.session.found(FOLDERS[Stage.BACKGROUND])
+        return (*super().depends_on(), found)

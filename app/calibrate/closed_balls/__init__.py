@@ -1,1 +1,0 @@
-"""The step of the ball presses on a closed sensor."""

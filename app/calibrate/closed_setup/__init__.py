@@ -1,1 +1,0 @@
-"""The set-up step of a closed sensor."""

@@ -1,1 +1,0 @@
-"""The validation step of a closed sensor."""

@@ -1,1 +1,0 @@
-"""The step `lens` of the wizard."""

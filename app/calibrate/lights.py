@@ -1,0 +1,136 @@
+"""The lights step: glints of the LEDs in a mirror on the top surface."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.calibrate.detection import Detection, Detector, as_image, judged, or_refusal
+from app.calibrate.image_step import ImageStep
+from app.calibrate.marks import LED_ROLES, mirror_positions_px, spot_markers, spot_mask
+from app.calibrate.step_data import Step
+from app.live.image_checks import Rgb
+from app.live.overlay import Marker, Overlay
+from app.services.jobs import Job
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
+from gelpolight_core.quality import judge
+from gelpolight_core.session.decisions import Point
+from gelpolight_core.session.session import Session
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+# A spot this far from its expected position cannot be explained by mounting tolerances.
+LED_OFF_OF_WIDTH = 0.05
+
+
+def detect_mirror(
+    rgb: Rgb, *, expected_px: Array | None = None, editable: bool = False
+) -> Detection:
+    """Find the reflections of the LEDs.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    expected_px : (3, 2), optional
+        Expected positions of the spots, from :func:`app.calibrate.marks.mirror_positions_px`.
+    editable : bool, optional
+        Whether the spots can be dragged; their handles are mirror.0, mirror.1 and mirror.2.
+    """
+    positions = () if expected_px is None else tuple(expected_px)
+    expected = tuple(
+        Marker(float(u), float(v), "ring", "expected", text=tr("expected")) for u, v in positions
+    )
+
+    def detect() -> Detection:
+        spots = find_mirror_spots(as_image(rgb))
+        marks = Overlay(
+            markers=(*expected, *spot_markers(spots, editable=editable)),
+            masks=tuple(
+                spot_mask(rgb, spot, role)
+                for spot, role in zip(spots.spots, LED_ROLES, strict=True)
+            ),
+        )
+        figures = spots.quality.figures
+        if expected_px is not None:
+            off = float(np.linalg.norm(spots.centres_px - expected_px, axis=1).max())
+            figures += (
+                judge("spot_off_px", tr("Largest spot offset"), off, "px",
+                      warn=LED_OFF_OF_WIDTH * rgb.shape[1],
+                      advice=tr("Check the channel of each LED, and that the mirror is flat")),
+            )  # fmt: skip
+        return judged(marks, figures, tr("All three LED reflections were found."), spots)
+
+    return or_refusal(detect, marks=Overlay(markers=expected))
+
+
+def placed_spots(rgb: Rgb, session: Session) -> Detection:
+    """Show the manually placed spots as handles that can be moved again."""
+
+    def detect() -> Detection:
+        spots = find_mirror_spots(as_image(rgb), placed=session.decisions.spots_px)
+        marks = Overlay(markers=spot_markers(spots, editable=True))
+        return judged(marks, spots.quality.figures, tr("The spots were placed by hand."), spots)
+
+    return or_refusal(detect)
+
+
+HANDLE = "mirror."
+
+
+class LightsStep(ImageStep):
+    """Finds the spots; the user can drag each to its place."""
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        return Step(
+            "lights",
+            tr("Lights"),
+            (Stage.LIGHTS,),
+            tr(
+                "Replace the board with the mirror. Switch all three LEDs on and darken the room. "
+                "Shorten the exposure until the three spots are small and not saturated."
+            ),
+            "mirror",
+            frames=16,
+            wanted=1,
+        )
+
+    def detector(self, name: str) -> Detector:
+        """Return the detection of the spots, with their positions in an earlier mirror image."""
+        session, results = self.model.project.session, self.model.project.results
+        if name and session.decisions.spots_px:
+            return partial(placed_spots, session=session)
+        expected = None
+        if results.lens and results.top_pose and results.lights:
+            expected = mirror_positions_px(
+                results.lens.camera, results.top_pose.plane, results.lights.led_positions_mm
+            )
+        return partial(detect_mirror, expected_px=expected, editable=bool(name))
+
+    def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
+        """Move an LED's spot to the spot at this point, or to the point itself."""
+        if not self.model.shown:
+            return
+        led, path = int(handle.removeprefix(HANDLE)), self._path(self.model.shown)
+        session = self.model.project.session
+        self.model.short_jobs.submit(
+            Job(
+                tr("Analysing the image"),
+                lambda _progress: spot_near(session.image(path), (u, v)),
+                lambda near: self.place_spot(led, near or (u, v)),
+            )
+        )
+
+    def place_spot(self, led: int, position: Point | None) -> None:
+        """Set the position of an LED's mirror spot by hand; can be undone."""
+        project = self.model.project
+        act = partial(project.place_spot, led)
+        before = project.session.decisions.spots_px.get(led)
+        text = tr("Move the mirror spot")
+        self.model.correct(text, partial(act, position), partial(act, before), Stage.LIGHTS)

@@ -1,1 +1,0 @@
-"""The step `lights` of the wizard."""

@@ -1,1 +1,0 @@
-"""The step `radiance` of the wizard."""

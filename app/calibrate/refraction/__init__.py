@@ -1,1 +1,0 @@
-"""The step `refraction` of the wizard."""

@@ -1,1 +1,0 @@
-"""The step `result` of the wizard."""

@@ -1,1 +1,0 @@
-"""The step `setup` of the wizard."""

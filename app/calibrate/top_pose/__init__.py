@@ -1,1 +1,0 @@
-"""The step `top_pose` of the wizard."""

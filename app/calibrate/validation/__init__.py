@@ -1,1 +1,0 @@
-"""The step `validation` of the wizard."""
