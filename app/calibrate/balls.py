@@ -11,7 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.calibrate.detection import (
     Detection,
@@ -29,6 +29,7 @@ from app.calibrate.step_data import Step
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
+from app.widgets.boxes import hbox
 from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
@@ -206,8 +207,6 @@ class RadiusRow(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
         self.box = named(
             DoubleSpinBox(),
             "calibrate.radius",
@@ -218,8 +217,7 @@ class RadiusRow(QWidget):
         self.box.setDecimals(3)
         self.box.setSuffix(tr(" mm"))
         self.box.setKeyboardTracking(False)
-        row.addWidget(PlainLabel(tr("Ball diameter")))
-        row.addWidget(self.box, 1)
+        hbox(PlainLabel(tr("Ball diameter")), (self.box, 1), parent=self, margins=0)
 
     @property
     def radius_mm(self) -> float:

@@ -8,7 +8,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QGroupBox,
-    QHBoxLayout,
     QLineEdit,
     QPushButton,
     QScrollArea,
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.widgets.boxes import hbox
 from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
@@ -51,15 +51,12 @@ class FormPage(QScrollArea):
         self.setWidgetResizable(True)
         inside = QWidget()
         self.setWidget(inside)
-        middle = QHBoxLayout(inside)
         column = QVBoxLayout()
-        middle.addStretch(1)
         holder = QWidget()
         holder.setLayout(column)
         holder.setMaximumWidth(FORM_WIDTH)
         holder.setMinimumWidth(LEAST_WIDTH)
-        middle.addWidget(holder)
-        middle.addStretch(1)
+        hbox(1, holder, 1, parent=inside)
         self._title, self._task = PlainLabel(title), PlainLabel(task)
         make_bold(self._title, size=1.35)
         self._task.setWordWrap(True)
@@ -129,7 +126,6 @@ class FormPage(QScrollArea):
 
     def _build_camera(self) -> QGroupBox:
         box = QGroupBox(tr("Camera"))
-        row = QHBoxLayout(box)
         self.camera = named(PlainLabel(), "setup.camera", tr("Camera state"))
         self.camera.setWordWrap(True)
         self.camera_settings = named(
@@ -139,8 +135,7 @@ class FormPage(QScrollArea):
             tr("Format, exposure, gain, white balance, focus, and a test of the image stability"),
         )
         self.camera_settings.clicked.connect(self.camera_wanted)
-        row.addWidget(self.camera, 1)
-        row.addWidget(self.camera_settings)
+        row = hbox((self.camera, 1), self.camera_settings, parent=box)
         self._camera_row = row
         self.show_camera(tr("No camera is selected."), "", settable=False)
         return box

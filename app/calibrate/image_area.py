@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
-    QHBoxLayout,
     QPushButton,
     QSizePolicy,
     QTabWidget,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -18,6 +16,7 @@ from app.calibrate.maps import MapsView, Panel
 from app.live.image_checks import Rgb
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
@@ -59,18 +58,11 @@ class ImageArea(QWidget):
         )
         self.back_to_live.clicked.connect(self.live_wanted)
         self.tabs.setCornerWidget(self.back_to_live)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addWidget(self._build_lost())
-        column.addWidget(self.tabs, 1)
-        column.addWidget(self.strip)
+        vbox(self._build_lost(), (self.tabs, 1), self.strip, parent=self, margins=0, spacing=2)
         self.show_capture_name("")
 
     def _build_lost(self) -> QWidget:
         self.lost = named(QWidget(), "calibrate.lost", tr("The camera is lost"))
-        row = QHBoxLayout(self.lost)
-        row.setContentsMargins(8, 4, 8, 4)
         self.why = named(PlainLabel(), "calibrate.lost.why", tr("Why no image arrives"))
         self.why.setWordWrap(True)
         show_meaning(self.why, "fail")
@@ -80,8 +72,7 @@ class ImageArea(QWidget):
             QPushButton(tr("Re&connect")), "calibrate.reconnect", tr("Open the camera again")
         )
         again.clicked.connect(self.reconnect_wanted)
-        row.addWidget(self.why, 1)
-        row.addWidget(again)
+        hbox((self.why, 1), again, parent=self.lost, margins=(8, 4, 8, 4))
         self.lost.hide()
         return self.lost
 

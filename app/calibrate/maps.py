@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from app.view2d import shading
 from app.view2d.display import SURROUND, Display, colour_table
 from app.view2d.map_image import map_image
 from app.view2d.map_view import Extent, Grid, MapView, extent_of
+from app.widgets.boxes import vbox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
@@ -172,17 +173,13 @@ class _PanelView(QWidget):
 
     def __init__(self, name: str) -> None:
         super().__init__()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(4, 4, 4, 4)
         self._title, self._caption = PlainLabel(), PlainLabel()
         self._map = MapView(name, tr("Result"))
         make_bold(self._title)
         for label in (self._title, self._caption):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
             label.setWordWrap(True)
-        column.addWidget(self._title)
-        column.addWidget(self._map, 1)
-        column.addWidget(self._caption)
+        vbox(self._title, (self._map, 1), self._caption, parent=self, margins=4)
 
     def show_panel(self, panel: Panel) -> None:
         self._title.setText(panel.title)

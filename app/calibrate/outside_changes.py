@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from app.calibrate.model import WizardModel
+from app.widgets.boxes import hbox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
@@ -48,11 +49,7 @@ class OutsideBar(QWidget):
         )
         self.reload.clicked.connect(self._reload)
         self.overwrite.clicked.connect(self._overwrite)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(8, 4, 8, 4)
-        row.addWidget(self.sentence, 1)
-        row.addWidget(self.reload)
-        row.addWidget(self.overwrite)
+        hbox((self.sentence, 1), self.reload, self.overwrite, parent=self, margins=(8, 4, 8, 4))
         self._timer = QTimer(self)
         self._timer.setInterval(CHECK_MS)
         self._timer.timeout.connect(self.check)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
 
 from app.calibrate.closed_form import ClosedForm, new_closed_session
 from app.calibrate.closed_offer import closed_offer, copy_images
@@ -18,6 +18,7 @@ from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
+from app.widgets.boxes import vbox
 from app.widgets.naming import named
 from app.widgets.question import ask
 from app.workspace.sessions import unfinished
@@ -46,10 +47,8 @@ class CalibratePage(QWidget):
         self.context = context
         self.wizard: Wizard | None = None
         self._shown = False
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
         self._stack = QStackedWidget()
-        column.addWidget(self._stack)
+        vbox(self._stack, parent=self, margins=0)
         self.start = StartView()
         self.question = QuestionView()
         self.form, self.closed_form = SetupForm(), ClosedForm()

@@ -25,6 +25,7 @@ from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from app.context.context import AppContext
 from app.services.jobs import Job
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
@@ -61,11 +62,9 @@ class ResultView(QWidget):
         named(self, "result", tr("Calibration"))
         self._rows: dict[Stage, _StageRow] = {}
         self._name = ""
-        column = QVBoxLayout(self)
         self.headline = named(PlainLabel(), "result.headline", tr("Verdict"))
         self.headline.setWordWrap(True)
         make_bold(self.headline, size=1.2)
-        column.addWidget(self.headline)
         scroll = named(QScrollArea(), "result.scroll", tr("All stages"))
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
@@ -79,7 +78,6 @@ class ResultView(QWidget):
                     rows.addWidget(self._rows[stage])
         rows.addStretch(1)
         scroll.setWidget(inside)
-        column.addWidget(scroll, 1)
         buttons = QHBoxLayout()
         self.save = named(
             QPushButton(tr("&Save the calibration")), "result.save", tr("Save the calibration")
@@ -91,10 +89,9 @@ class ResultView(QWidget):
             button.setMinimumHeight(38)
             button.clicked.connect(signal)
             buttons.addWidget(button)
-        column.addLayout(buttons)
         self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        column.addWidget(self.saved)
+        vbox(self.headline, (scroll, 1), buttons, self.saved, parent=self)
 
     def show_saved(self, sentence: str, role: str = "pass") -> None:
         """Show where the calibration or its report was saved, or why it was not."""
@@ -199,9 +196,6 @@ class _StageRow(QWidget):
     def __init__(self, step: Step) -> None:
         super().__init__()
         self.step = step
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 2, 0, 2)
-        row = QHBoxLayout()
         self._sign, self._word, self._sentence = Sign(), PlainLabel(), PlainLabel()
         self._sentence.setWordWrap(True)
         self._word.setMinimumWidth(96)
@@ -222,18 +216,13 @@ class _StageRow(QWidget):
         title.setMinimumWidth(130)
         title.setStyleSheet("text-align: left;")
         title.clicked.connect(lambda: self.step_wanted.emit(step.key))
-        row.addWidget(self._sign)
-        row.addWidget(title)
-        row.addWidget(self._word, 1)
-        row.addWidget(self.more)
-        column.addLayout(row)
-        column.addWidget(self._sentence)
+        row = hbox(self._sign, title, (self._word, 1), self.more)
         self.table = QualityTableWidget(
             f"result.{step.key}.quality", tr("Figures of {title}").format(title=step.title)
         )
         self.table.hide()
         self.more.toggled.connect(self.table.setVisible)
-        column.addWidget(self.table)
+        vbox(row, self._sentence, self.table, parent=self, margins=(0, 2, 0, 2))
 
     def show_state(self, state: str, sentence: str, quality: QualityTable) -> None:
         self._sign.show_icon(state_icon(state))

@@ -9,7 +9,6 @@ from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QFrame,
-    QHBoxLayout,
     QProgressBar,
     QPushButton,
     QScrollArea,
@@ -24,6 +23,7 @@ from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.residual_table import ResidualTable
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.step_data import Step
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
@@ -79,11 +79,7 @@ class StepPanel(QWidget):
         self.setFixedWidth(WIDTH)
         self.finished = False
         self._step: Step | None = None
-        outer = QVBoxLayout(self)
-        outer.setContentsMargins(0, 0, 0, 0)
-        outer.setSpacing(0)
         self._scroll, inside = side_scroll("calibrate.panel.scroll", tr("This step"))
-        outer.addWidget(self._scroll, 1)
         self._column = QVBoxLayout(inside)
         self._column.setContentsMargins(12, 10, 12, 6)
         self._column.setSpacing(8)
@@ -91,7 +87,7 @@ class StepPanel(QWidget):
         self._build_capture()
         self._build_state()
         self._column.addStretch(1)
-        outer.addLayout(self._build_foot())
+        vbox((self._scroll, 1), self._build_foot(), parent=self, margins=0, spacing=0)
 
     def _build_head(self) -> None:
         self.title = named(PlainLabel(), "calibrate.title", tr("Step"))
@@ -100,9 +96,7 @@ class StepPanel(QWidget):
         self.assembly = AssemblyDrawing()
         self.help = help_button("calibrate.help")
         self.help.clicked.connect(self.help_wanted)
-        head = QHBoxLayout()
-        head.addWidget(self.title, 1)
-        head.addWidget(self.help)
+        head = hbox((self.title, 1), self.help)
         self._column.addLayout(head)
         for widget in (self.assembly, self.task):
             self._column.addWidget(widget)
@@ -133,29 +127,28 @@ class StepPanel(QWidget):
             QPushButton(tr("&Import…")), "calibrate.import", tr("Import image files")
         )
         self.import_files.clicked.connect(self.import_wanted)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.capture, 2)
-        buttons.addWidget(self.import_files, 1)
+        buttons = hbox((self.capture, 2), (self.import_files, 1))
         self.capturing = QWidget()
         self.lay = lay_button("calibrate.lay")
         self.lay.clicked.connect(self.lay_wanted)
-        column = QVBoxLayout(self.capturing)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.lay)
-        column.addWidget(self.live)
         self._extra = QVBoxLayout()
-        column.addLayout(self._extra)
-        column.addLayout(buttons)
-        column.addWidget(self.automatic)
         self.notice = named(
             _wrapped(lines=NOTICE_LINES), "calibrate.notice", tr("Result of the last action")
         )
         self.notice.setAlignment(Qt.AlignmentFlag.AlignTop)
-        column.addWidget(self.notice)
+        vbox(
+            self.lay,
+            self.live,
+            self._extra,
+            buttons,
+            self.automatic,
+            self.notice,
+            parent=self.capturing,
+            margins=0,
+        )
         self._column.addWidget(self.capturing)
 
     def _build_state(self) -> None:
-        row = QHBoxLayout()
         self._sign = Sign()
         self._word = named(PlainLabel(), "calibrate.state", tr("State of the step"))
         make_bold(self._word)
@@ -166,9 +159,7 @@ class StepPanel(QWidget):
             tr("Compute this step again from the stored captures"),
         )
         self.recompute.clicked.connect(self.recompute_wanted)
-        row.addWidget(self._sign)
-        row.addWidget(self._word, 1)
-        row.addWidget(self.recompute)
+        row = hbox(self._sign, (self._word, 1), self.recompute)
         self.sentence = named(_wrapped(), "calibrate.sentence", tr("Message about the step"))
         self.quality = QualityTableWidget(
             "calibrate.quality", tr("Quality figures of this step"), narrow=True
@@ -180,10 +171,6 @@ class StepPanel(QWidget):
         self._column.addWidget(self.residuals)
 
     def _build_foot(self) -> QVBoxLayout:
-        foot = QVBoxLayout()
-        foot.setContentsMargins(12, 4, 12, 10)
-        foot.setSpacing(6)
-        row = QHBoxLayout()
         self.progress = named(QProgressBar(), "calibrate.progress", tr("Progress"))
         self.progress.setRange(0, 100)
         self.progress.setTextVisible(True)
@@ -195,13 +182,11 @@ class StepPanel(QWidget):
         keep.setRetainSizeWhenHidden(True)
         self.cancel.setSizePolicy(keep)
         self.cancel.clicked.connect(self.cancel_wanted)
-        row.addWidget(self.progress, 1)
-        row.addWidget(self.cancel)
-        foot.addLayout(row)
+        row = hbox((self.progress, 1), self.cancel)
         self.next = named(QPushButton(tr("&Next step")), "calibrate.next", tr("Next step"))
         self.next.setMinimumHeight(38)
         self.next.clicked.connect(self.next_wanted)
-        foot.addWidget(self.next)
+        foot = vbox(row, self.next, margins=(12, 4, 12, 10), spacing=6)
         self.show_work("", 0.0)
         return foot
 

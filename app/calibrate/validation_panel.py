@@ -7,10 +7,8 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
     QFormLayout,
-    QHBoxLayout,
     QProgressBar,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -18,6 +16,7 @@ from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.step_data import Step
 from app.calibrate.step_panel import WIDTH, help_button, lay_button, side_scroll
 from app.calibrate.trial import KnownObject, Trial
+from app.widgets.boxes import hbox, vbox
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.meaning import make_bold, show_meaning
@@ -56,20 +55,13 @@ class ValidationPanel(QWidget):
         named(self, "validation", tr("Validation"))
         self.setFixedWidth(WIDTH)
         self._has_calibration = self._has_camera = False
-        outer = QVBoxLayout(self)
-        outer.setContentsMargins(0, 0, 0, 0)
         scroll, inside = side_scroll("validation.scroll", tr("Validation"))
-        outer.addWidget(scroll)
-        column = QVBoxLayout(inside)
-        column.setContentsMargins(12, 10, 12, 10)
+        vbox(scroll, parent=self, margins=0)
         title = PlainLabel(step.title)
         make_bold(title, size=1.35)
         self.help = help_button("validation.help")
         self.help.clicked.connect(self.help_wanted)
-        head = QHBoxLayout()
-        head.addWidget(title, 1)
-        head.addWidget(self.help)
-        column.addLayout(head)
+        head = hbox((title, 1), self.help)
         assembly = AssemblyDrawing()
         assembly.show_assembly(step.assembly)
         task = PlainLabel(step.task)
@@ -78,12 +70,8 @@ class ValidationPanel(QWidget):
             PlainLabel(), "validation.calibration", tr("Calibration to validate")
         )
         self.calibration.setWordWrap(True)
-        for widget in (assembly, task, self.calibration):
-            column.addWidget(widget)
-        column.addLayout(self._build_form())
         self.lay = lay_button("validation.lay")
         self.lay.clicked.connect(self.lay_wanted)
-        column.addWidget(self.lay)
         self.measure = named(
             QPushButton(tr("&Measure the press")),
             "validation.measure",
@@ -98,23 +86,17 @@ class ValidationPanel(QWidget):
             tr("The true size is read from a truth.csv file in the same folder, if there is one"),
         )
         self.import_press.clicked.connect(self.import_wanted)
-        row = QHBoxLayout()
-        row.addWidget(self.measure, 2)
-        row.addWidget(self.import_press, 1)
-        column.addLayout(row)
+        row = hbox((self.measure, 2), (self.import_press, 1))
         self.blocked = named(PlainLabel(), "validation.blocked", tr("Why nothing can be measured"))
         self.blocked.setWordWrap(True)
-        column.addWidget(self.blocked)
         self.progress = named(QProgressBar(), "validation.progress", tr("Progress"))
         self.progress.setRange(0, 100)
         keep = self.progress.sizePolicy()
         keep.setRetainSizeWhenHidden(True)
         self.progress.setSizePolicy(keep)
         self.progress.hide()
-        column.addWidget(self.progress)
         self.result = named(MarkupLabel(), "validation.result", tr("Result"))
         self.result.setWordWrap(True)
-        column.addWidget(self.result)
         self.keep = named(
             QPushButton(tr("&Record this validation")),
             "validation.keep",
@@ -122,11 +104,9 @@ class ValidationPanel(QWidget):
         )
         self.keep.setMinimumHeight(34)
         self.keep.clicked.connect(self.keep_wanted)
-        column.addWidget(self.keep)
         self.verdict = named(PlainLabel(), "validation.verdict", tr("Validated or not"))
         self.verdict.setWordWrap(True)
         make_bold(self.verdict)
-        column.addWidget(self.verdict)
         self.use = named(
             QPushButton(tr("&Use it now")),
             "validation.use",
@@ -134,8 +114,24 @@ class ValidationPanel(QWidget):
             tr("Use this calibration on the Inspect and Measure pages"),
         )
         self.use.clicked.connect(self.use_wanted)
-        column.addWidget(self.use)
-        column.addStretch(1)
+        vbox(
+            head,
+            assembly,
+            task,
+            self.calibration,
+            self._build_form(),
+            self.lay,
+            row,
+            self.blocked,
+            self.progress,
+            self.result,
+            self.keep,
+            self.verdict,
+            self.use,
+            1,
+            parent=inside,
+            margins=(12, 10, 12, 10),
+        )
         self.show_trial(None)
 
     def _build_form(self) -> QFormLayout:

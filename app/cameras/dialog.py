@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
 
 from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
 from app.sources.camera.camera import Camera
+from app.widgets.boxes import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -38,9 +39,7 @@ class CameraDialog(QDialog):
         close = buttons.button(QDialogButtonBox.StandardButton.Close)
         named(close, "camera.close", tr("Close the camera settings"))
         buttons.rejected.connect(self.close)
-        column = QVBoxLayout(self)
-        column.addWidget(self.panel, 1)
-        column.addWidget(buttons)
+        vbox((self.panel, 1), buttons, parent=self)
         self.resize(WIDTH, HEIGHT)
 
     def showEvent(self, event: QShowEvent) -> None:

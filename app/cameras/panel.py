@@ -25,6 +25,7 @@ from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.steadiness import SteadinessTest
 from app.sources.source import Rgb, Setting
 from app.sources.stream import Stream
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
@@ -61,9 +62,7 @@ class CameraPanel(QWidget):
         self._tick.setInterval(UPDATE_MS)
         self._tick.timeout.connect(self._update)
         self.formats, self.controls = FormatRows(), ControlRows()
-        row = QHBoxLayout(self)
-        row.addWidget(self._build_settings(), 1)
-        row.addWidget(self._build_verdicts(), 1)
+        hbox((self._build_settings(), 1), (self._build_verdicts(), 1), parent=self)
         self.formats.chosen.connect(lambda chosen: manager.choose_format(camera, chosen))
         self.controls.changed.connect(lambda key, value: manager.set(camera, {key: value}))
         self.lock.clicked.connect(lambda: manager.lock(camera))
@@ -76,10 +75,7 @@ class CameraPanel(QWidget):
         QVBoxLayout(formats).addWidget(self.formats)
         QVBoxLayout(controls).addWidget(self.controls)
         inside = QWidget()
-        column = QVBoxLayout(inside)
-        column.addWidget(formats)
-        column.addWidget(controls)
-        column.addStretch(1)
+        vbox(formats, controls, 1, parent=inside)
         area = named(QScrollArea(), "camera.settings", tr("Format and settings"))
         area.setWidgetResizable(True)
         area.setFrameShape(QFrame.Shape.NoFrame)
@@ -137,12 +133,7 @@ class CameraPanel(QWidget):
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setWidget(tables)
         side = QWidget()
-        whole = QVBoxLayout(side)
-        whole.addWidget(self.image)
-        whole.addWidget(self.state)
-        whole.addLayout(buttons)
-        whole.addWidget(self.bar)
-        whole.addWidget(area, 1)
+        vbox(self.image, self.state, buttons, self.bar, (area, 1), parent=side)
         return side
 
     # Camera access

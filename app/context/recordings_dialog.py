@@ -11,14 +11,13 @@ from PySide6.QtGui import QImage, QPixmap
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
-    QHBoxLayout,
     QListWidget,
     QListWidgetItem,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
@@ -127,16 +126,9 @@ class RecordingsDialog(QDialog):
         other.clicked.connect(self.other_wanted)
         self.list.currentItemChanged.connect(self._show_chosen)
         self.list.itemDoubleClicked.connect(lambda _: self.play_chosen())
-        right = QVBoxLayout()
-        right.addWidget(self.image)
-        right.addWidget(self.text)
-        right.addStretch(1)
-        row = QHBoxLayout()
-        row.addWidget(self.list, 1)
-        row.addLayout(right)
-        column = QVBoxLayout(self)
-        column.addLayout(row, 1)
-        column.addWidget(buttons)
+        right = vbox(self.image, self.text, 1)
+        row = hbox((self.list, 1), right)
+        vbox((row, 1), buttons, parent=self)
         self.list.setCurrentRow(0)
         self.play_button.setEnabled(bool(recordings))
 

@@ -8,17 +8,16 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QDialogButtonBox,
-    QHBoxLayout,
     QHeaderView,
     QPushButton,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.measure.placing import INDENTERS, kind_label
 from app.theme.icons import icon
+from app.widgets.boxes import hbox, vbox
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
@@ -57,11 +56,7 @@ class IndentersDialog(QDialog):
         buttons = QDialogButtonBox(kinds.Save | kinds.Cancel)
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
-        row = QHBoxLayout()
-        row.addWidget(add)
-        row.addWidget(remove)
-        row.addStretch(1)
-        row.addWidget(buttons)
+        row = hbox(add, remove, 1, buttons)
         words = PlainLabel(
             tr(
                 "All lengths are in mm. Depth is the height of the indenter from its face to "
@@ -69,10 +64,7 @@ class IndentersDialog(QDialog):
             )
         )
         words.setWordWrap(True)
-        column = QVBoxLayout(self)
-        for widget in (words, self.table, self.problem):
-            column.addWidget(widget)
-        column.addLayout(row)
+        vbox(words, self.table, self.problem, row, parent=self)
         for indenter in indenters:
             self.add_row(indenter)
         self.table.setCurrentCell(0, NAME)

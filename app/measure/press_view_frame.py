@@ -6,13 +6,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QDockWidget,
-    QHBoxLayout,
     QMainWindow,
     QMenu,
     QSplitter,
     QToolBar,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -30,6 +28,7 @@ from app.measure.tool_map import ToolMap
 from app.measure.work import Work
 from app.services.jobs import Jobs
 from app.widgets.actions import make_action
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -89,22 +88,14 @@ class PressViewFrame(QMainWindow):
 
     def _build(self) -> None:
         middle = QWidget()
-        across = QHBoxLayout()
-        across.setSpacing(0)
         self._split = named(QSplitter(Qt.Orientation.Vertical), "measure.split", tr("Views"))
         self._split.addWidget(self.map)
         self._split.addWidget(self.details)
         self._split.setStretchFactor(0, 1)
         self._split.setCollapsible(0, False)
         self._split.setSizes(FIRST_SIZES)
-        across.addWidget(self._split, 1)
-        across.addWidget(self.panel)
-        column = QVBoxLayout(middle)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.banner)
-        column.addLayout(across, 1)
-        column.addWidget(self.replay)
+        across = hbox((self._split, 1), self.panel, spacing=0)
+        vbox(self.banner, (across, 1), self.replay, parent=middle, margins=0, spacing=0)
         self.setCentralWidget(middle)
         self._build_bar()
         self._bench = QDockWidget(tr("Virtual bench"), self)

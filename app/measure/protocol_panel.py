@@ -6,7 +6,6 @@ from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
-    QHBoxLayout,
     QHeaderView,
     QProgressBar,
     QPushButton,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.measure.press_check import object_name
 from app.theme import theme
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -62,9 +62,7 @@ class RunPanel(QWidget):
         super().__init__(parent)
         named(self, "protocol.panel", tr("Next press"))
         self.setFixedWidth(WIDTH)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(12, 10, 12, 10)
-        column.setSpacing(8)
+        column = vbox(parent=self, margins=(12, 10, 12, 10), spacing=8)
         self._build_task(column)
         self._build_buttons(column)
         self._build_progress(column)
@@ -122,9 +120,7 @@ class RunPanel(QWidget):
         )
         self.bench.toggled.connect(self.bench_wanted)
         column.addWidget(self.bare)
-        row = QHBoxLayout()
-        row.addWidget(self.capture)
-        row.addWidget(self.take_back)
+        row = hbox(self.capture, self.take_back)
         column.addLayout(row)
         column.addWidget(self.bench)
 
@@ -165,9 +161,7 @@ class RunPanel(QWidget):
             tr("Evaluate the presses so far"),
         )
         self.evaluate.clicked.connect(self.evaluate_wanted)
-        row = QHBoxLayout()
-        row.addWidget(self.leave)
-        row.addWidget(self.evaluate, 1)
+        row = hbox(self.leave, (self.evaluate, 1))
         column.addLayout(row)
 
     def show_press(self, press: PressWanted | None, repeats: int) -> None:

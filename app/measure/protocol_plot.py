@@ -8,9 +8,10 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from app.theme import theme
+from app.widgets.boxes import vbox
 from app.widgets.label import MarkupLabel
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
@@ -41,16 +42,12 @@ class Fig13(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         named(self, "protocol.figure", tr("Errors by size and height, as in the paper's Fig. 13"))
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
         head = QHBoxLayout()
         self.legend = named(MarkupLabel(), "protocol.legend", tr("Legend"))
         head.addWidget(self.legend, 1)
-        column.addLayout(head)
         self._grid = QGridLayout()
         self._grid.setSpacing(6)
-        column.addLayout(self._grid, 1)
+        vbox(head, (self._grid, 1), parent=self, margins=0, spacing=4)
         self._plots: list[pg.PlotWidget] = []
         self._evaluation: Evaluation | None = None
         self._repaint = QTimer(self, interval=1, singleShot=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.live.live_detection import LiveDetection
@@ -24,6 +24,7 @@ from app.measure.protocol_bench import BenchHand
 from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_work import ProtocolWork
 from app.sources.processor import Failure
+from app.widgets.boxes import hbox
 from app.widgets.naming import named
 from gelpolight_core.measurement.steadiness import judge_press
 from gelpolight_core.translation import tr
@@ -60,11 +61,7 @@ class PressingView(QWidget):
         self._detection = LiveDetection(self.live)
         self.image = LiveView()
         self.panel = RunPanel()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(0)
-        row.addWidget(self.image, 1)
-        row.addWidget(self.panel)
+        hbox((self.image, 1), self.panel, parent=self, margins=0, spacing=0)
         self._tick = QTimer(self)
         self._tick.setInterval(HAND_MS)
         self._tick.timeout.connect(self._move_hand)

@@ -17,13 +17,13 @@ from PySide6.QtWidgets import (
     QTableWidget,
     QTableWidgetItem,
     QTabWidget,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.context.context import AppContext
 from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -57,13 +57,8 @@ class ResultView(QWidget):
         self._work, self._context = work, context
         self._evaluation: Evaluation | None = None
         self._limits_percent = (0.0, 0.0)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(12, 10, 12, 10)
-        column.setSpacing(8)
-        column.addLayout(self._build_head())
         self.sentence = named(PlainLabel(), "protocol.sentence", tr("Results"))
         self.sentence.setWordWrap(True)
-        column.addWidget(self.sentence)
         self.figure = Fig13()
         self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
         split = QSplitter(Qt.Orientation.Vertical)
@@ -72,22 +67,27 @@ class ResultView(QWidget):
         split.setStretchFactor(0, 3)
         split.setStretchFactor(1, 2)
         split.setChildrenCollapsible(False)
-        column.addWidget(split, 1)
         self.progress = named(QProgressBar(), "protocol.result.progress", tr("Running work"))
         keep = self.progress.sizePolicy()
         keep.setRetainSizeWhenHidden(True)
         self.progress.setSizePolicy(keep)
-        column.addWidget(self.progress)
+        vbox(
+            self._build_head(),
+            self.sentence,
+            (split, 1),
+            self.progress,
+            parent=self,
+            margins=(12, 10, 12, 10),
+            spacing=8,
+        )
         self.show_work("", 0.0)
 
     def _build_head(self) -> QHBoxLayout:
-        row = QHBoxLayout()
         self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
         font = self.verdict.font()
         font.setPointSizeF(font.pointSizeF() * 1.45)
         font.setBold(True)
         self.verdict.setFont(font)
-        row.addWidget(self.verdict, 1)
         self.buttons = {
             name: named(QPushButton(text), f"protocol.{name}", tip)
             for name, text, tip in (
@@ -97,8 +97,7 @@ class ResultView(QWidget):
                 ("leave_result", tr("Lea&ve"), tr("Leave the run. Everything is saved")),
             )
         }
-        for button in self.buttons.values():
-            row.addWidget(button)
+        row = hbox((self.verdict, 1), *self.buttons.values())
         self.buttons["back"].clicked.connect(self.back_wanted)
         self.buttons["save"].clicked.connect(lambda: self.save(self._work.run.folder / REPORT))
         self.buttons["save_as"].clicked.connect(self._save_as)
@@ -140,9 +139,7 @@ class ResultView(QWidget):
         quality = QualityTableWidget("protocol.errors", tr("Errors and their limits"))
         quality.set_table(document.sections[0].quality)
         holder = QWidget()
-        inside = QVBoxLayout(holder)
-        inside.addWidget(quality)
-        inside.addStretch(1)
+        vbox(quality, 1, parent=holder)
         self._tabs.addTab(holder, tr("Summary"))
         groups = document.sections[0].listings[0]
         self._tabs.addTab(listing_table("protocol.groups", groups), tr("By size and height"))
@@ -150,12 +147,10 @@ class ResultView(QWidget):
             gauge = document.sections[1]
             table = listing_table("protocol.gauge", gauge.listings[0])
             holder = QWidget()
-            inside = QVBoxLayout(holder)
             pooled = PlainLabel("      ".join(f"{label}: {value}" for label, value in gauge.facts))
             named(pooled, "protocol.pooled", tr("Repeatability over all objects"))
             pooled.setWordWrap(True)
-            inside.addWidget(pooled)
-            inside.addWidget(table, 1)
+            vbox(pooled, (table, 1), parent=holder)
             self._tabs.addTab(holder, tr("Repeatability"))
         self._tabs.addTab(listing_table("protocol.presses", document.sources), tr("Every press"))
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.widgets.boxes import hbox
 from app.widgets.inputs import ComboBox, SpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
@@ -75,14 +76,8 @@ class ProtocolSetup(QScrollArea):
         self.setFrameShape(QScrollArea.Shape.NoFrame)
         inside = QWidget()
         self.setWidget(inside)
-        row = QHBoxLayout(inside)
-        row.setContentsMargins(24, 20, 24, 20)
-        row.setSpacing(36)
-        row.addStretch(1)
         form, runs = QVBoxLayout(), QVBoxLayout()
-        row.addLayout(form)
-        row.addLayout(runs)
-        row.addStretch(1)
+        hbox(1, form, runs, 1, parent=inside, margins=(24, 20, 24, 20), spacing=36)
         self._build_form(form)
         self._build_runs(runs)
         self._count()

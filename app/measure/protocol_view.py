@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QWidget
 
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
@@ -18,6 +18,7 @@ from app.measure.protocol_result import ResultView
 from app.measure.protocol_setup import KnownRun, ProtocolSetup
 from app.measure.protocol_work import Equipped, ProtocolWork, equip
 from app.services.jobs import Job, Jobs
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_calibration
@@ -59,12 +60,8 @@ class ProtocolView(QWidget):
         self._retiring: list[ProtocolWork] = []
         self._jobs = Jobs("protocol set-up", self)
         self._jobs.refused.connect(self._on_refused)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(self._build_bar())
         self._stack = QStackedWidget()
-        column.addWidget(self._stack, 1)
+        vbox(self._build_bar(), (self._stack, 1), parent=self, margins=0, spacing=0)
         self.setup = ProtocolSetup()
         self._stack.addWidget(self.setup)
         self.setup.begin_wanted.connect(lambda path: self.begin(Path(path)))
@@ -72,11 +69,12 @@ class ProtocolView(QWidget):
         context.requests.calibrations_changed.connect(self._refresh)
 
     def _build_bar(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setContentsMargins(12, 6, 12, 6)
         self.heading = named(PlainLabel(), "protocol.heading", tr("Current run"))
-        row.addWidget(self.heading, 1)
-        row.addWidget(SourceButton(context=self.context, page="protocol", none=tr("No camera")))
+        row = hbox(
+            (self.heading, 1),
+            SourceButton(context=self.context, page="protocol", none=tr("No camera")),
+            margins=(12, 6, 12, 6),
+        )
         return row
 
     # Called by the parent page

@@ -34,6 +34,7 @@ from app.measure.record_table import (
 )
 from app.theme.icons import icon
 from app.widgets.actions import make_action
+from app.widgets.boxes import vbox
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
@@ -109,14 +110,9 @@ class ResultsView(QWidget):
         for widget in (self.remove, self.export):
             bar.addWidget(widget)
         left = QWidget()
-        words = QVBoxLayout(left)
-        words.setContentsMargins(10, 4, 10, 4)
-        words.addWidget(self.statistics, 1)
+        vbox((self.statistics, 1), parent=left, margins=(10, 4, 10, 4))
         right = QWidget()
-        chart = QVBoxLayout(right)
-        chart.setContentsMargins(0, 0, 8, 4)
-        chart.addWidget(self.drift_title)
-        chart.addWidget(self.drift, 1)
+        vbox(self.drift_title, (self.drift, 1), parent=right, margins=(0, 0, 8, 4))
         below = QSplitter(Qt.Orientation.Horizontal)
         below.addWidget(left)
         below.addWidget(right)

@@ -6,7 +6,7 @@ import math
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.live.frame_results import Shown
 from app.live.height_panel import HeightPanel
@@ -19,6 +19,7 @@ from app.measure.tool_layer import DrawnTool, ToolLayer
 from app.measure.work import Work
 from app.view2d.display import Display
 from app.view2d.map_point import read_at
+from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from app.widgets.units import in_unit
@@ -78,19 +79,9 @@ class ToolMap(QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        foot = QHBoxLayout()
-        foot.setContentsMargins(8, 2, 8, 2)
-        foot.addWidget(self.hint, 1)
-        foot.addWidget(self.readout)
-        right = QVBoxLayout()
-        right.setSpacing(0)
-        right.addWidget(self.panel, 1)
-        right.addLayout(foot)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(0)
-        row.addWidget(self.tools)
-        row.addLayout(right, 1)
+        foot = hbox((self.hint, 1), self.readout, margins=(8, 2, 8, 2))
+        right = vbox((self.panel, 1), foot, spacing=0)
+        hbox(self.tools, (right, 1), parent=self, margins=0, spacing=0)
 
     def _connect(self) -> None:
         self.tools.chosen.connect(self._on_kind)

@@ -8,15 +8,14 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.measure.figures_text import UNITS
 from app.measure.judging import Judged, Stated
 from app.measure.placing import INDENTERS
+from app.widgets.boxes import hbox, vbox
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
@@ -91,15 +90,8 @@ class TruthForm(QGroupBox):
         self._form.addRow(self.known)
         self._form.addRow(self.size_on, self.size)
         self._form.addRow(self.height_on, self.height)
-        row = QHBoxLayout()
-        row.addWidget(edit)
-        row.addWidget(limits)
-        row.addStretch(1)
-        column = QVBoxLayout(self)
-        column.addLayout(self._form)
-        column.addWidget(self.again)
-        column.addLayout(row)
-        column.addWidget(self.verdict)
+        row = hbox(edit, limits, 1)
+        vbox(self._form, self.again, row, self.verdict, parent=self)
 
     # True values
 

@@ -14,13 +14,14 @@ from PySide6.QtGui import (
     QKeySequence,
     QResizeEvent,
 )
-from PySide6.QtWidgets import QSplitter, QToolBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QToolBar, QWidget
 
 from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_effect import Effect
 from app.calibrate.reflectance.lut_live import LivePanel
 from app.calibrate.reflectance.lut_model import CurveEdit
 from app.calibrate.reflectance.lut_plot import CurvePlot
+from app.widgets.boxes import vbox
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from app.widgets.roomy_label import RoomyLabel
@@ -220,20 +221,20 @@ class LutEditor(QWidget):
         channels = [f"channel.{name}" for name in CHANNEL_KEYS]
         first = (channels, ("lasso", "reset"), ("compare", "view"))
         second = (("add", "remove", "thin", "snap", "smooth"),)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self._bar("lut.tools", tr("Tools for the reflectance curve"), first))
-        layout.addWidget(
-            self._bar("lut.more_tools", tr("More tools for the reflectance curve"), second)
-        )
         self._split = split = QSplitter(Qt.Orientation.Horizontal)
         split.addWidget(self.plot)
         split.addWidget(self.live)
         split.setStretchFactor(0, 3)
         split.setStretchFactor(1, 1)
         split.setSizes([860, 400])
-        layout.addWidget(split, 1)
-        layout.addWidget(self._hint)
-        layout.addWidget(self._notice)
+        vbox(
+            self._bar("lut.tools", tr("Tools for the reflectance curve"), first),
+            self._bar("lut.more_tools", tr("More tools for the reflectance curve"), second),
+            (split, 1),
+            self._hint,
+            self._notice,
+            parent=self,
+        )
 
     def _connect(self) -> None:
         self.plot.node_chosen.connect(self.choose_node)

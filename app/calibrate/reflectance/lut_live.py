@@ -9,12 +9,13 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.calibrate.reflectance.lut_effect import Effect
 from app.calibrate.reflectance.lut_model import CurveEdit
 from app.services.newest_wins import NewestWins
 from app.theme import theme
+from app.widgets.boxes import vbox
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
@@ -72,15 +73,18 @@ class LivePanel(QWidget):
         self._profile = named(_bare_plot(), "lut.profile", tr("Depth through the ball's centre"))
         self._residual = named(_bare_plot(), "lut.residual", tr("Depth minus ball"))
         self._lines = self._make_lines()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
         title = PlainLabel(tr("Effect of the edit on a press"))
         title.setBuddy(self.press)
         title.setWordWrap(True)
-        for widget in (title, self.press, self._words):
-            layout.addWidget(widget)
-        layout.addWidget(self._profile, 3)
-        layout.addWidget(self._residual, 2)
+        vbox(
+            title,
+            self.press,
+            self._words,
+            (self._profile, 3),
+            (self._residual, 2),
+            parent=self,
+            margins=0,
+        )
         self.apply_theme()
 
     def show_plots(self, on: bool) -> None:
