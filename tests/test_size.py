@@ -52,7 +52,7 @@ MOST = {
     "gelpolight_core/design_check": 320,
     "gelpolight_core/export": 611,
     "gelpolight_core/factors": 193,
-    "gelpolight_core/health": 1157,
+    "gelpolight_core/health": 1119,
     "gelpolight_core/image": 393,
     "gelpolight_core/in_place": 1221,
     "gelpolight_core/io": 497,

@@ -179,9 +179,7 @@ def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:
         how=tr("weaker") if change < 0.0 else tr("brighter"),
     )
     remedy = tr("Let the LEDs warm up and check their current; then {again}")
-    return Finding(
-        "led_weak", text, remedy.format(again=BACKGROUND), _severity(far), far, 100.0 * change, "%"
-    )
+    return _graded("led_weak", text, remedy.format(again=BACKGROUND), far, 100.0 * change, "%")
 
 
 def led_off_findings(change: Array) -> list[Finding]:
@@ -200,39 +198,26 @@ def led_off_findings(change: Array) -> list[Finding]:
 
 
 def _led_off_finding(k: int, change: float) -> Finding:
-    return Finding(
-        "led_off",
-        tr("the {name} LED is off").format(name=channel_name(k)),
-        tr("Check its cable and driver, then calibrate again"),
-        Verdict.FAIL, True, 100.0 * change, "%",
-    )  # fmt: skip
+    text = tr("the {name} LED is off").format(name=channel_name(k))
+    remedy = tr("Check its cable and driver, then calibrate again")
+    return _graded("led_off", text, remedy, True, 100.0 * change, "%")
 
 
 def _exposure_finding(change: float) -> Finding:
     text = tr("the light is {p:.1f} % {how} than at calibration: exposure, gain or LEDs changed")
+    text = text.format(p=100.0 * abs(change), how=tr("brighter") if change > 0.0 else tr("darker"))
     remedy = tr("Restore the camera settings of the calibration, or {again}")
     far = abs(change) > FAR_GAIN
-    return Finding(
-        "exposure",
-        text.format(
-            p=100.0 * abs(change), how=tr("brighter") if change > 0.0 else tr("darker")
-        ),
-        remedy.format(again=BACKGROUND),
-        _severity(far), far, 100.0 * change, "%",
-    )  # fmt: skip
+    return _graded("exposure", text, remedy.format(again=BACKGROUND), far, 100.0 * change, "%")
 
 
 def _room_finding(offset: float) -> Finding:
-    far = abs(offset) > FAR_OFFSET
     text = tr("room light reaches the membrane ({p:.2f} % of full scale)")
     if offset < 0.0:
         text = tr("there is less room light than at calibration ({p:.2f} % of full scale)")
-    return Finding(
-        "room_light",
-        text.format(p=100.0 * abs(offset)),
-        tr("Shade the sensor as at calibration, and check the camera's black level"),
-        _severity(far), far, 100.0 * offset, "%",
-    )  # fmt: skip
+    text = text.format(p=100.0 * abs(offset))
+    remedy = tr("Shade the sensor as at calibration, and check the camera's black level")
+    return _graded("room_light", text, remedy, abs(offset) > FAR_OFFSET, 100.0 * offset, "%")
 
 
 def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> Finding | None:
@@ -268,7 +253,7 @@ def far_moved_finding(shift_px: tuple[float, float]) -> Finding:
 
 def _moved(text: str, size: float, far: bool) -> Finding:
     remedy = tr("Seat the camera and the elastomer as at calibration, or calibrate again")
-    return Finding("camera_moved", text, remedy, _severity(far), far, size, "px")
+    return _graded("camera_moved", text, remedy, far, size, "px")
 
 
 def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
@@ -280,26 +265,18 @@ def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
     if seen < float(np.interp(LEAST_BLUR_PX, sizes, strength)) + SIGMAS * sd:
         return None
     size = float(np.interp(seen, strength, sizes))
-    far = size > FAR_BLUR_PX
-    return Finding(
-        "blurred",
-        tr("the image is blurred by {n:.1f} px more than at calibration").format(n=size),
-        tr("Focus the lens and clean it; calibrate again if the focus was changed"),
-        _severity(far), far, size, "px",
-    )  # fmt: skip
+    text = tr("the image is blurred by {n:.1f} px more than at calibration").format(n=size)
+    remedy = tr("Focus the lens and clean it; calibrate again if the focus was changed")
+    return _graded("blurred", text, remedy, size > FAR_BLUR_PX, size, "px")
 
 
 def saturated_finding(share: float) -> Finding | None:
     """Return that much of the field is saturated."""
     if share < SATURATED_SHARE:
         return None
-    far = share > MOSTLY_SATURATED
-    return Finding(
-        "saturated",
-        tr("{p:.0f} % of the membrane is saturated").format(p=100.0 * share),
-        tr("Restore the exposure of the calibration, and shade the sensor"),
-        _severity(far), far, 100.0 * share, "%",
-    )  # fmt: skip
+    text = tr("{p:.0f} % of the membrane is saturated").format(p=100.0 * share)
+    remedy = tr("Restore the exposure of the calibration, and shade the sensor")
+    return _graded("saturated", text, remedy, share > MOSTLY_SATURATED, 100.0 * share, "%")
 
 
 def dirt_finding(samples: Samples, run_change: Array, common: CommonChange) -> Finding | None:
@@ -317,13 +294,9 @@ def dirt_finding(samples: Samples, run_change: Array, common: CommonChange) -> F
     around = runs + runs[samples.beside].sum(axis=1)
     if around.max() < DIRT_RUNS:
         return None
-    cells = int(np.count_nonzero(runs))
-    return Finding(
-        "dirt",
-        tr("something dark lies on the membrane, the window or the lens"),
-        tr("Clean the sensor and the lens"),
-        Verdict.WARN, False, float(cells), "mm2",
-    )  # fmt: skip
+    text = tr("something dark lies on the membrane, the window or the lens")
+    remedy = tr("Clean the sensor and the lens")
+    return _graded("dirt", text, remedy, False, float(np.count_nonzero(runs)), "mm2")
 
 
 def bad_pixel_findings(
@@ -335,54 +308,44 @@ def bad_pixel_findings(
     for kind, places in ((tr("column"), columns), (tr("row"), rows)):
         if places:
             text = tr("the camera has a dead or hot {kind} at {places}")
-            named = ", ".join(str(n) for n in places[:5])
-            found.append(
-                Finding(
-                    "bad_line", text.format(kind=kind, places=named), remedy, Verdict.FAIL,
-                    False, float(len(places)), "",
-                )
-            )  # fmt: skip
+            text = text.format(kind=kind, places=", ".join(str(n) for n in places[:5]))
+            line = _graded("bad_line", text, remedy, False, float(len(places)), "")
+            found.append(replace(line, severity=Verdict.FAIL))
     if share > BAD_SHARE and count >= LEAST_BAD:
         text = tr("{p:.2g} % of the pixels are dead or hot").format(p=100.0 * share)
         far = share > FAR_SHARE
-        found.append(Finding("bad_pixels", text, remedy, _severity(far), far, 100.0 * share, "%"))
+        found.append(_graded("bad_pixels", text, remedy, far, 100.0 * share, "%"))
     return found
 
 
 def dark_finding() -> Finding:
     """Return that there is no light."""
-    return Finding(
-        "dark",
-        tr("the image is dark: the LEDs are off, or the lens is covered"),
-        tr("Switch the LEDs on and uncover the lens"),
-        Verdict.FAIL, True,
-    )  # fmt: skip
+    text = tr("the image is dark: the LEDs are off, or the lens is covered")
+    return _graded("dark", text, tr("Switch the LEDs on and uncover the lens"), True)
 
 
 def swapped_finding(order: Sequence[int]) -> Finding:
     """Return that the channels come in another order."""
-    letters = "".join("RGB"[k] for k in order)
-    return Finding(
-        "colour_order",
-        tr("the colours come in the order {letters} instead of RGB").format(letters=letters),
-        tr("Set the camera's colour order as at calibration"),
-        Verdict.FAIL, True,
-    )  # fmt: skip
+    text = tr("the colours come in the order {letters} instead of RGB")
+    text = text.format(letters="".join("RGB"[k] for k in order))
+    remedy = tr("Set the camera's colour order as at calibration")
+    return _graded("colour_order", text, remedy, True)
 
 
 def stranger_finding() -> Finding:
     """Return that the image does not show this sensor's membrane."""
-    return Finding(
-        "other_sensor",
-        tr("the image does not look like this sensor's membrane"),
-        tr(
-            "Use the calibration of the sensor that captured the image; if it is the "
-"right one, remove all objects from the field and seat camera and "
-"elastomer"
-        ),
-        Verdict.FAIL, True,
-    )  # fmt: skip
+    remedy = tr(
+        "Use the calibration of the sensor that captured the image; if it is the "
+        "right one, remove all objects from the field and seat camera and "
+        "elastomer"
+    )
+    text = tr("the image does not look like this sensor's membrane")
+    return _graded("other_sensor", text, remedy, True)
 
 
-def _severity(far: bool) -> Verdict:
-    return Verdict.FAIL if far else Verdict.WARN
+def _graded(
+    key: str, cause: str, remedy: str, far: bool, value: float = 0.0, unit: str = ""
+) -> Finding:
+    """Return a finding that makes the depth meaningless where the fault is `far`."""
+    severity = Verdict.FAIL if far else Verdict.WARN
+    return Finding(key, cause, remedy, severity, far, value, unit)
