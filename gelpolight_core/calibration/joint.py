@@ -31,7 +31,6 @@ from gelpolight_core.calibration.joint_problem import (
     Problem,
     diffuse_curves,
 )
-from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.least_squares import fit_least_squares
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reflectance.agreement import LEAST_PRESSES
@@ -112,7 +111,6 @@ def refine_jointly(
     slab: Slab,
     *,
     board: BesideBoard | None = None,
-    terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
     check_radii: bool = False,
 ) -> JointResult:
     """Refine LEDs, membrane and balls together.
@@ -130,22 +128,18 @@ def refine_jointly(
         What is below the membrane.
     board : BesideBoard, optional
         The untouched membrane and the white board, which give the reflectance.
-    terms : CalibrationTerms, optional
-        The effects to model; by default all.
     check_radii : bool, optional
         Look for a common error of all ball radii, with four presses or more.
     """
-    if terms.interreflection:
-        seen = _first_light(presses, pixels, led_positions_mm, slab, terms)
-        # Without interreflection, no frame needs to compute it.
-        pixels, terms = (
-            (pixels, replace(terms, interreflection=False)) if seen is None else (seen, terms)
-        )
-    held_out, membranes = _held_out(presses, pixels, led_positions_mm, terms)
+    lit = _first_light(presses, pixels, led_positions_mm, slab)
+    # Without interreflection, no frame needs to compute it.
+    around = lit is not None
+    pixels = pixels if lit is None else lit
+    held_out, membranes = _held_out(presses, pixels, led_positions_mm, around)
     refine = held_out[1] <= held_out[0]
     curves = membranes[1] <= membranes[0]
-    solved = _solve(presses, pixels, led_positions_mm, terms, refine=refine, curves=curves)
-    if terms.interreflection:
+    solved = _solve(presses, pixels, led_positions_mm, around, refine=refine, curves=curves)
+    if around:
         pixels = _lit(pixels, solved.x, slab)
         start = solved.x
         expected = None if board is None else _expected(board, solved, COMMON + 3 * len(pixels))
@@ -153,7 +147,7 @@ def refine_jointly(
             presses,
             pixels,
             led_positions_mm,
-            terms,
+            around,
             refine=refine,
             curves=curves,
             near=start,
@@ -208,15 +202,14 @@ def _first_light(
     pixels: Sequence[BallPixels],
     leds: Array,
     slab: Slab,
-    terms: CalibrationTerms,
 ) -> list[BallPixels] | None:
     """Return the pixels with interreflected light, from a fit to some; None if there is none.
 
     The fit starts from the light that a matt membrane would reflect.
     """
-    x, _ = _start(presses, leds, terms, curves=False)
+    x, _ = _start(presses, leds, True, curves=False)
     some = _lit([thinned(p) for p in pixels], x, slab)
-    fitted = _solve(presses, some, leds, terms, refine=terms.led_refinement)
+    fitted = _solve(presses, some, leds, True, refine=True)
     if fitted.x[INTERREFLECTION] <= SIGNIFICANT * fitted.sd[INTERREFLECTION]:
         return None
     return _lit(pixels, fitted.x, slab)
@@ -244,18 +237,17 @@ class _Solution:
 
 
 def _start(
-    presses: Sequence[BallPress], leds: Array, terms: CalibrationTerms, *, curves: bool
+    presses: Sequence[BallPress], leds: Array, around: bool, *, curves: bool
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return the start values of the fit, and which parameters are free."""
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
-    glossy = terms.gloss and not curves
-    common = [1.0, 0.05 * glossy, 0.5, 0.1 * terms.interreflection, 0.7]
+    glossy = not curves
+    common = [1.0, 0.05 * glossy, 0.5, 0.1 * around, 0.7]
     heights = np.zeros(CURVE_SIZE if curves else 0)
     start = np.concatenate([leds.ravel(), common, np.ravel(balls), heights])
     free = np.ones(start.size, dtype=bool)
-    free[:9] = terms.led_refinement
     # Deviations from Lambert's cosine law are covered by the one-dimensional curves.
-    free[9:DECAY] = [False, glossy, glossy, terms.interreflection]
+    free[9:DECAY] = [False, glossy, glossy, around]
     return start, free
 
 
@@ -263,7 +255,7 @@ def _solve(
     presses: Sequence[BallPress],
     pixels: Sequence[BallPixels],
     leds: Array,
-    terms: CalibrationTerms,
+    around: bool,
     *,
     refine: bool,
     curves: bool = False,
@@ -275,7 +267,7 @@ def _solve(
 
     Starts from a solution that is `near`, if there is one. A `reflectance` may be expected.
     """
-    start, free = _start(presses, leds, terms, curves=curves)
+    start, free = _start(presses, leds, around, curves=curves)
     balls = slice(COMMON, COMMON + 3 * len(pixels))
     free[:9] &= refine
     low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
@@ -405,7 +397,7 @@ def _held_out(
     presses: Sequence[BallPress],
     pixels: Sequence[BallPixels],
     leds: Array,
-    terms: CalibrationTerms,
+    around: bool,
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return mean robust losses on every second press, from fits to the others.
 
@@ -421,12 +413,11 @@ def _held_out(
     pixels = [thinned(p) for p in pixels]
 
     def loss(refine: bool, curves: bool) -> float:
-        fitted = _solve(presses[even], pixels[even], leds, terms, refine=refine, curves=curves)
+        fitted = _solve(presses[even], pixels[even], leds, around, refine=refine, curves=curves)
         return _solve(
-            presses[odd], pixels[odd], leds, terms, refine=refine, curves=curves, judging=fitted.x
+            presses[odd], pixels[odd], leds, around, refine=refine, curves=curves, judging=fitted.x
         ).loss
 
-    tried = [False, True] if terms.led_refinement else [False]
-    mirror, refined = [*in_parallel(lambda refine: loss(refine, False), tried), np.inf][:2]
-    one_dimensional = loss(refined <= mirror, True) if terms.curves else np.inf
+    mirror, refined = in_parallel(lambda refine: loss(refine, False), (False, True))
+    one_dimensional = loss(refined <= mirror, True)
     return (mirror, refined), (min(mirror, refined), one_dimensional)

@@ -17,7 +17,6 @@ from gelpolight_core.calibration.depth_scale import (
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.calibration.results import StageResults, need
 from gelpolight_core.calibration.saturated_background import beyond_saturation
-from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.masks import reflects_light
@@ -30,7 +29,7 @@ from gelpolight_core.sensor_calibration import (
     ScaleSd,
     sensor_stack,
 )
-from gelpolight_core.session.session import SensorData, Session
+from gelpolight_core.session.session import Session
 
 CHECKED_BALLS = 4
 GATHERED_SD = 0.005
@@ -56,39 +55,9 @@ def refine(session: Session, results: StageResults) -> StageResults:
     InputError
         If an earlier stage was not run.
     """
-    large = _median_contact_px(results.presses) >= LEAST_CONTACT_PX
-    refined = refine_with(session.sensor, results, check_radii=large)
-    assert refined.joint is not None and refined.full is not None
-    scale = _scale_sd(session, refined, refined.joint, refined.full)
-    return replace(refined, full=replace(refined.full, scale_sd=scale))
-
-
-def refine_with(
-    sensor: SensorData,
-    results: StageResults,
-    *,
-    terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
-    check_radii: bool = False,
-) -> StageResults:
-    """Refine LEDs and membrane on the presses, and keep the background for comparison.
-
-    Parameters
-    ----------
-    sensor : SensorData
-        With its layers.
-    results : StageResults
-        Results of all earlier stages.
-    terms : CalibrationTerms, optional
-        The effects that the full model includes.
-    check_radii : bool, optional
-        Look for a common error of all ball radii.
-    """
     table, lights = need(results.table, "balls"), need(results.lights, "balls")
     bare, factors = need(results.background, "balls"), need(results.factors, "balls")
-    found = need(results.crosstalk, "balls")
-    if not terms.crosstalk:
-        found = replace(found, matrix=np.eye(3))
-    crosstalk = found.matrix
+    crosstalk = need(results.crosstalk, "balls").matrix
     background = unmix(bare, crosstalk)
     noise = press_noise(results.presses)
     view = CoarseView.of(table, reflects_light(table.valid, background))
@@ -98,13 +67,12 @@ def refine_with(
         )
         for press, image in zip(results.presses, results.images, strict=True)
     ]
-    slab = Slab.of(sensor_stack(sensor, need(results.top_pose, "balls").plane))
+    slab = Slab.of(sensor_stack(session.sensor, need(results.top_pose, "balls").plane))
     leds = lights.led_positions_mm
     radiance = need(results.radiance, "balls").radiance
     board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds)
-    joint = refine_jointly(
-        results.presses, pixels, leds, slab, board=board, terms=terms, check_radii=check_radii
-    )
+    large = _median_contact_px(results.presses) >= LEAST_CONTACT_PX
+    joint = refine_jointly(results.presses, pixels, leds, slab, board=board, check_radii=large)
     full = FullModel(
         joint.led_positions_mm,
         joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
@@ -119,13 +87,10 @@ def refine_with(
         joint.membrane_kept,
     )
     lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
-    return replace(
-        results,
-        crosstalk=found,
-        factors=replace(factors, factors=known),
-        joint=joint,
-        full=replace(full, background=lit),
-    )
+    full = replace(full, background=lit)
+    refined = replace(results, factors=replace(factors, factors=known), joint=joint, full=full)
+    scale = _scale_sd(session, refined, joint, full)
+    return replace(refined, full=replace(full, scale_sd=scale))
 
 
 def _scale_sd(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
@@ -41,7 +42,8 @@ def write_remark(path: Path, key: str, text: str) -> None:
             advice=tr("Enter a shorter text without special characters"),
         ) from error
     calibration = read_calibration(path)
-    stated = replace(calibration.provenance, **{key: text.strip()})
+    remark: dict[str, Any] = {key: text.strip()}
+    stated = replace(calibration.provenance, **remark)
     changed = replace(calibration, provenance=stated)
     vars(changed)["identity"] = calibration.identity
     write_calibration(changed, path)

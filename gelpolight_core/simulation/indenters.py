@@ -164,26 +164,6 @@ class Relief:
 Indenter = Ball | Cylinder | Cuboid | Relief
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Settled:
-    """The membrane on a shape that is not axisymmetric, in the shape's own frame, centre at (0, 0).
-
-    Attributes
-    ----------
-    depth_mm, contact : (2 count + 1, 2 count + 1)
-        Depth, and contact with the shape.
-    step_mm : float
-        Distance between cells.
-    count : int
-        Cells from the centre to the border.
-    """
-
-    depth_mm: Array
-    contact: NDArray[np.bool_]
-    step_mm: float
-    count: int
-
-
 def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
     """Return the drop of a rounded edge at a distance inside the outline, and its slope."""
     if edge_mm <= 0.0:
@@ -202,7 +182,6 @@ def press(
     decay_mm: float = 0.7,
     pitch_mm: float = PITCH_MM,
     margin_mm: float = 0.0,
-    settled: Settled | None = None,
     interrupt: Interrupt = never,
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
@@ -222,9 +201,6 @@ def press(
         Cell size of the surface.
     margin_mm : float, optional
         Margin around the indenter; at least as much as the membrane needs to become flat.
-    settled : Settled, optional
-        From :func:`settle` with the same indenter, decay length and cell size; saves solving it
-        again for every position.
     interrupt : callable, optional
         Called regularly; an exception raised by it stops the work.
     """
@@ -239,9 +215,7 @@ def press(
         yaw = math.radians(yaw_deg)
         along = dx * math.cos(yaw) + dy * math.sin(yaw)
         across = dy * math.cos(yaw) - dx * math.sin(yaw)
-        if settled is None:
-            settled = settle(indenter, decay_mm=decay_mm, pitch_mm=pitch_mm, interrupt=interrupt)
-        depth, contact = _turned_drape(indenter, along, across, settled)
+        depth, contact = _turned_drape(indenter, along, across, decay_mm, pitch_mm, interrupt)
     return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
 
 
@@ -269,20 +243,15 @@ def _round_drape(
     return np.where(contact, indenter.obstacle(radius, zeros), outside), contact
 
 
-def settle(
+def _turned_drape(
     indenter: Cuboid | Relief,
-    *,
-    decay_mm: float = 0.7,
-    pitch_mm: float = PITCH_MM,
-    interrupt: Interrupt = never,
-) -> Settled:
-    """Return the membrane on a shape that is not axisymmetric, in the shape's own frame.
-
-    Parameters
-    ----------
-    indenter, decay_mm, pitch_mm, interrupt
-        As in :func:`press`.
-    """
+    along: Array,
+    across: Array,
+    decay_mm: float,
+    pitch_mm: float,
+    interrupt: Interrupt,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Solve the membrane in the indenter's own frame, and read it at rotated positions."""
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
     # The outline lies on cells, so that the block has its nominal side.
     count = math.ceil(half / pitch_mm)
@@ -291,18 +260,9 @@ def settle(
     depth, contact = solve_drape(
         indenter.obstacle, cells, cells, decay_mm=decay_mm, interrupt=interrupt
     )
-    return Settled(depth, contact, step, count)
-
-
-def _turned_drape(
-    indenter: Cuboid | Relief, along: Array, across: Array, settled: Settled
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Read the solution in the indenter's frame at rotated positions."""
-    position = [across / settled.step_mm + settled.count, along / settled.step_mm + settled.count]
-    turned = map_coordinates(
-        settled.depth_mm, position, order=3, mode="constant", cval=0.0, prefilter=True
-    )
-    touched = map_coordinates(settled.contact.astype(np.float64), position, order=1, cval=0.0) > 0.5
+    position = [across / step + count, along / step + count]
+    turned = map_coordinates(depth, position, order=3, mode="constant", cval=0.0, prefilter=True)
+    touched = map_coordinates(contact.astype(np.float64), position, order=1, cval=0.0) > 0.5
     return np.clip(turned, 0.0, indenter.depth_mm), touched
 
 

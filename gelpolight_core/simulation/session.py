@@ -29,12 +29,9 @@ from gelpolight_core.simulation.indenters import (
     Cuboid,
     Cylinder,
     Indenter,
-    Relief,
-    Settled,
     coin,
     nut,
     press,
-    settle,
 )
 from gelpolight_core.simulation.plan import (
     AVERAGED,
@@ -227,7 +224,6 @@ def pressed_membrane(
     x_mm: float,
     y_mm: float,
     yaw_deg: float = 0.0,
-    settled: Settled | None = None,
     interrupt: Interrupt = never,
 ) -> PressedMembrane:
     """Return the sensor with an indenter in its membrane, as fine as its image requires.
@@ -240,8 +236,6 @@ def pressed_membrane(
         The pressed object.
     x_mm, y_mm, yaw_deg : float
         Position and rotation.
-    settled : Settled, optional
-        From :func:`settled_membrane` with the same design and indenter.
     interrupt : callable, optional
         Called regularly; an exception raised by it stops the work.
     """
@@ -252,30 +246,11 @@ def pressed_membrane(
             y_mm=y_mm,
             yaw_deg=yaw_deg,
             decay_mm=design.membrane.decay_length_mm,
-            pitch_mm=_pitch_mm(design),
-            settled=settled,
+            # As fine as the image shows it.
+            pitch_mm=max(PITCH_MM, 0.7 * design.layers.top_distance_mm / design.camera.fx),
             interrupt=interrupt,
         )
     )
-
-
-def settled_membrane(design: SensorDesign, indenter: Cuboid | Relief) -> Settled:
-    """Return the membrane on a shape that is not axisymmetric, for any position.
-
-    Parameters
-    ----------
-    design : SensorDesign
-        The sensor.
-    indenter : Cuboid or Relief
-        The pressed object.
-    """
-    decay_mm = design.membrane.decay_length_mm
-    return settle(indenter, decay_mm=decay_mm, pitch_mm=_pitch_mm(design))
-
-
-def _pitch_mm(design: SensorDesign) -> float:
-    """Return the cell size of a pressed surface that a design's image requires."""
-    return max(PITCH_MM, 0.7 * design.layers.top_distance_mm / design.camera.fx)
 
 
 def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView, view_directions
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.calibration.pipeline import judge_presses
-from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Slab
@@ -195,12 +194,11 @@ def refined(
     noise: float = 0.01,
     seed: int = 0,
     count: int = 8,
-    terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
 ) -> JointResult:
     random = np.random.default_rng(seed)
     presses = [found_press(pose, random) for pose in BALLS[:count]]
     pixels = [pixels_of(pose, truth, noise, random) for pose in BALLS[:count]]
-    return refine_jointly(presses, pixels, MIRROR, SLAB, terms=terms)
+    return refine_jointly(presses, pixels, MIRROR, SLAB)
 
 
 @pytest.fixture(scope="module")
@@ -375,20 +373,6 @@ def test_views_run_back_along_the_rays() -> None:
     # A step of 1 mm of depth along the view shifts the point by the ray slope.
     np.testing.assert_allclose(view[0, 0, :2] / -view[0, 0, 2], ray_slope[0, 0])
     assert np.linalg.norm(view[0, 0]) == pytest.approx(1.0)
-
-
-def test_a_term_that_is_left_out_stays_neutral_and_is_missed(
-    glossy: tuple[Truth, JointResult],
-) -> None:
-    known, whole = glossy
-    matt = refined(known, noise=0.003, terms=CalibrationTerms(gloss=False))
-    assert matt.membrane.gloss == 0.0
-    assert matt.membrane_sd["gloss"] == 0.0
-    assert matt.misfit > 1.5 * whole.misfit
-    stated = refined(known, noise=0.003, terms=CalibrationTerms(led_refinement=False))
-    assert stated.kept == "mirror"
-    np.testing.assert_array_equal(stated.led_positions_mm, MIRROR, SLAB)
-    assert stated.misfit > 1.1 * whole.misfit
 
 
 def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> None:

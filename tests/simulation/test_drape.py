@@ -75,9 +75,9 @@ def test_membrane_lies_on_the_indenter_and_obeys_the_foundation_elsewhere(shape:
     assert pushed.max() < 1e-3
 
 
-@pytest.mark.parametrize("make", [coin, nut])
-def test_reliefs_are_pressed_to_the_depth_asked_for(make: object) -> None:
-    surface = press(make(depth_mm=0.5, pitch_mm=0.08), yaw_deg=20.0, pitch_mm=0.08)
+@pytest.mark.parametrize("relief", [coin(8.0, 0.5), nut(5.5, 0.5)])
+def test_reliefs_are_pressed_to_the_depth_asked_for(relief: Relief) -> None:
+    surface = press(relief, yaw_deg=20.0, pitch_mm=0.08)
     assert surface.depth_mm.max() == pytest.approx(0.5, abs=0.005)
     # The contact is larger than the rim and smaller than the whole circle.
     assert 3.0 < surface.contact.sum() * 0.08**2 < math.pi * 4.0**2
