@@ -12,10 +12,9 @@ from PySide6.QtCore import QObject, Signal
 from app.services.settings import Settings
 from app.services.status import StatusModel
 from app.services.toasts import Toasts
-from app.sources.camera.applying import differences, is_locked
+from app.sources.camera.applying import CameraState, differences, is_locked
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
-from app.sources.camera.camera_state import CameraState
 from app.sources.camera.driver import (
     PORT,
     CameraDriver,

@@ -54,21 +54,21 @@ class SourceChoice(QObject):
         if self.bench is None:
             self.bench = Bench(SensorDesign())
         if self.info is None or self.info.kind != "virtual":
-            self.choose(*virtual_sensor(self.bench)())
+            self.choose(virtual_sensor(self.bench))
 
     def choose_recording(self, file: Path) -> None:
         """Select a recording and play it from the start."""
-        from app.sources.listing import recordings  # slow import, as above
+        from app.sources.listing import recording  # slow import, as above
 
-        for info in recordings([file])():
-            self.choose(info)
+        if file.is_file():
+            self.choose(recording(file))
 
     def choose_folder(self, folder: Path) -> None:
         """Select a folder of images and show them one after the other."""
-        from app.sources.listing import image_folders  # slow import, as above
+        from app.sources.listing import image_folder  # slow import, as above
 
-        for info in image_folders([folder])():
-            self.choose(info)
+        if folder.is_dir():
+            self.choose(image_folder(folder))
 
     @property
     def idle_name(self) -> str | None:

@@ -29,7 +29,6 @@ from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
-from app.sources.listing import image_folders
 from app.view2d.map_point import PixelMap, read_at
 from app.widgets.actions import make_action
 from app.widgets.label import PlainLabel, plain_tip
@@ -179,8 +178,7 @@ class InspectPage(QWidget):
         if path.suffix == ENDING:
             self.context.source.choose_recording(path)
             return
-        for info in image_folders([path])():
-            self.context.source.choose(info)
+        self.context.source.choose_folder(path)
 
     def show_stream(self) -> None:
         """Show what is sent to other programs."""

@@ -10,8 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.live.depth import LiveDepth
-from app.sources.recorder import Recorder, RecorderFigures, header_for
-from app.sources.recording_room import Room, free_bytes, room_for
+from app.sources.recorder import Recorder, RecorderFigures, Room, free_bytes, header_for, room_for
 from app.widgets.actions import make_action
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr

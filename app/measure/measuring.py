@@ -15,7 +15,6 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from app.measure.sheet import Sheet
 from app.sources.source import Frame
 from app.view2d.display import Display
 from app.view2d.map_image import MapImage, map_image
@@ -33,6 +32,9 @@ from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
+
+Sheet = Mapping[int, Tool]
+"""The tools on an image by their keys, in the order of their placement. Never changed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,10 +162,10 @@ class Measuring:
             return None
         heightmap, shown, linear = self._depth_of(request)
         results = {}
-        for item in request.sheet.items:
-            if item.tool not in self._results:
-                self._results[item.tool] = apply_tool(item.tool, heightmap)
-            results[item.key] = self._results[item.tool]
+        for key, tool in request.sheet.items():
+            if tool not in self._results:
+                self._results[tool] = apply_tool(tool, heightmap)
+            results[key] = self._results[tool]
         proposal = propose(heightmap) if request.propose else None
         return ImageResults(heightmap, shown, linear, MappingProxyType(results), proposal)
 

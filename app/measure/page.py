@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.context.context import AppContext
 from app.measure.indenters_dialog import IndentersDialog
-from app.measure.keeping import Kept, record_of
+from app.measure.judging import Kept, record_of
 from app.measure.limits_dialog import LimitsDialog
 from app.measure.press_view import IMAGES, RECORDING, PressView
 from app.measure.protocol_view import ProtocolView

@@ -14,8 +14,7 @@ from app.context.context import AppContext
 from app.live.frame_results import Shown, Wanted
 from app.live.zero import ZeroControl
 from app.measure.advice import measuring_advice
-from app.measure.judging import Judged, judge
-from app.measure.keeping import Kept
+from app.measure.judging import Judged, Kept, judge
 from app.measure.measuring import MeasuredImage
 from app.measure.press_view_frame import PressViewFrame
 from app.measure.steady import SteadyPress

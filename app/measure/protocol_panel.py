@@ -19,7 +19,7 @@ from app.measure.press_check import object_name
 from app.theme import theme
 from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
-from app.widgets.meaning import show_meaning
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.protocol import SAME_REGION, PressWanted
 from gelpolight_core.measurement.protocol_run import RunProgress
@@ -71,10 +71,7 @@ class RunPanel(QWidget):
 
     def _build_task(self, column: QVBoxLayout) -> None:
         self.title = named(PlainLabel(), "protocol.title", tr("Next object"))
-        font = self.title.font()
-        font.setPointSizeF(font.pointSizeF() * 1.35)
-        font.setBold(True)
-        self.title.setFont(font)
+        make_bold(self.title, size=1.35)
         self.title.setWordWrap(True)
         self.where = named(PlainLabel(), "protocol.where", tr("Position"))
         self.where.setWordWrap(True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QWidget
@@ -20,18 +21,58 @@ from app.measure.press_check import (
     make_target,
     why_not_bare,
 )
-from app.measure.protocol_bench import BenchHand
 from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_work import ProtocolWork
+from app.sources.bench import Bench
 from app.sources.processor import Failure
 from app.widgets.boxes import hbox
 from app.widgets.naming import named
+from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.steadiness import judge_press
 from gelpolight_core.translation import tr
 
 FRAMES = 4
 HAND_MS = 100
 """Interval at which the virtual bench checks for its next action."""
+HAND_MM, HAND_DEG = 0.1, 1.0
+"""Repeatability of placing by hand, one standard deviation."""
+
+
+class BenchHand:
+    """Places on the bench what the protocol requests.
+
+    Parameters
+    ----------
+    bench : Bench
+        Of the virtual sensor.
+    """
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._laid: PressWanted | None = None
+
+    def lift(self) -> None:
+        """Remove everything from the sensor."""
+        self._laid = None
+        if self._bench.scene.item != "bare":
+            self._bench.lay("bare")
+
+    def press(self, wanted: PressWanted) -> None:
+        """Press an object in, once."""
+        if wanted == self._laid:
+            return
+        self._laid = wanted
+        rng = np.random.default_rng([self._bench.seed, *wanted.file.encode()])
+        dx_mm, dy_mm, turn_deg = rng.standard_normal(3) * (HAND_MM, HAND_MM, HAND_DEG)
+        x_mm, y_mm = wanted.position_mm
+        self._bench.lay(wanted.truth.shape)
+        self._bench.arrange(
+            size_mm=wanted.truth.size_mm,
+            depth_mm=wanted.truth.height_mm,
+            x_mm=x_mm + dx_mm,
+            y_mm=y_mm + dy_mm,
+            yaw_deg=wanted.yaw_deg + turn_deg,
+        )
 
 
 class PressingView(QWidget):

@@ -25,7 +25,7 @@ from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
 from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
-from app.widgets.meaning import show_meaning
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.measurement.evaluation import Evaluation
@@ -84,10 +84,7 @@ class ResultView(QWidget):
 
     def _build_head(self) -> QHBoxLayout:
         self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
-        font = self.verdict.font()
-        font.setPointSizeF(font.pointSizeF() * 1.45)
-        font.setBold(True)
-        self.verdict.setFont(font)
+        make_bold(self.verdict, size=1.45)
         self.buttons = {
             name: named(QPushButton(text), f"protocol.{name}", tip)
             for name, text, tip in (

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from app.widgets.boxes import hbox
 from app.widgets.inputs import ComboBox, SpinBox
 from app.widgets.label import PlainLabel
-from app.widgets.meaning import show_meaning
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from gelpolight_core.measurement.protocol import Protocol
@@ -234,10 +234,7 @@ def _duration(seconds: float) -> str:
 
 def _heading(text: str) -> PlainLabel:
     label = PlainLabel(text)
-    font = label.font()
-    font.setPointSizeF(font.pointSizeF() * 1.45)
-    font.setBold(True)
-    label.setFont(font)
+    make_bold(label, size=1.45)
     return label
 
 

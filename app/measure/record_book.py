@@ -108,14 +108,23 @@ class RecordBook(QObject):
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""
-        if numbers:
-            self.undo.push(_Removal(self, numbers))
+
+        def each(change: Callable[[Records, int], None]) -> Change:
+            return lambda records: [change(records, number) for number in numbers]
+
+        text = tr("remove {n} measurements").format(n=len(numbers))
+        removal = tr("Removing"), each(Records.remove)
+        self.undo.push(_Change(self, text, removal, (tr("Restoring"), each(Records.restore))))
 
     def write_note(self, number: int, note: str) -> None:
         """Change the note of a measurement. This can be undone."""
         before = next((r.note for r in self.records if r.id == number), "")
+
+        def writing(text: str) -> tuple[str, Change]:
+            return tr("Writing the note"), lambda records: records.update_note(number, text)
+
         if note != before:
-            self.undo.push(_Note(self, number, before, note))
+            self.undo.push(_Change(self, tr("edit a note"), writing(note), writing(before)))
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
         """Write a table of all measurements, or of those of one sensor."""
@@ -168,45 +177,23 @@ def _nothing(_records: Records) -> None:
     """Change nothing. The records are read."""
 
 
-class _Removal(QUndoCommand):
-    """Removal of measurements."""
+class _Change(QUndoCommand):
+    """A change of the records, and the opposite change, each with its title."""
 
-    def __init__(self, book: RecordBook, numbers: tuple[int, ...]) -> None:
-        super().__init__(tr("remove {n} measurements").format(n=len(numbers)))
-        self._book, self._numbers = book, numbers
-
-    def redo(self) -> None:
-        """Remove them."""
-        self._each(tr("Removing"), Records.remove)
-
-    def undo(self) -> None:
-        """Restore them."""
-        self._each(tr("Restoring"), Records.restore)
-
-    def _each(self, title: str, change: Callable[[Records, int], None]) -> None:
-        def run(records: Records) -> None:
-            for number in self._numbers:
-                change(records, number)
-
-        self._book.change(title, run)
-
-
-class _Note(QUndoCommand):
-    """Change of a note."""
-
-    def __init__(self, book: RecordBook, number: int, before: str, after: str) -> None:
-        super().__init__(tr("edit a note"))
-        self._book, self._number = book, number
-        self._before, self._after = before, after
+    def __init__(
+        self,
+        book: RecordBook,
+        text: str,
+        change: tuple[str, Change],
+        opposite: tuple[str, Change],
+    ) -> None:
+        super().__init__(text)
+        self._book, self._change, self._opposite = book, change, opposite
 
     def redo(self) -> None:
-        """Write the new note."""
-        self._write(self._after)
+        """Make the change."""
+        self._book.change(*self._change)
 
     def undo(self) -> None:
-        """Write the old note again."""
-        self._write(self._before)
-
-    def _write(self, note: str) -> None:
-        number = self._number
-        self._book.change(tr("Writing the note"), lambda r: r.update_note(number, note))
+        """Make the opposite change."""
+        self._book.change(*self._opposite)

@@ -148,14 +148,14 @@ class SidePanel(QScrollArea):
     def _show_tools(self, work: Work) -> None:
         with QSignalBlocker(self.tools):
             self.tools.clear()
-            for placed in work.sheet.items:
-                item = QListWidgetItem(_line(placed.tool.name, work.results.get(placed.key)))
-                item.setIcon(icon(f"tool-{placed.tool.name}"))
-                item.setData(KEY, placed.key)
+            for key, tool in work.sheet.items():
+                item = QListWidgetItem(_line(tool.name, work.results.get(key)))
+                item.setIcon(icon(f"tool-{tool.name}"))
+                item.setData(KEY, key)
                 self.tools.addItem(item)
-                if placed.key == work.chosen:
+                if key == work.chosen:
                     self.tools.setCurrentItem(item)
-            if not work.sheet.items:
+            if not work.sheet:
                 item = QListWidgetItem(tr("No tool yet. Choose one on the left."))
                 item.setFlags(Qt.ItemFlag.NoItemFlags)
                 self.tools.addItem(item)

@@ -14,7 +14,6 @@ from app.measure.figures_text import figure_text
 from app.measure.grips import Point, grips_of, outline_of
 from app.measure.palette import Palette
 from app.measure.placing import first_points, kinds, make_tool
-from app.measure.sheet import Placed
 from app.measure.tool_layer import DrawnTool, ToolLayer
 from app.measure.work import Work
 from app.view2d.display import Display
@@ -24,7 +23,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from app.widgets.units import in_unit
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.measurement.tools import Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
@@ -177,7 +176,7 @@ class ToolMap(QWidget):
 
     def _draw(self) -> None:
         work = self._work
-        drawn = tuple(_drawn(item, work.results.get(item.key)) for item in work.sheet.items)
+        drawn = tuple(_drawn(*item, work.results.get(item[0])) for item in work.sheet.items())
         grips = () if work.tool is None else grips_of(work.tool)
         self.layer.show_tools(drawn, work.chosen, grips, work.grip)
         self.drawn.emit(drawn, work.chosen)
@@ -230,13 +229,13 @@ class ToolMap(QWidget):
             work.choose(work.chosen, names[(at + step) % len(names)])
 
 
-def _drawn(item: Placed, found: ToolResult | str | None) -> DrawnTool:
+def _drawn(key: int, tool: Tool, found: ToolResult | str | None) -> DrawnTool:
     """Return a tool as it is drawn: as measured, or as it was placed."""
-    if isinstance(found, ToolResult) and found.tool == item.tool:
+    if isinstance(found, ToolResult) and found.tool == tool:
         lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
         state = "ok" if found.verdict == "ok" else "doubtful"
-        return DrawnTool(item.key, lines, state, figure_text(found.figures[0]))
-    lines = outline_of(item.tool)
+        return DrawnTool(key, lines, state, figure_text(found.figures[0]))
+    lines = outline_of(tool)
     if not lines:
-        lines = (tuple(grip.at_mm for grip in grips_of(item.tool)),)
-    return DrawnTool(item.key, lines, "refused" if isinstance(found, str) else "ok", "")
+        lines = (tuple(grip.at_mm for grip in grips_of(tool)),)
+    return DrawnTool(key, lines, "refused" if isinstance(found, str) else "ok", "")

@@ -10,9 +10,8 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.measure.grips import grips_of, moved
-from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
+from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring, Sheet
 from app.measure.placing import kind_label
-from app.measure.sheet import Sheet
 from app.services.newest_wins import NewestWins
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
@@ -68,7 +67,7 @@ class Work(QObject):
         self.image_results: ImageResults | None = None
         self.chosen = 0
         self.grip = ""
-        self._sheet = Sheet()
+        self._sheet: Sheet = {}
         self._preview: Sheet | None = None
         self._reconstructor: Reconstructor | None = None
         self._propose = False
@@ -83,7 +82,7 @@ class Work(QObject):
 
     @property
     def sheet(self) -> Sheet:
-        """The tools, including a drag in progress."""
+        """The tools by their keys, including a drag in progress."""
         return self._sheet if self._preview is None else self._preview
 
     @property
@@ -99,7 +98,7 @@ class Work(QObject):
     @property
     def tool(self) -> Tool | None:
         """The chosen tool."""
-        return self.sheet.tool(self.chosen)
+        return self.sheet.get(self.chosen)
 
     @property
     def result(self) -> ToolResult | None:
@@ -126,7 +125,7 @@ class Work(QObject):
         """Measure on another image, or on none. It starts without tools."""
         self.image, self.image_results, self._preview = image, None, None
         self.undo.clear()
-        self._sheet = Sheet()
+        self._sheet = {}
         self.chosen, self.grip = 0, ""
         self._propose = propose and image is not None
         self._detected = 0
@@ -151,42 +150,42 @@ class Work(QObject):
     def add(self, tool: Tool) -> int:
         """Add a tool to the image and choose it. Return its key."""
         self._preview = None
-        key = self._sheet.next_key()
+        key = max(self._sheet, default=0) + 1
         text = tr("add {tool}").format(tool=kind_label(tool.name))
-        self.undo.push(_Edit(self, self._sheet.added(tool), key, text))
+        self.undo.push(_Edit(self, {**self._sheet, key: tool}, key, text))
         return key
 
     def change(self, key: int, tool: Tool, *, nudge: bool = False) -> None:
         """Replace a tool. Successive key moves of one grip are one undo step."""
         self._preview = None
         text = tr("move {tool}").format(tool=kind_label(tool.name))
-        self.undo.push(_Edit(self, self._sheet.changed(key, tool), key, text, nudge=nudge))
+        self.undo.push(_Edit(self, {**self._sheet, key: tool}, key, text, nudge=nudge))
 
     def remove(self, key: int) -> None:
         """Remove a tool from the image."""
         self._preview = None
-        tool = self._sheet.tool(key)
-        if tool is not None:
-            text = tr("remove {tool}").format(tool=kind_label(tool.name))
-            self.undo.push(_Edit(self, self._sheet.without(key), 0, text))
+        if key in self._sheet:
+            text = tr("remove {tool}").format(tool=kind_label(self._sheet[key].name))
+            left = {other: tool for other, tool in self._sheet.items() if other != key}
+            self.undo.push(_Edit(self, left, 0, text))
 
     def drag(self, grip: str, to_mm: tuple[float, float]) -> None:
         """Show the chosen tool with a grip moved, during a drag."""
-        tool = self._sheet.tool(self.chosen)
+        tool = self._sheet.get(self.chosen)
         if tool is not None:
-            self._preview = self._sheet.changed(self.chosen, moved(tool, grip, to_mm))
+            self._preview = {**self._sheet, self.chosen: moved(tool, grip, to_mm)}
             self.changed.emit()
             self._ask()
 
     def drop(self, grip: str, to_mm: tuple[float, float]) -> None:
         """End the drag: leave the chosen tool's grip at its position."""
-        tool = self._sheet.tool(self.chosen)
+        tool = self._sheet.get(self.chosen)
         if tool is not None:
             self.change(self.chosen, moved(tool, grip, to_mm))
 
     def nudge(self, dx_mm: float, dy_mm: float) -> bool:
         """Move the grip selected for the keys. Return whether there is one."""
-        tool = self._sheet.tool(self.chosen)
+        tool = self._sheet.get(self.chosen)
         selected = next((g for g in grips_of(tool) if g.name == self.grip), None) if tool else None
         if tool is None or selected is None:
             return False
@@ -196,7 +195,7 @@ class Work(QObject):
 
     def choose(self, key: int, grip: str = "") -> None:
         """Choose a tool and the grip that the keys move: its first if none is named."""
-        tool = self.sheet.tool(key)
+        tool = self.sheet.get(key)
         self.chosen = 0 if tool is None else key
         grips = () if tool is None else grips_of(tool)
         self.grip = grip or (grips[0].name if grips else "")
@@ -276,7 +275,7 @@ class Work(QObject):
         if proposal is not None:
             kind = {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}
             tool = kind[proposal.candidates[0]](proposal.at_mm)
-            if self._sheet.tool(self._detected) is None:
+            if self._detected not in self._sheet:
                 self._detected = self.add(tool)
             else:
                 # The same image has the same object: its tool remains, even if it was moved.

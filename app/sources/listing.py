@@ -1,8 +1,7 @@
-"""Lists the sources that can be selected."""
+"""Describes the sources that can be selected."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -11,12 +10,9 @@ from app.sources.folder import FolderSource
 from app.sources.source import Source, SourceInfo
 from gelpolight_core.translation import tr
 
-Finder = Callable[[], Iterable[SourceInfo]]
-"""Finds sources of one kind, such as the connected cameras."""
 
-
-def virtual_sensor(bench: Bench) -> Finder:
-    """Return the finder of the virtual sensor on a bench."""
+def virtual_sensor(bench: Bench) -> SourceInfo:
+    """Return the virtual sensor on a bench."""
     camera = bench.design.camera
 
     def make() -> Source:
@@ -24,41 +20,26 @@ def virtual_sensor(bench: Bench) -> Finder:
 
         return VirtualSource(bench)
 
-    info = SourceInfo(
+    return SourceInfo(
         "virtual",
         tr("Virtual sensor {serial}").format(serial=bench.design.serial),
         tr("{w} x {h} pixels, rendered").format(w=camera.width_px, h=camera.height_px),
         make,
     )
-    return lambda: (info,)
 
 
-def image_folders(folders: Sequence[Path]) -> Finder:
-    """Return the finder of image folders; deleted folders are skipped."""
-
-    def find() -> Iterable[SourceInfo]:
-        for folder in folders:
-            if folder.is_dir():
-                detail = str(folder.parent)
-                make = partial(FolderSource, folder)
-                yield SourceInfo("folder", folder.name, detail, make, folder)
-
-    return find
+def image_folder(folder: Path) -> SourceInfo:
+    """Return a folder of images."""
+    make = partial(FolderSource, folder)
+    return SourceInfo("folder", folder.name, str(folder.parent), make, folder)
 
 
-def recordings(files: Sequence[Path]) -> Finder:
-    """Return the finder of recordings; deleted files are skipped."""
+def recording(file: Path) -> SourceInfo:
+    """Return a recording."""
 
-    def find() -> Iterable[SourceInfo]:
-        for file in files:
-            if file.is_file():
-                detail = str(file.parent)
-                yield SourceInfo("recording", file.stem, detail, partial(_play, file), file)
+    def make() -> Source:
+        from app.sources.recording import RecordingSource  # slow to import
 
-    return find
+        return RecordingSource(file)
 
-
-def _play(file: Path) -> Source:
-    from app.sources.recording import RecordingSource  # slow to import
-
-    return RecordingSource(file)
+    return SourceInfo("recording", file.stem, str(file.parent), make, file)

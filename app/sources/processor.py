@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from app.sources.mailbox import Mailbox
-from app.sources.priority import PROCESSING, lower_priority
 from app.sources.source import Frame
-from app.sources.stopping import join
+from app.sources.stopping import PROCESSING, join, lower_priority
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.bench import BOARDS, PRESSED, Bench, Scene
-from app.sources.priority import RENDERING, lower_priority
-from app.sources.stopping import join
+from app.sources.stopping import RENDERING, join, lower_priority
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.boards import BoardPose, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never

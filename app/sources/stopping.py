@@ -1,8 +1,10 @@
-"""Waits for threads that were asked to stop, and again before the program ends."""
+"""Threads: their priority, and waiting for those that were asked to stop."""
 
 from __future__ import annotations
 
 import logging
+import os
+import sys
 import threading
 import time
 
@@ -41,3 +43,24 @@ def join_left_behind(timeout_s: float) -> bool:
     for thread in _left_behind:
         _LOG.error("The thread %s is still busy at the end of the program", thread.name)
     return not _left_behind
+
+
+PROCESSING = 5
+"""For threads that compute what is shown; the window and capture keep their priority."""
+RENDERING = 10
+"""For the images of the virtual sensor, which a real camera would not have to compute."""
+
+
+def lower_priority(steps: int) -> None:
+    """Lower the priority of the calling thread, and of threads that it starts from now on.
+
+    Parameters
+    ----------
+    steps : int
+        Steps of POSIX niceness; only Linux has it for single threads, other systems change
+        nothing.
+    """
+    if sys.platform == "linux":
+        thread = threading.get_native_id()
+        now = os.getpriority(os.PRIO_PROCESS, thread)
+        os.setpriority(os.PRIO_PROCESS, thread, min(now + steps, 19))

@@ -32,7 +32,7 @@ from app.desktop import make_application, make_context
 from app.inspect.page import InspectPage
 from app.live.frame_results import Shown
 from app.sources.bench import PRESSED, Bench
-from app.sources.listing import image_folders, recordings, virtual_sensor
+from app.sources.listing import image_folder, recording, virtual_sensor
 from app.theme import theme
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -132,10 +132,9 @@ class Measurement:
         if source is None:
             design = SensorDesign()
             context.source.bench = Bench(design.scaled(width / design.camera.width_px))
-            context.source.choose(*virtual_sensor(context.source.bench)())
+            context.source.choose(virtual_sensor(context.source.bench))
             return
-        find = image_folders([source]) if source.is_dir() else recordings([source])
-        context.source.choose(*find())
+        context.source.choose((image_folder if source.is_dir() else recording)(source))
 
     def start(self) -> None:
         """Show the page."""

@@ -1,9 +1,10 @@
-"""Apply a camera's settings, read them back, and report which of them were accepted."""
+"""The state of a camera; its settings are applied, read back, and compared."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from app.sources.camera.controls import CONTROLS, MAIN, ORDER
 from app.sources.camera.driver import CameraGone, Format, OpenCamera
@@ -187,3 +188,41 @@ def differences(
         found.append(tr("the format is {a}, not {b}").format(a=got.code, b=stored.pixel_format))
     compared = _compare(controls, stored.controls, {})
     return (*found, *(a.sentence for a in compared if not a.holds))
+
+
+Phase = Literal["closed", "opening", "live", "away"]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraState:
+    """The state of a camera.
+
+    Attributes
+    ----------
+    phase : str
+        ``closed`` (not used), ``opening``, ``live``, or ``away`` (tried again repeatedly).
+    sentence : str
+        Why the camera is away.
+    format : Format or None
+        Format as read back; None before the camera was opened.
+    offered : tuple of Format
+        Formats that the camera lists; empty if the system does not report them.
+    controls : tuple of Setting
+        Settings as last reported by the camera.
+    applied : tuple of Applied
+        Settings requested when the camera was opened or set, with their results.
+    """
+
+    phase: Phase = "closed"
+    sentence: str = ""
+    format: Format | None = None
+    offered: tuple[Format, ...] = ()
+    controls: tuple[Setting, ...] = ()
+    applied: tuple[Applied, ...] = ()
+
+
+def format_of(settings: CameraSettings | None) -> Format | None:
+    """Return the format stored with settings; None if it is not stored."""
+    if settings is None or not settings.pixel_format or settings.size == (0, 0):
+        return None
+    return Format(settings.pixel_format, *settings.size, settings.rate_hz)

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import platformdirs
 
-from app.sources.camera.applying import Applied, apply_settings, locked
-from app.sources.camera.camera_state import CameraState, format_of
+from app.sources.camera.applying import Applied, CameraState, apply_settings, format_of, locked
 from app.sources.camera.driver import (
     CameraDriver,
     CameraGone,

@@ -43,9 +43,9 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
 @pytest.fixture
 def presses(small_session: Path, context: AppContext) -> Path:
     """Return a folder with one press, selected as the camera."""
-    from app.sources.listing import image_folders
+    from app.sources.listing import image_folder
 
-    (info,) = image_folders([small_session / "balls"])()
+    info = image_folder(small_session / "balls")
     context.source.choose(info)
     return small_session / "balls"
 
@@ -153,12 +153,12 @@ def test_a_calibration_of_another_image_size_is_refused_with_both_sizes(
     page: InspectPage, tmp_path: Path, context: AppContext, small_calibration: Calibration,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
-    from app.sources.listing import image_folders
+    from app.sources.listing import image_folder
 
     folder = tmp_path / "others"
     folder.mkdir()
     cv2.imwrite(str(folder / "one.png"), np.full((100, 120, 3), 90, np.uint8))
-    (info,) = image_folders([folder])()
+    info = image_folder(folder)
     context.source.choose(info)
     page.enter()
     _use(page, small_calibration)
@@ -211,13 +211,13 @@ def test_a_frozen_image_ends_with_its_source(
     page: InspectPage, presses: Path, small_session: Path, context: AppContext,
     small_calibration: Calibration, qtbot: QtBot,
 ) -> None:  # fmt: skip
-    from app.sources.listing import image_folders
+    from app.sources.listing import image_folder
 
     page.enter()
     _use(page, small_calibration)
     _wait_for_section(page, qtbot)
     page.pause(True)
-    (info,) = image_folders([small_session / "background"])()
+    info = image_folder(small_session / "background")
     context.source.choose(info)
     assert not page.views.height.map.has_image
     assert not page.live.paused and not page.pause_action.isChecked()
@@ -285,9 +285,9 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
-    from app.sources.listing import image_folders
+    from app.sources.listing import image_folder
 
-    (info,) = image_folders([small_session / "background"])()
+    info = image_folder(small_session / "background")
     context.source.choose(info)
     path = context.workspace.calibration_path(small_calibration.sensor.serial, "mine")
     write_calibration(small_calibration, path)

@@ -40,9 +40,9 @@ def live(
     page: InspectPage, small_session: Path, small_calibration: Calibration, context: AppContext
 ) -> InspectPage:
     """Return the page with a folder of images as the camera."""
-    from app.sources.listing import image_folders
+    from app.sources.listing import image_folder
 
-    (info,) = image_folders([small_session / "balls"])()
+    info = image_folder(small_session / "balls")
     context.source.choose(info)
     page.enter()
     reconstructor = Reconstructor(small_calibration, model="paper")

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.measure.judging import Stated, judge
-from app.measure.keeping import Kept, record_of
+from app.measure.judging import Kept, Stated, judge, record_of
 from app.services.preferences import Limits
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare

@@ -202,14 +202,14 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     _measured(page, qtbot)
     assert work.result.figures[0].value == pytest.approx(4.0)
     qtbot.keyClick(tool_map, Qt.Key.Key_Delete)
-    assert work.sheet.items == ()
+    assert work.sheet == {}
     work.undo.undo()
-    assert len(work.sheet.items) == 1
+    assert len(work.sheet) == 1
 
     # With the keyboard only: choose a tool, place it in the middle, cancel another one.
     tool_map.tools.buttons["rectangle"].click()
     qtbot.keyClick(tool_map, Qt.Key.Key_Return)
-    assert [item.tool.name for item in work.sheet.items] == ["distance", "rectangle"]
+    assert [tool.name for tool in work.sheet.values()] == ["distance", "rectangle"]
     tool_map.tools.buttons["angle"].click()
     qtbot.keyClick(tool_map, Qt.Key.Key_Escape)
     assert not any(b.isChecked() for b in tool_map.tools.buttons.values())
@@ -303,13 +303,13 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
 def test_a_steady_press_is_frozen_and_detected_automatically(
     page: MeasurePage, context: AppContext, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
-    from app.sources.listing import image_folders
+    from app.sources.listing import image_folder
 
     folder = tmp_path / "camera"
     folder.mkdir()
     shutil.copy(press, folder / press.name)
-    for info in image_folders([folder])():
-        context.source.choose(info)
+    info = image_folder(folder)
+    context.source.choose(info)
     _measured(page, qtbot)
     press_view = page.press_view
     assert press_view.freeze_action.isChecked()

@@ -16,7 +16,7 @@ from pytestqt.qtbot import QtBot
 from app.command_line.main import main
 from app.context.context import AppContext
 from app.measure.press_check import TOLERANCE_MM, ImageMap, PressCheck, make_target
-from app.measure.protocol_bench import BenchHand
+from app.measure.protocol_press import BenchHand
 from app.measure.protocol_view import ProtocolView
 from app.services.preferences import Limits
 from app.sources.bench import Bench

@@ -10,7 +10,7 @@ import pytest
 
 from app.sources.bench import Bench
 from app.sources.folder import FolderSource
-from app.sources.listing import image_folders, virtual_sensor
+from app.sources.listing import image_folder, virtual_sensor
 from app.sources.source import Frame
 from gelpolight_core.errors import InputError
 
@@ -87,9 +87,8 @@ def test_a_folder_without_images_is_rejected(tmp_path: Path, name: str) -> None:
         FolderSource(tmp_path / name).open()
 
 
-def test_the_list_contains_the_virtual_sensor_and_existing_folders(folder: Path) -> None:
-    bench = Bench()
-    found = [*virtual_sensor(bench)(), *image_folders([folder, folder / "gone"])()]
+def test_the_virtual_sensor_and_a_folder_open_as_they_are_described(folder: Path) -> None:
+    found = [virtual_sensor(Bench()), image_folder(folder)]
     assert [(info.kind, info.name) for info in found] == [
         ("virtual", "Virtual sensor virtual-1"),
         ("folder", folder.name),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.sources.recorder import RecorderFigures
-from app.sources.recording_room import RESERVE_BYTES, room_for
+from app.sources.recorder import RESERVE_BYTES, RecorderFigures, room_for
 
 # 35 MB a second, as of a camera of 2.3 megapixels.
 AFTER_A_MINUTE = RecorderFigures(frames=1800, size_bytes=2_100_000_000, seconds=60.0)
