@@ -54,6 +54,7 @@ def editor(qtbot: QtBot) -> Iterator[LutEditor]:
     qtbot.wait(50)
     yield widget
     assert widget.stop()
+    stack.clear()  # its commands hold the editor
 
 
 def pixel(editor: LutEditor, cosine: float, value: float) -> QPoint:
