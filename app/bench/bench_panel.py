@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
@@ -11,18 +11,17 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
     QSizePolicy,
     QSlider,
     QSpinBox,
-    QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.sources.bench import CONDITION_RANGES, FAULTS, FLAT, PRESSED, Bench, Scene
+from app.widgets.buttons import tool_button
 from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -85,17 +84,10 @@ class BenchPanel(QWidget):
         self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         self._form.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
         self._fill_scene()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 8, 8, 8)
         heading = PlainLabel(tr("On the sensor"))
         heading.setBuddy(self._item)
-        layout.addWidget(heading)
-        layout.addWidget(self._item)
-        layout.addLayout(self._form)
-        layout.addWidget(self._hint)
-        layout.addWidget(self._image_group())
-        layout.addWidget(self._fault_group())
-        layout.addStretch(1)
+        groups = self._image_group(), self._fault_group()
+        vbox(heading, self._item, self._form, self._hint, *groups, None, of=self, margins=8)
         self.setMinimumWidth(260)
         self._bench_changed.connect(self._show_bench)
         # Methods, not lambdas, so that nothing keeps the panel alive once Qt has deleted it.
@@ -132,7 +124,7 @@ class BenchPanel(QWidget):
         self._depth_slider.valueChanged.connect(
             lambda steps: self._bench.arrange(depth_mm=steps / _SLIDER_STEPS_PER_MM)
         )
-        self._depth_row = _row([self._depth_slider, self._depth])
+        self._depth_row = _row(self._depth_slider, self._depth)
         self._depth.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self._form.addRow(tr("Depth"), self._depth_row)
         self._x = self._number("x_mm", tr("Position to the right"), tr("mm"), 0.1)
@@ -148,24 +140,25 @@ class BenchPanel(QWidget):
                 tr(
                     "Drag the object in the image to move it. The middle mouse button moves the "
                     "image."
-                )
+                ),
+                wrap=True,
             ),
             "bench.hint",
             tr("Hint"),
         )
-        self._hint.setWordWrap(True)
 
     def _make_pose_row(self) -> QWidget:
         self._pose = named(SpinBox(), "bench.pose", tr("Pose of the checkerboard"))
         self._pose.valueChanged.connect(lambda number: self._show_pose(number - 1))
-        back, on = QToolButton(), QToolButton()
-        back.setText(tr("Back"))
-        on.setText(tr("Next"))
-        named(back, "bench.previous_pose", tr("Previous pose of the checkerboard"))
-        named(on, "bench.next_pose", tr("Next pose of the checkerboard"))
-        back.clicked.connect(lambda: self._step_pose(-1))
-        on.clicked.connect(lambda: self._step_pose(1))
-        return _row([self._pose, back, on])
+        back = tool_button(
+            "bench.previous_pose", tr("Back"), lambda: self._step_pose(-1),
+            accessible=tr("Previous pose of the checkerboard"),
+        )  # fmt: skip
+        on = tool_button(
+            "bench.next_pose", tr("Next"), lambda: self._step_pose(1),
+            accessible=tr("Next pose of the checkerboard"),
+        )  # fmt: skip
+        return _row(self._pose, back, on)
 
     def _number(self, key: str, accessible: str, unit: str, step: float) -> QDoubleSpinBox:
         box = named(DoubleSpinBox(), f"bench.{key}", accessible)
@@ -182,33 +175,29 @@ class BenchPanel(QWidget):
         return box
 
     def _image_group(self) -> QWidget:
-        self._conditions = {
-            "exposure_ms": self._number("exposure_ms", tr("Exposure"), tr("ms"), 0.5),
-            "gain_db": self._number("gain_db", tr("Gain"), tr("dB"), 1.0),
-            "noise": self._number("noise", tr("Noise"), tr("times"), 0.1),
-        }
-        self._conditions["noise"].setToolTip(tr("0 is no noise, 1 is the noise of the design"))
         group = QGroupBox(tr("Image"))
         form = QFormLayout(group)
-        form.addRow(tr("Exposure"), self._conditions["exposure_ms"])
-        form.addRow(tr("Gain"), self._conditions["gain_db"])
-        form.addRow(tr("Noise"), self._conditions["noise"])
+        self._conditions = {}
+        for key, text, unit, step in (
+            ("exposure_ms", tr("Exposure"), tr("ms"), 0.5),
+            ("gain_db", tr("Gain"), tr("dB"), 1.0),
+            ("noise", tr("Noise"), tr("times"), 0.1),
+        ):
+            self._conditions[key] = self._number(key, text, unit, step)
+            form.addRow(text, self._conditions[key])
+        self._conditions["noise"].setToolTip(tr("0 is no noise, 1 is the noise of the design"))
         return group
 
     def _fault_group(self) -> QWidget:
         group = QGroupBox(tr("Simulate a fault"))
-        layout = QVBoxLayout(group)
         self._faults: dict[str, QCheckBox] = {}
         for fault in FAULTS:
             name, tip = _fault_names()[fault]
             box = named(QCheckBox(name), f"bench.fault.{fault}", name, tip)
-            box.toggled.connect(self._switch(fault))
-            layout.addWidget(box)
+            box.toggled.connect(partial(self._bench.switch, fault))
             self._faults[fault] = box
+        vbox(*self._faults.values(), of=group)
         return group
-
-    def _switch(self, fault: str) -> Callable[[bool], None]:
-        return lambda on: self._bench.switch(fault, on)
 
     def _show_pose(self, number: int) -> None:
         self._bench.show("checkerboard", number)
@@ -255,12 +244,9 @@ class BenchPanel(QWidget):
         self._hint.setVisible(movable)
 
 
-def _row(widgets: Sequence[QWidget]) -> QWidget:
+def _row(*widgets: QWidget) -> QWidget:
     row = QWidget()
-    layout = QHBoxLayout(row)
-    layout.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        layout.addWidget(widget)
+    hbox(*widgets, of=row, margins=0)
     return row
 
 

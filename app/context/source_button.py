@@ -6,10 +6,11 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QFileDialog, QMenu, QToolButton, QWidget
+from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from app.context.context import AppContext
 from app.context.recordings_dialog import RecordingsDialog
+from app.services.file_dialogs import ask_folder, ask_open
 from app.sources.source import SourceInfo
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
@@ -89,11 +90,9 @@ class SourceButton(QToolButton):
 
     def choose_folder(self) -> None:
         """Let the user choose a folder whose images replace the camera."""
-        chosen = QFileDialog.getExistingDirectory(
-            self, tr("Folder of images"), str(self._context.settings.folder("images"))
-        )
-        if chosen:
-            self.use_folder(Path(chosen))
+        folder = ask_folder(self, self._context.settings, "images", tr("Folder of images"))
+        if folder is not None:
+            self.use_folder(folder)
 
     def use_folder(self, folder: Path) -> None:
         """Use the images of a folder instead of a camera."""
@@ -111,14 +110,10 @@ class SourceButton(QToolButton):
 
     def choose_recording(self) -> None:
         """Let the user choose the file of a recording that replaces the camera."""
-        chosen, _ = QFileDialog.getOpenFileName(
-            self,
-            tr("Recording"),
-            str(self._context.settings.folder("recording")),
-            tr("Recordings (*{ending})").format(ending=ENDING),
-        )
-        if chosen:
-            self.use_recording(Path(chosen))
+        patterns = tr("Recordings (*{ending})").format(ending=ENDING)
+        file = ask_open(self, self._context.settings, "recording", tr("Recording"), patterns)
+        if file is not None:
+            self.use_recording(file)
 
     def use_recording(self, file: Path) -> None:
         """Use the frames of a recording instead of a camera."""

@@ -10,19 +10,19 @@ from typing import Any
 
 from PySide6.QtCore import QBuffer, QObject
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.inspect.movie_source import recorded_surfaces
 from app.inspect.views import Views
 from app.live.depth import LiveDepth
+from app.services.file_dialogs import ask_open, ask_save
 from app.sources.recording import RecordingSource
 from app.view2d.quantities import Reference
-from app.view3d.image_dialog import ImageChoice, ImageDialog
+from app.view3d.image_dialog import ImageChoice, image_dialog
 from app.view3d.saving import Played, ViewSaving
 from app.view3d.surface import Surface
 from app.widgets.actions import make_action
-from gelpolight_core.errors import InputError
 from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.io.atomic import write_atomically
@@ -80,13 +80,9 @@ class FileActions(QObject):
         processed = last is not None and bool(last.processed)
         name = "profiles" if len(profiles) > 1 else "profile"
         file = f"{name}-processed.csv" if processed else f"{name}.csv"
-        proposed = self._context.settings.folder("table") / file
-        chosen, _ = QFileDialog.getSaveFileName(
-            self._owner, tr("Save the profiles"), str(proposed), tr("Table (*.csv)")
-        )
-        if chosen:
-            self._context.settings.keep_folder("table", Path(chosen).parent)
-            self._write(Path(chosen), lambda path: write_profiles(profiles, path))
+        path = self._ask_save("table", tr("Save the profiles"), file, tr("Table (*.csv)"))
+        if path is not None:
+            self._write(path, lambda path: write_profiles(profiles, path))
 
     # The 3D view
 
@@ -110,26 +106,20 @@ class FileActions(QObject):
         return True
 
     def _ask_reference(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(
-            self._owner,
-            tr("Load a reference"),
-            str(self._context.settings.folder("height_map")),
+        path = ask_open(
+            self._owner, self._context.settings, "height_map", tr("Load a reference"),
             tr("Height map (*.npz)"),
-        )
-        if chosen:
-            self._context.settings.keep_folder("height_map", Path(chosen).parent)
-            self.load_reference(Path(chosen))
+        )  # fmt: skip
+        if path is not None:
+            self.load_reference(path)
 
     def load_reference(self, path: Path) -> None:
         """Compare with a height map that was exported as npz."""
-        try:
+        with self._context.toasts.errors():
             heightmap = read_npz(path)
             if self._depth.last is not None and self._depth.last.raw is not None:
                 difference(self._depth.last.raw, heightmap)
-        except InputError as error:
-            self._report(str(error), "fail")
-            return
-        self._views.compare_with(Reference(heightmap, path.name))
+            self._views.compare_with(Reference(heightmap, path.name))
 
     def _player(self) -> Played | None:
         """Return the frames of the open recording for a movie, if there is one."""
@@ -153,7 +143,7 @@ class FileActions(QObject):
     def screenshot(self) -> None:
         """Ask which image to save and in which size."""
         kinds = ("views",) if self._views.surface.view is None else ("views", "surface")
-        dialog = ImageDialog(self._views.size(), kinds, parent=self._owner)
+        dialog = image_dialog(self._views.size(), kinds, self._owner)
         dialog.chosen.connect(self.save_screenshot)
         dialog.open()
 
@@ -164,26 +154,18 @@ class FileActions(QObject):
             return
         image = self._views.grab().toImage()
         name = f"inspect-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.png"
-        chosen, _ = QFileDialog.getSaveFileName(
-            self._owner,
-            tr("Save the image"),
-            str(self._context.settings.folder("picture") / name),
-            tr("Image (*.png)"),
-        )
-        if chosen:
-            self._context.settings.keep_folder("picture", Path(chosen).parent)
+        path = self._ask_save("picture", tr("Save the image"), name, tr("Image (*.png)"))
+        if path is not None:
             data = png_bytes(image)
-            self._write(
-                Path(chosen), lambda path: write_atomically(path, lambda file: file.write(data))
-            )
+            self._write(path, lambda path: write_atomically(path, lambda file: file.write(data)))
+
+    def _ask_save(self, kind: str, title: str, name: str, patterns: str) -> Path | None:
+        return ask_save(self._owner, self._context.settings, kind, title, name, patterns)
 
     def _write(self, path: Path, write: Callable[[Path], object]) -> None:
-        try:
+        with self._context.toasts.errors():
             write(path)
-        except InputError as error:
-            self._report(str(error), "fail")
-            return
-        self._report(tr("Saved to {path}").format(path=path), "pass")
+            self._report(tr("Saved to {path}").format(path=path), "pass")
 
     def _report(self, text: str, kind: str, **more: Any) -> None:
         self._context.toasts.show(text, kind, **more)

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDialog,
     QDialogButtonBox,
     QFileDialog,
     QFormLayout,
-    QHBoxLayout,
     QLineEdit,
-    QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.inspect.export import ExportChoice, format_words
+from app.widgets.buttons import push_button
+from app.widgets.dialog import Dialog
 from app.widgets.inputs import SpinBox
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -27,7 +26,7 @@ FIRST_FORMATS = ("npz", "tif")
 FOLDER_WIDTH = 360
 
 
-class ExportDialog(QDialog):
+class ExportDialog(Dialog):
     """Lets the user choose formats, folder and frames.
 
     Parameters
@@ -48,18 +47,17 @@ class ExportDialog(QDialog):
     chosen = Signal(object)
 
     def __init__(self, folder: Path, *, count: int = 0, at: int = 0, parent: QWidget) -> None:
-        super().__init__(parent)
-        named(self, "inspect.export.dialog", tr("Export"))
-        self.setWindowTitle(tr("Export the depth"))
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        kinds = QDialogButtonBox.StandardButton
+        super().__init__(
+            parent, "inspect.export.dialog", tr("Export the depth"), kinds.Save | kinds.Cancel,
+            once=True,
+        )  # fmt: skip
         self._beside = folder.parent
         self._formats: dict[str, QCheckBox] = {}
-        column = QVBoxLayout(self)
         for name, words in format_words().items():
             box = named(QCheckBox(words), f"inspect.export.{name}", words)
             box.setChecked(name in FIRST_FORMATS)
             box.toggled.connect(self._check)
-            column.addWidget(box)
             self._formats[name] = box
         form = QFormLayout()
         self._stride = named(SpinBox(), "inspect.export.stride", tr("Use every n-th node"))
@@ -71,12 +69,10 @@ class ExportDialog(QDialog):
         self._folder = named(QLineEdit(str(folder)), "inspect.export.folder", tr("Folder"))
         self._folder.setMinimumWidth(FOLDER_WIDTH)
         self._folder.textChanged.connect(self._check)
-        browse = named(QPushButton(tr("Browse…")), "inspect.export.browse", tr("Choose folder"))
-        browse.clicked.connect(self._browse)
-        row = QHBoxLayout()
-        row.addWidget(self._folder, 1)
-        row.addWidget(browse)
-        form.addRow(tr("Folder"), row)
+        browse = push_button(
+            "inspect.export.browse", tr("Browse…"), self._browse, accessible=tr("Choose folder")
+        )
+        form.addRow(tr("Folder"), hbox((self._folder, 1), browse))
         self._range = named(
             QCheckBox(tr("Frames")), "inspect.export.range", tr("Export a range of frames")
         )
@@ -90,18 +86,10 @@ class ExportDialog(QDialog):
             self._range.toggled.connect(box.setEnabled)
         self._range.toggled.connect(self._check)
         self._first.valueChanged.connect(self._last.setMinimum)
-        span = QHBoxLayout()
-        span.addWidget(self._first)
-        span.addWidget(self._last)
-        form.addRow(self._range, span)
+        form.addRow(self._range, hbox(self._first, self._last))
         form.setRowVisible(self._range, count > 1)
-        column.addLayout(form)
-        self._buttons = QDialogButtonBox(
-            QDialogButtonBox.StandardButton.Save | QDialogButtonBox.StandardButton.Cancel
-        )
-        self._buttons.accepted.connect(self._accept)
-        self._buttons.rejected.connect(self.reject)
-        column.addWidget(self._buttons)
+        self.accepted.connect(lambda: self.chosen.emit(self.choice))
+        self.fill(*self._formats.values(), form)
         self._check()
 
     @property
@@ -120,13 +108,9 @@ class ExportDialog(QDialog):
 
     def _check(self) -> None:
         good = bool(self.choice.formats) and bool(self._folder.text().strip())
-        self._buttons.button(QDialogButtonBox.StandardButton.Save).setEnabled(good)
+        self.buttons.button(QDialogButtonBox.StandardButton.Save).setEnabled(good)
 
     def _browse(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, tr("Folder"), self._folder.text())
         if chosen:
             self._folder.setText(chosen)
-
-    def _accept(self) -> None:
-        self.chosen.emit(self.choice)
-        self.accept()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtGui import QColor, QIcon, QPixmap
-from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.inspect.section_line import SectionLines
-from app.theme.icons import icon
 from app.view2d.profile_plot import line_colour
+from app.widgets.buttons import tool_button
 from app.widgets.inputs import ComboBox
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -38,20 +39,16 @@ class LineChoice(QWidget):
             tr("The values below belong to this line. A click on a line also selects it"),
         )  # fmt: skip
         self._box.activated.connect(lambda at: self.chosen.emit(self._box.itemData(at)))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(2)
-        row.addWidget(self._box, 1)
-        self._add = self._button("add", tr("Add a line"), self.add_wanted)
-        self._remove = self._button("remove", tr("Remove this line"), self.remove_wanted)
-        row.addWidget(self._add)
-        row.addWidget(self._remove)
-
-    def _button(self, name: str, tip: str, wanted: Signal) -> QToolButton:
-        button = named(QToolButton(), f"inspect.section.line.{name}", tip, tip)
-        button.setIcon(icon(name))
-        button.clicked.connect(lambda: wanted.emit())  # type: ignore[attr-defined]
-        return button
+        add, remove = tr("Add a line"), tr("Remove this line")
+        self._add = tool_button(
+            "inspect.section.line.add", "", self.add_wanted.emit, icon_name="add", accessible=add,
+            tip=add,
+        )  # fmt: skip
+        self._remove = tool_button(
+            "inspect.section.line.remove", "", self.remove_wanted.emit, icon_name="remove",
+            accessible=remove, tip=remove,
+        )  # fmt: skip
+        hbox((self._box, 1), self._add, self._remove, of=self, margins=0, spacing=2)
 
     def show_lines(self, lines: SectionLines) -> None:
         """Show the lines, and which of them is chosen."""

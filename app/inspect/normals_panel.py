@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.live.frame_results import Shown
 from app.view2d.map_view import MapView, extent_of
 from app.view2d.quantities import STEEPEST_DEG
 from app.widgets.inputs import ComboBox
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -32,11 +33,7 @@ class NormalsPanel(QWidget):
         self._what.addItem(tr("Normals: x in red, y in green"), "normals")
         self._what.addItem(tr("Slope"), "slope")
         self._what.currentIndexChanged.connect(self._on_chosen)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addWidget(self._what)
-        column.addWidget(self.map, 1)
+        vbox(self._what, (self.map, 1), of=self, margins=0, spacing=2)
         self.map.say(tr("No depth yet."))
 
     @property

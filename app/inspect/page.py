@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.inspect.actions import FileActions
@@ -32,6 +32,7 @@ from app.services.jobs import Jobs
 from app.view2d.map_point import PixelMap, read_at
 from app.widgets.actions import make_action
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
@@ -76,13 +77,8 @@ class InspectPage(QWidget):
 
     def _lay_out(self) -> None:
         foot = QWidget()
-        row = QHBoxLayout(foot)
-        row.setContentsMargins(8, 2, 8, 2)
-        row.addWidget(self._readout, 1)
-        row.addWidget(self._rate)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
+        hbox((self._readout, 1), self._rate, of=foot, margins=(8, 2, 8, 2))
+        column = vbox(of=self, margins=0, spacing=0)
         self.pause_action = make_action(
             self, "inspect.pause", tr("Pause"), lambda: self.pause(not self.live.paused),
             keys=("Space",), icon_name="pause", tip=tr("Freeze the image at full detail"),
@@ -142,8 +138,7 @@ class InspectPage(QWidget):
         self.recorder.reported.connect(self._on_recorded)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self.banner.act_wanted.connect(self._on_act)
-        self._texts = QTimer(self)
-        self._texts.setInterval(TEXT_MS)
+        self._texts = QTimer(self, interval=TEXT_MS)
         self._texts.timeout.connect(self._show_texts)
 
     # Called by the main window

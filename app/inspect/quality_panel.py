@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.live.frame_results import Shown
 from app.view2d.map_point import flag_words
@@ -12,6 +12,7 @@ from app.view2d.map_view import MapView, extent_of
 from app.view2d.quantities import FLAG_COLOURS
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.misfit import Misfit
@@ -42,15 +43,9 @@ class QualityPanel(QWidget):
         self._what.addItem(tr("Misfit of the image (| |n| - 1 |)"), "misfit")
         self._what.addItem(tr("Uncertainty (when paused)"), "uncertainty")
         self._what.currentIndexChanged.connect(self._on_chosen)
-        self._legend = named(MarkupLabel(), "inspect.quality.legend", tr("Legend"))
-        self._legend.setWordWrap(True)
+        self._legend = named(MarkupLabel(wrap=True), "inspect.quality.legend", tr("Legend"))
         self._legend.setContentsMargins(6, 2, 6, 2)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addWidget(self._what)
-        column.addWidget(self.map, 1)
-        column.addWidget(self._legend)
+        vbox(self._what, (self.map, 1), self._legend, of=self, margins=0, spacing=2)
         self.map.say(tr("No depth yet."))
         self._count = 0
 

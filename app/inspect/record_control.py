@@ -48,8 +48,7 @@ class RecordControl(QObject):
             icon_name="record", tip=tr("Record every frame without loss"),
         )  # fmt: skip
         self.action.setCheckable(True)
-        self._timer = QTimer(self)
-        self._timer.setInterval(POLL_MS)
+        self._timer = QTimer(self, interval=POLL_MS)
         self._timer.timeout.connect(self._poll)
         depth.live.switched.connect(self._on_switched)
 

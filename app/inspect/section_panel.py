@@ -7,21 +7,15 @@ from collections.abc import Sequence
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QFrame,
-    QHBoxLayout,
-    QPushButton,
-    QScrollArea,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QScrollArea, QWidget
 
 from app.inspect.line_choice import LineChoice
 from app.view2d.cuts import Cut, Section
 from app.view2d.profile_plot import ProfilePlot
-from app.widgets.inputs import ComboBox, DoubleSpinBox
+from app.widgets.buttons import push_button
+from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, escaped
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.units import figure_in_unit
 from gelpolight_core.measurement.measured import Measured
@@ -30,8 +24,6 @@ from gelpolight_core.translation import tr
 FIRST, SECOND = QColor(11, 92, 173, 60), QColor(23, 138, 70, 60)
 DEG = "deg"
 SIDE_WIDTH = 170
-# Those of ISO 21920-3 that fit on a sensor.
-CUTOFFS_MM = (0.25, 0.8, 2.5)
 
 
 class SectionPanel(QWidget):
@@ -55,50 +47,23 @@ class SectionPanel(QWidget):
         self.cut = Cut()
         self._make_plot()
         self.choice = LineChoice()
-        self._width = named(
-            DoubleSpinBox(), "inspect.section.width", tr("Width"),
-            tr("Depth is averaged over this width across the line"),
+        self.form = Form(Section(), "inspect.section")
+        self.form.changed.connect(self.changed)
+        self._plot.level_dragged.connect(lambda depth_mm: self.form.change(level_mm=depth_mm))
+        save = push_button(
+            "inspect.section.save", tr("Save…"), self.save_wanted.emit,
+            accessible=tr("Save the profiles"), tip=tr("Save all lines as a table (CSV)"),
         )  # fmt: skip
-        self._width.setRange(0.0, 5.0)
-        self._width.setSingleStep(0.1)
-        self._width.setValue(Section().width_mm)
-        self._width.setSuffix(tr(" mm wide"))
-        self._width.valueChanged.connect(self.changed)
-        self._region = named(
-            QCheckBox(tr("Roughness")), "inspect.section.region", tr("Measure roughness"),
-            tr("Measure Sa, Sq and Sz in a rectangle on the height map"),
-        )  # fmt: skip
-        self._region.toggled.connect(self.changed)
-        self._make_level()
-        self._make_cutoff()
-        save = named(
-            QPushButton(tr("Save…")), "inspect.section.save", tr("Save the profiles"),
-            tr("Save all lines as a table (CSV)"),
-        )  # fmt: skip
-        save.clicked.connect(self.save_wanted)
-        self._figures = named(MarkupLabel(), "inspect.section.figures", tr("Measurements"))
-        self._figures.setWordWrap(True)
+        self._figures = named(MarkupLabel(wrap=True), "inspect.section.figures", tr("Measurements"))
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
-        scroll = QScrollArea()
-        scroll.setWidgetResizable(True)
+        scroll = QScrollArea(widgetResizable=True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         scroll.setWidget(self._figures)
-        scroll.setFixedWidth(SIDE_WIDTH)
-        last = QHBoxLayout()
-        last.addWidget(self._region, 1)
-        last.addWidget(save)
-        side = QVBoxLayout()
-        for widget in (self.choice, self._width, self._level, self._cutoff):
+        side = vbox(self.choice, self.form, save, (scroll, 1), margins=0, spacing=2)
+        for widget in (self.choice, self.form, save, scroll):
             widget.setFixedWidth(SIDE_WIDTH)
-            side.addWidget(widget)
-        side.addLayout(last)
-        side.addWidget(scroll, 1)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(2, 2, 2, 4)
-        row.setSpacing(2)
-        row.addWidget(self._plot, 1)
-        row.addLayout(side)
+        hbox((self._plot, 1), side, of=self, margins=(2, 2, 2, 4), spacing=2)
 
     def _make_plot(self) -> None:
         self._plot = ProfilePlot("inspect.section.plot")
@@ -117,53 +82,6 @@ class SectionPanel(QWidget):
             region.sigRegionChanged.connect(self.changed)
             self._plot.addItem(region)
             self._ranges.append(region)
-
-    def _make_level(self) -> None:
-        self._level = named(
-            DoubleSpinBox(), "inspect.section.level", tr("Depth at which the width is measured"),
-            tr("Depth at which the width is measured. 0: half of the height"),
-        )  # fmt: skip
-        self._level.setRange(0.0, 5.0)
-        self._level.setDecimals(3)
-        self._level.setSingleStep(0.01)
-        self._level.setSpecialValueText(tr("width at half height"))
-        self._level.setPrefix(tr("width at "))
-        self._level.setSuffix(tr(" mm"))
-        self._level.valueChanged.connect(self.changed)
-        self._plot.level_dragged.connect(self._level.setValue)
-
-    def _make_cutoff(self) -> None:
-        self._cutoff = named(
-            ComboBox(), "inspect.section.cutoff", tr("Roughness of the line"),
-            tr("Measure Ra, Rq and Rz along the line (ISO 21920). The cut-off separates roughness "
-               "from waviness"),
-        )  # fmt: skip
-        self._cutoff.addItem(tr("no line roughness"), None)
-        for cutoff_mm in CUTOFFS_MM:
-            self._cutoff.addItem(tr("Ra, Rq, Rz at {c:g} mm").format(c=cutoff_mm), cutoff_mm)
-        self._cutoff.currentIndexChanged.connect(lambda _: self.changed.emit())
-
-    @property
-    def cutoff_mm(self) -> float | None:
-        """Cut-off of the roughness of the line. None: it is not measured."""
-        chosen = self._cutoff.currentData()
-        return None if chosen is None else float(chosen)
-
-    @property
-    def width_mm(self) -> float:
-        """Width across the line over which depth is averaged."""
-        return float(self._width.value())
-
-    @property
-    def level_mm(self) -> float | None:
-        """Depth at which the width is measured. None: half of the height."""
-        value = float(self._level.value())
-        return value if value > 0.0 else None
-
-    @property
-    def has_region(self) -> bool:
-        """Whether the roughness of the rectangle is measured."""
-        return self._region.isChecked()
 
     @property
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QFormLayout,
-    QPushButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QFormLayout, QWidget
 
 from app.context.context import AppContext
 from app.live.depth import LiveDepth
 from app.live.frame_results import Shown
 from app.live.publisher import ANY_HOST, HOST, PORT, Publisher
+from app.widgets.buttons import push_button
+from app.widgets.dialog import Dialog
 from app.widgets.inputs import ComboBox, SpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
@@ -129,41 +125,36 @@ class DepthStream(QObject):
         self.count += 1
 
 
-class StreamDialog(QDialog):
+class StreamDialog(Dialog):
     """Lets the user start and stop the stream. The network needs an explicit consent."""
 
     def __init__(self, stream: DepthStream, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(parent, "stream", tr("Stream the live depth"))
         self._stream = stream
-        named(self, "stream", tr("Stream the live depth"))
-        self.setWindowTitle(tr("Stream the live depth"))
         self.setMinimumWidth(WIDTH)
         about = PlainLabel(
             tr(
                 "Depth, normals, flags and health of the live frames are sent over ZeroMQ while "
                 "the Inspect page is visible. The guide has a client of ten lines."
-            )
+            ),
+            wrap=True,
         )
-        about.setWordWrap(True)
         self.reach = named(ComboBox(), "stream.reach", tr("Receivers"))
         self.reach.addItem(tr("Programs on this computer"), False)
         self.reach.addItem(tr("Other computers of the network, too"), True)
         self.port = named(SpinBox(), "stream.port", tr("Port"))
         self.port.setRange(1024, 65535)
         self.port.setValue(PORT)
-        self.state = named(PlainLabel(), "stream.state", tr("State of the stream"))
-        self.state.setWordWrap(True)
-        self.button = named(QPushButton(), "stream.start", tr("Start or stop the stream"))
-        self.button.clicked.connect(self._toggle)
-        close = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        close.addButton(self.button, QDialogButtonBox.ButtonRole.ActionRole)
-        close.rejected.connect(self.reject)
-        form = QFormLayout(self)
+        self.state = named(PlainLabel(wrap=True), "stream.state", tr("State of the stream"))
+        self.button = push_button(
+            "stream.start", "", self._toggle, accessible=tr("Start or stop the stream")
+        )
+        form = QFormLayout()
         form.addRow(about)
         form.addRow(tr("&Receivers"), self.reach)
         form.addRow(tr("&Port"), self.port)
         form.addRow(self.state)
-        form.addRow(close)
+        self.fill(form, add=(self.button,))
         stream.changed.connect(self.refresh)
         self.refresh()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PySide6.QtCore import QByteArray, Qt, Signal
 from PySide6.QtWidgets import (
     QDockWidget,
@@ -28,10 +30,10 @@ from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Jobs
 from app.view2d.cuts import Cut, Section
-from app.view2d.display import Display, display_as_text, display_from_text
+from app.view2d.display import QUANTITIES, Display, display_as_text, display_from_text
 from app.view2d.map_view import MapView, extent_of
 from app.view2d.profile_plot import line_colour
-from app.view2d.quantities import Reference, quantity_names
+from app.view2d.quantities import Reference
 from app.view3d.panel import SurfacePanel, view_names
 from app.view3d.surface import SurfaceLine
 from app.widgets.actions import make_action
@@ -90,8 +92,7 @@ class Views(QMainWindow):
         self._connect()
 
     def _make_bar(self) -> QToolBar:
-        bar = named(QToolBar(tr("Inspect")), "inspect.bar", tr("Inspect"))
-        bar.setMovable(False)
+        bar = named(QToolBar(tr("Inspect"), movable=False), "inspect.bar", tr("Inspect"))
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         self._menu = QMenu(self)
         button = named(QToolButton(), "inspect.views.menu", tr("Views"), tr("Show or hide a view"))
@@ -216,19 +217,13 @@ class Views(QMainWindow):
 
     def _section(self) -> Section:
         first, second = self.section.ranges
-        panel, lines = self.section, self.lines
-        return Section(
-            tuple(lines),
-            lines.chosen,
-            panel.width_mm,
-            first,
-            second,
-            panel.level_mm,
-            panel.cutoff_mm,
+        lines, form = self.lines, self.section.form
+        return replace(
+            form.value, lines=tuple(lines), chosen=lines.chosen, first=first, second=second
         )
 
     def _measures_region(self) -> bool:
-        return self._visible["section"] and self.section.has_region
+        return self._visible["section"] and self.section.form.value.region
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show a frame in every visible view."""
@@ -344,11 +339,11 @@ class Views(QMainWindow):
 
     def _on_section(self) -> None:
         self.lines.show(self._visible["section"] and self._has_depth)
-        self.lines.set_width(self.section.width_mm)
+        self.lines.set_width(self.section.form.value.width_mm)
         self.section.choice.show_lines(self.lines)
-        region = self._measures_region() or self.processing.has_rectangle
+        region = self._measures_region() or self.processing.form.value.uses_rectangle
         self.region.show(region and self._has_depth)
-        self.level_points.show(self.processing.level == "points" and self._has_depth)
+        self.level_points.show(self.processing.form.value.level == "points" and self._has_depth)
         self._lay_lines()
         self.wanted_changed.emit()
 
@@ -368,7 +363,7 @@ class Views(QMainWindow):
     def _on_display(self) -> None:
         display: Display = self.display.display
         self.surface.set_exaggeration(display.exaggeration)
-        self.surface.menu.set_colours(quantity_names(), display.colour_by)
+        self.surface.menu.set_colours(QUANTITIES, display.colour_by)
         self.wanted_changed.emit()
 
     def _on_image_clicked(self, u: float, v: float) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.live.advice import Advice
 from app.services.jobs import Jobs
+from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -38,20 +40,17 @@ class Banner(QWidget):
         super().__init__()
         named(self, "inspect.banner", tr("What to do next"))
         self._advice, self._idle = Advice(), idle
-        self._text = named(PlainLabel(), "inspect.advice", tr("Advice"))
-        self._text.setWordWrap(True)
+        self._text = named(PlainLabel(wrap=True), "inspect.advice", tr("Advice"))
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._button = named(QPushButton(), "inspect.advised", tr("Do this"))
         self._button.clicked.connect(lambda: self.act_wanted.emit(self._advice.act))
         self._bar = named(QProgressBar(), "inspect.progress", tr("Progress"))
         self._bar.setFixedWidth(220)
-        self._stop = named(QPushButton(tr("Stop")), "inspect.stop", tr("Stop the work"))
-        self._stop.clicked.connect(jobs.cancel)
+        self._stop = push_button(
+            "inspect.stop", tr("Stop"), jobs.cancel, accessible=tr("Stop the work")
+        )
         jobs.progressed.connect(self.show_work)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(10, 4, 10, 4)
-        for widget in (self._text, self._button, self._bar, self._stop):
-            row.addWidget(widget)
+        hbox(self._text, self._button, self._bar, self._stop, of=self, margins=(10, 4, 10, 4))
         line, button = self._text.fontMetrics().lineSpacing(), self._button.sizeHint().height()
         self.setFixedHeight(max(2 * line, button) + 8)
         self._working = False

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QGridLayout, QProgressBar, QSizePolicy, QWidget
 
 from app.live.image_checks import Exposure
 from app.widgets.label import PlainLabel, plain_tip
@@ -18,54 +18,33 @@ NARROW = 620
 SIGNS = {Verdict.PASS: "\u2713", Verdict.WARN: "!", Verdict.FAIL: "\u2715"}
 
 
-class FocusBar(QWidget):
+class FocusBar(QProgressBar):
     """Sharpness of the image relative to the recent best; full means as sharp as the best."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(
             self,
             "live.focus",
             tr("Focus"),
             tr("Turn the lens until the bar is full and drops in both directions"),
         )
-        self.share = 0.0
-        policy = QSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setRange(0, 1000)
+        self.setFixedSize(170, 18)
+        policy = self.sizePolicy()
         # Still images have no focus to adjust; the image above must not jump because of that.
         policy.setRetainSizeWhenHidden(True)
         self.setSizePolicy(policy)
-
-    def sizeHint(self) -> QSize:  # noqa: D102
-        return QSize(170, 18)
+        self.show_share(0.0)
 
     def show_share(self, share: float) -> None:
         """Show the focus as a share of the best, 0..1."""
         self.share = share
-        self.setAccessibleDescription(self._text())
-        self.update()
-
-    def _text(self) -> str:
-        return tr("Focus {p:.0f} % of best").format(p=100.0 * self.share)
-
-    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        palette = self.palette()
-        frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QPen(palette.color(QPalette.ColorRole.Mid), 1.0))
-        painter.setBrush(palette.color(QPalette.ColorRole.Base))
-        painter.drawRoundedRect(frame, 3.0, 3.0)
         # The last third of the range takes two thirds of the bar, because fine adjustment happens
         # there.
-        filled = QRectF(frame)
-        filled.setWidth(frame.width() * self.share**3)
-        tint = palette.color(QPalette.ColorRole.Highlight)
-        tint.setAlpha(110)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(tint)
-        painter.drawRoundedRect(filled, 3.0, 3.0)
-        painter.setPen(palette.color(QPalette.ColorRole.Text))
-        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._text())
+        self.setValue(round(1000.0 * share**3))
+        self.setFormat(tr("Focus {p:.0f} % of best").format(p=100.0 * share))
+        self.setAccessibleDescription(self.text())
 
 
 class ChecksBar(QWidget):

@@ -30,9 +30,7 @@ class PressCounter(QObject):
         self._context = context
         self._seen = 0
         self._new, self._kept = Counter[str](), Counter[str]()
-        self._keep = QTimer(self)
-        self._keep.setSingleShot(True)
-        self._keep.setInterval(KEEP_MS)
+        self._keep = QTimer(self, singleShot=True, interval=KEEP_MS)
         self._keep.timeout.connect(self.flush)
         self._reported = False
         context.requests.calibrations_changed.connect(self._read)

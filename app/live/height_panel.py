@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QElapsedTimer, Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.live.frame_results import Shown
 from app.view2d.colour_bar import depth_counts
 from app.view2d.display import LIMITS_MM
 from app.view2d.map_view import MapView, extent_of
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from app.widgets.units import per_mm, unit_word
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -45,9 +46,7 @@ class HeightPanel(QWidget):
         limits = LIMITS_MM if adjustable else None
         self.map = MapView("inspect.height.map", tr("Height map"), limits=limits)
         self._since_histogram = QElapsedTimer()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(self.map)
+        hbox(self.map, of=self, margins=0)
         self.map.say(tr("No depth yet."))
         if adjustable:
             self.map.bar.setToolTip(

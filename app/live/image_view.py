@@ -95,9 +95,8 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         self._box.sigRangeChanged.connect(self._on_range)
         self.scene().sigMouseMoved.connect(self._on_pointer)
         self.scene().sigMouseClicked.connect(self._on_click)
-        self._placeholder = PlainLabel(tr("No camera. Select a source."), self)
+        self._placeholder = PlainLabel(tr("No camera. Select a source."), self, wrap=True)
         self._placeholder.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._placeholder.setWordWrap(True)
         self._placeholder.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 15px;")
         self._placeholder.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 

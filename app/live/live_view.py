@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from PySide6.QtCore import QStandardPaths, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.live.checks_bar import ChecksBar
 from app.live.handles import Handle, move, next_name, resize
@@ -29,6 +29,7 @@ from app.live.image_view import ImageView
 from app.live.overlay import Overlay
 from app.live.tools import ImageTools
 from app.live.zebra import eight_bits, with_zebra
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically
@@ -120,12 +121,7 @@ class LiveView(QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self._tools)
-        column.addWidget(self._image, 1)
-        column.addWidget(self._checks)
+        vbox(self._tools, (self._image, 1), self._checks, of=self, margins=0, spacing=0)
 
     def _connect(self) -> None:
         self._tools.pressed.connect(self._on_tool)
@@ -136,13 +132,9 @@ class LiveView(QWidget):
         self._image.zoomed.connect(self._tools.show_zoom)
         self._image.resized.connect(self._place_histogram)
         self._image.overlay.handle_moved.connect(self._on_handle_moved)
-        self._tick = QTimer(self)
-        self._tick.setTimerType(Qt.TimerType.PreciseTimer)
-        self._tick.setInterval(TICK_MS)
+        self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=TICK_MS)
         self._tick.timeout.connect(self._show_newest_frame)
-        self._nudge_end = QTimer(self)
-        self._nudge_end.setSingleShot(True)
-        self._nudge_end.setInterval(NUDGE_END_MS)
+        self._nudge_end = QTimer(self, singleShot=True, interval=NUDGE_END_MS)
         self._nudge_end.timeout.connect(self._end_nudge)
 
     @property

@@ -5,7 +5,6 @@ from __future__ import annotations
 from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QHBoxLayout,
     QToolButton,
     QWidget,
 )
@@ -14,6 +13,7 @@ from app.sources.recording import Playback, RecordingSource
 from app.widgets.actions import make_action
 from app.widgets.inputs import ComboBox, Slider
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -41,8 +41,7 @@ class ReplayBar(QWidget):
         super().__init__()
         named(self, f"{page}.replay", tr("Replay"))
         self._source: RecordingSource | None = None
-        row = QHBoxLayout(self)
-        row.setContentsMargins(8, 2, 8, 2)
+        row = hbox(of=self, margins=(8, 2, 8, 2))
         for name, text, slot, keys, icon_name in (
             ("back", tr("Previous frame"), lambda: self._step(-1), ",", "step-back"),
             ("play", tr("Play or pause"), self._toggle, "Ctrl+Space", "play"),
@@ -77,8 +76,7 @@ class ReplayBar(QWidget):
         self._speed.activated.connect(self._set_speed)
         row.addWidget(self._loop)
         row.addWidget(self._speed)
-        self._timer = QTimer(self)
-        self._timer.setInterval(POLL_MS)
+        self._timer = QTimer(self, interval=POLL_MS)
         self._timer.timeout.connect(self._poll)
         self.hide()
 

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QEvent, QSize, Signal
-from PySide6.QtGui import QIcon, QPalette
-from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
+from PySide6.QtCore import QSize, Signal
+from PySide6.QtWidgets import QToolButton, QWidget
 
-from app.live.icons import SIDE, tool_icon
+from app.theme.icons import icon
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from app.widgets.tool_key import add_tool_key
 from gelpolight_core.translation import tr
 
-# name: (key, stays pressed)
+SIDE = 20
+# name: (key, stays pressed, icon)
 TOOLS = {
-    "fit": ("F", False),
-    "full_size": ("1", False),
-    "freeze": ("Space", True),
-    "snapshot": ("P", False),
-    "zebra": ("Z", True),
-    "histogram": ("H", True),
-    "overlay": ("O", True),
+    "fit": ("F", False, "fit"),
+    "full_size": ("1", False, "full-size"),
+    "freeze": ("Space", True, "pause"),
+    "snapshot": ("P", False, "picture"),
+    "zebra": ("Z", True, "zebra"),
+    "histogram": ("H", True, "histogram"),
+    "overlay": ("O", True, "marks"),
 }
 
 
@@ -58,9 +59,7 @@ class ImageTools(QWidget):
         named(self, "live.tools", tr("Image tools"))
         self._buttons: dict[str, QToolButton] = {}
         self._zoom = named(PlainLabel(), "live.zoom", tr("Magnification"))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(4, 2, 8, 2)
-        row.setSpacing(2)
+        row = hbox(of=self, margins=(4, 2, 8, 2), spacing=2)
         for name, text in tool_texts().items():
             row.addWidget(self._make_button(name, text, owner))
         row.addStretch(1)
@@ -68,11 +67,10 @@ class ImageTools(QWidget):
         self._buttons["overlay"].setChecked(True)
 
     def _make_button(self, name: str, text: str, owner: QWidget) -> QToolButton:
-        key, stays = TOOLS[name]
-        button = named(QToolButton(), f"live.{name}", text, text, key)
-        button.setAutoRaise(True)
+        key, stays, sign = TOOLS[name]
+        button = named(QToolButton(autoRaise=True), f"live.{name}", text, text, key)
         button.setIconSize(QSize(SIDE, SIDE))
-        button.setIcon(self._icon(name))
+        button.setIcon(icon(sign))
         button.setCheckable(stays)
         if stays:
             button.toggled.connect(lambda on: self.switched.emit(name, on))
@@ -93,14 +91,3 @@ class ImageTools(QWidget):
     def show_zoom(self, scale: float) -> None:
         """Show the magnification, 1 for full size; NaN if there is no image."""
         self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
-
-    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
-        super().changeEvent(event)
-        changes = (QEvent.Type.PaletteChange, QEvent.Type.StyleChange)
-        if event.type() in changes and hasattr(self, "_buttons"):
-            for name, button in self._buttons.items():
-                button.setIcon(self._icon(name))
-
-    def _icon(self, name: str) -> QIcon:
-        colour = self.palette().color(QPalette.ColorRole.ButtonText)
-        return tool_icon(name, colour, ratio=max(self.devicePixelRatioF(), 1.0))

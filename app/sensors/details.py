@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QScrollArea,
     QToolBar,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -97,8 +96,7 @@ class Details(QWidget):
 def _stages(entry: Entry) -> QWidget:
     """Return the quality tables of all stages, one below the other."""
     stages = QWidget()
-    column = QVBoxLayout(stages)
-    column.setContentsMargins(0, 0, 8, 0)
+    column = vbox(of=stages, margins=(0, 0, 8, 0))
     for stage, table in (entry.summary.quality if entry.summary is not None else {}).items():
         title = stage_title(stage)
         column.addWidget(_heading(title, table.verdict))

@@ -34,8 +34,7 @@ class GelCarePanel(QWidget):
         self.elastomer.editingFinished.connect(self._on_edited)
         label = PlainLabel(tr("&Elastomer"))
         label.setBuddy(self.elastomer)
-        self._care = named(PlainLabel(), "sensors.gel.care", tr("Use of the gel"))
-        self._care.setWordWrap(True)
+        self._care = named(PlainLabel(wrap=True), "sensors.gel.care", tr("Use of the gel"))
         vbox(hbox(label, (self.elastomer, 1)), self._care, of=self, margins=0)
 
     def show_gel(self, elastomer: str, presses: str) -> None:

@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
-    QSplitter,
     QStackedWidget,
     QToolBar,
     QWidget,
@@ -29,7 +28,7 @@ from app.sensors.welcome import Welcome
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job, Jobs
 from app.widgets.actions import make_action
-from app.widgets.layout import vbox
+from app.widgets.layout import splitter, vbox
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.gel_care import presses_text, read_presses
@@ -63,13 +62,9 @@ class SensorsPage(QWidget):
         self._reports.refused.connect(lambda text: context.toasts.show(text, "fail"))
         self._details = Details((self.use, self.report, self.reveal, self.remove))
         self._details.gel.renamed.connect(self._on_elastomer)
-        split = QSplitter(Qt.Orientation.Horizontal, self)
-        split.addWidget(self._build_lists())
-        split.addWidget(self._details)
-        split.setStretchFactor(0, 3)
-        split.setStretchFactor(1, 2)
-        split.setSizes([600, 400])
-        split.setChildrenCollapsible(False)
+        lists = splitter(Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2))
+        parts = (lists, 3), (self._details, 2)
+        split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
         self._stack = QStackedWidget(self)
         self._stack.addWidget(Welcome(self._first_actions()))
         self._stack.addWidget(self._build_library(split))
@@ -139,16 +134,7 @@ class SensorsPage(QWidget):
         first = (self.demo, self.new, self.session, self.import_, self.trash)
         return tuple(action for action in first if action.isVisible())
 
-    def _build_lists(self) -> QSplitter:
-        lists = QSplitter(Qt.Orientation.Vertical, self)
-        lists.addWidget(self._table)
-        lists.addWidget(self._sessions)
-        lists.setStretchFactor(0, 3)
-        lists.setStretchFactor(1, 2)
-        lists.setChildrenCollapsible(False)
-        return lists
-
-    def _build_library(self, split: QSplitter) -> QWidget:
+    def _build_library(self, split: QWidget) -> QWidget:
         bar = named(QToolBar(self), "sensors.bar", tr("Library"))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         for action in (self.new, self.session, self.import_, self.trash):

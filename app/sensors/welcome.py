@@ -37,8 +37,8 @@ class Welcome(QWidget):
                 "actions, or drop a session folder or a calibration file onto this window."
             ),
             self,
+            wrap=True,
         )
-        text.setWordWrap(True)
         text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         middle = QWidget(self)
         middle.setFixedWidth(WIDTH)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.widgets.forms import choice, folder, number
+from app.widgets.fields import choice, folder, number
 from gelpolight_core.reconstruction.modes import MODES, Mode
 from gelpolight_core.translation import LANGUAGES, tr
 

@@ -12,17 +12,16 @@ from datetime import datetime
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QPushButton,
     QSizePolicy,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.theme import theme
 from app.theme.icons import icon
+from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.native import give_own_window, native_windows
 from gelpolight_core.errors import InputError
@@ -79,8 +78,7 @@ class Toast(QWidget):
         self.times = 1
         named(self, "toast", f"{WORDS[kind]}: {text}")
         give_own_window(self)  # over the 3D view, which has a native window
-        self._label = PlainLabel(text, self)
-        self._label.setWordWrap(True)
+        self._label = PlainLabel(text, self, wrap=True)
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         sign = PlainLabel(parent=self)
@@ -91,24 +89,16 @@ class Toast(QWidget):
         close.setIcon(icon("close"))
         close.setAutoRaise(True)
         close.clicked.connect(self.dismiss)
-        top = QHBoxLayout()
-        top.addWidget(sign)
-        top.addWidget(self._label, 1)
-        top.addWidget(close, 0, Qt.AlignmentFlag.AlignTop)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(12, 10, 8, 10)
-        layout.addLayout(top)
+        top = hbox(sign, (self._label, 1), (close, 0, Qt.AlignmentFlag.AlignTop))
+        layout = vbox(top, of=self, margins=(12, 10, 8, 10))
         if actions:
-            row = QHBoxLayout()
-            row.addStretch(1)
+            row = hbox(None)
             for i, (label, act) in enumerate(actions):
-                button = named(QPushButton(label, self), f"toast.action{i}", label)
-                button.clicked.connect(act)
+                button = push_button(f"toast.action{i}", label, act)
                 button.clicked.connect(self.dismiss)
                 row.addWidget(button)
             layout.addLayout(row)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
+        self._timer = QTimer(self, singleShot=True)
         self._timer.timeout.connect(self.dismiss)
         self._restart()
 

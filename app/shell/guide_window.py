@@ -11,13 +11,12 @@ from PySide6.QtWidgets import (
     QDialog,
     QListWidget,
     QListWidgetItem,
-    QSplitter,
     QTextBrowser,
     QWidget,
 )
 
 from app.widgets.buttons import push_button
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -114,11 +113,7 @@ class GuideWindow(QDialog):
         back.setEnabled(False)
         back.setAutoDefault(False)
         self.text.backwardAvailable.connect(back.setEnabled)
-        split = QSplitter(self)
-        split.addWidget(self.list)
-        split.addWidget(self.text)
-        split.setStretchFactor(1, 1)
-        split.setChildrenCollapsible(False)
+        split = splitter(Qt.Orientation.Horizontal, (self.list, 0), (self.text, 1))
         vbox(hbox(back, None), (split, 1), of=self)
 
     def show_page(self, name: str, heading: str = "") -> None:

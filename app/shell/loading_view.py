@@ -21,8 +21,7 @@ class LoadingView(QWidget):
         named(self, "main.loading", tr("Page is loading"))
         self._text = named(PlainLabel(), "main.loading.text", tr("Page being loaded"))
         self._text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        bar = named(QProgressBar(), "main.loading.bar", tr("Page is loading"))
-        bar.setRange(0, 0)
+        bar = named(QProgressBar(minimum=0, maximum=0), "main.loading.bar", tr("Page is loading"))
         bar.setFixedWidth(WIDTH)
         vbox(self._text, bar, of=self).setAlignment(Qt.AlignmentFlag.AlignCenter)
 

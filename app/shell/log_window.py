@@ -53,8 +53,7 @@ class LogWindow(Dialog):
             tip=str(log.folder),
         )  # fmt: skip
         self.fill(hbox(PlainLabel(tr("Show")), self._levels, None, copy, folder), (self._text, 1))
-        self._timer = QTimer(self)
-        self._timer.setInterval(REFRESH_MS)
+        self._timer = QTimer(self, interval=REFRESH_MS)
         self._timer.timeout.connect(self._show_new)
 
     def copy(self) -> None:

@@ -26,7 +26,6 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QStackedWidget,
     QToolBar,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -48,6 +47,7 @@ from app.shell.shortcuts import ShortcutSheet
 from app.theme import theme
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.units import use_length_unit
 from app.workspace.workspace import ENDING
@@ -98,11 +98,7 @@ class MainWindow(QMainWindow):
         self._guide: GuideWindow | None = None
         self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
         centre = QWidget()
-        column = QVBoxLayout(centre)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(FailedLine(context.status))
-        column.addWidget(self._stack, 1)
+        vbox(FailedLine(context.status), (self._stack, 1), of=centre, margins=0, spacing=0)
         self.setCentralWidget(centre)
         self._loading = LoadingView()
         self._stack.addWidget(self._loading)
@@ -125,14 +121,12 @@ class MainWindow(QMainWindow):
         requests.calibrations_changed.connect(self._show_in_use)
         context.source.changed.connect(self._remember_source)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
-        self._tidy = QTimer(self)
-        self._tidy.setSingleShot(True)
+        self._tidy = QTimer(self, singleShot=True)
         self._tidy.timeout.connect(self._give_back)
         self._restore_layout()
 
     def _build_navigation(self) -> dict[str, QAction]:
-        bar = named(QToolBar(tr("Navigation"), self), "navigation", tr("Navigation"))
-        bar.setMovable(False)
+        bar = named(QToolBar(tr("Navigation"), self, movable=False), "navigation", tr("Navigation"))
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         bar.setIconSize(QSize(28, 28))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)

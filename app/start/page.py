@@ -7,12 +7,13 @@ from datetime import datetime
 
 from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QImageReader, QPixmap
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QScrollArea, QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.start.card import IMAGE, Card
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.workspace.entries import Entry
@@ -45,9 +46,9 @@ class StartPage(QWidget):
         requests = context.requests
         title = PlainLabel(tr("What do you want to do?"), self)
         make_bold(title, size=1.5)
-        self.go_on = Card("home.continue", tr("&Continue the calibration"), "calibrate", self)
+        self.go_on = Card("home.continue", tr("&Continue the calibration"), "calibrate")
         self.go_on.clicked.connect(self._continue)
-        self.use = Card("home.inspect", tr("&Inspect with the calibration"), "inspect", self)
+        self.use = Card("home.inspect", tr("&Inspect with the calibration"), "inspect")
         self.use.clicked.connect(self._inspect)
         self.new = self._card("home.new", tr("Calibrate a &new sensor"), "add", requests.new_sensor)
         self.new.say(tr("From its camera, step by step"))
@@ -57,28 +58,16 @@ class StartPage(QWidget):
             "home.demo", tr("&Try the virtual sensor"), "demo", requests.begin_demo
         )
         self.demo.say(tr("All functions, without a camera"))
-        middle = QWidget(self)
-        middle.setMaximumWidth(WIDTH)
-        column = QVBoxLayout(middle)
-        column.setSpacing(10)
-        column.addStretch(1)
-        column.addWidget(title)
-        column.addSpacing(8)
-        for card in (self.go_on, self.use, self.new, self.open, self.demo):
-            column.addWidget(card)
-        column.addStretch(2)
+        middle = QWidget(self, maximumWidth=WIDTH)
+        cards = self.go_on, self.use, self.new, self.open, self.demo
+        vbox(None, title, 8, *cards, (None, 2), of=middle, spacing=10)
         area = named(QScrollArea(self), "home.area", tr("Start"))
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setWidgetResizable(True)
         inner = QWidget()
-        centred = QHBoxLayout(inner)
-        centred.addStretch(1)
-        centred.addWidget(middle, 6)
-        centred.addStretch(1)
+        hbox(None, (middle, 6), None, of=inner)
         area.setWidget(inner)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(area)
+        vbox(area, of=self, margins=0)
         requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 
@@ -103,7 +92,7 @@ class StartPage(QWidget):
             self.use.say(calibration_text(self._calibration))
 
     def _card(self, name: str, title: str, sign: str, wanted: SignalInstance) -> Card:
-        card = Card(name, title, sign, self)
+        card = Card(name, title, sign)
         card.clicked.connect(lambda _=False: wanted.emit())
         return card
 

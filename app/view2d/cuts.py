@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from app.widgets.fields import choice, number, switch
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.measured import Measured
@@ -19,8 +20,11 @@ from gelpolight_core.measurement.profile import (
 )
 from gelpolight_core.measurement.roughness import profile_roughness, roughness
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
+# Those of ISO 21920-3 that fit on a sensor.
+CUTOFFS_MM = (0.25, 0.8, 2.5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,21 +56,37 @@ class Section:
         Number of the line that is measured.
     width_mm : float
         Depth is averaged over this width across each line.
+    level_mm : float
+        Depth at which the width is measured. 0: half of the height.
+    cutoff_mm : float
+        Cut-off of the roughness of the line. 0: it is not measured.
+    region : bool
+        Whether the roughness of the rectangle is measured.
     first, second : (from, to)
         Ranges as shares of the line's length.
-    level_mm : float or None
-        Depth at which the width is measured. None: half of the height.
-    cutoff_mm : float or None
-        Cut-off of the roughness of the line. None: it is not measured.
     """
 
     lines: tuple[Line, ...] = (Line(),)
     chosen: int = 1
-    width_mm: float = 0.2
+    width_mm: float = number(
+        0.2, tr("Width"), 0.0, 5.0, tr(" mm"), 2, step=0.1,
+        tip=tr("Depth is averaged over this width across the line"),
+    )  # fmt: skip
+    level_mm: float = number(
+        0.0, tr("Width at"), 0.0, 5.0, tr(" mm"), 3, step=0.01, none=tr("half height"),
+        tip=tr("Depth at which the width is measured. 0: half of the height"),
+    )  # fmt: skip
+    cutoff_mm: float = choice(
+        0.0, tr("Ra, Rq, Rz"),
+        {0.0: tr("none"), **{c: tr("at {c:g} mm").format(c=c) for c in CUTOFFS_MM}},
+        tr("Measure Ra, Rq and Rz along the line (ISO 21920). The cut-off separates roughness "
+           "from waviness"),
+    )  # fmt: skip
+    region: bool = switch(
+        False, "", tr("Roughness"), tr("Measure Sa, Sq and Sz in a rectangle on the height map")
+    )
     first: Point = (0.02, 0.14)
     second: Point = (0.44, 0.56)
-    level_mm: float | None = None
-    cutoff_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +138,7 @@ def cut(heightmap: HeightMap, section: Section, region: Rectangle | None) -> Cut
         second = (length * section.second[0], length * section.second[1])
         for measure in (
             lambda: step_height(profile, first_mm=first, second_mm=second),
-            lambda: width_at(profile, section.level_mm),
+            lambda: width_at(profile, section.level_mm or None),
             lambda: slope(profile, *first),
             lambda: slope(profile, *second),
             lambda: angle_between(profile, first, second),
@@ -127,13 +147,13 @@ def cut(heightmap: HeightMap, section: Section, region: Rectangle | None) -> Cut
                 figures.append(measure())
             except InputError as error:
                 sentences.append(error.found)
-        if section.cutoff_mm is not None:
+        if section.cutoff_mm:
             try:
                 figures.extend(profile_roughness(profile, cutoff_mm=section.cutoff_mm))
             except InputError as error:
                 sentences.append(str(error))
         if any(figure.name == "width" for figure in figures):
-            ends = width_ends(profile, section.level_mm)
+            ends = width_ends(profile, section.level_mm or None)
     if region is not None:
         try:
             figures.extend(roughness(heightmap, region))

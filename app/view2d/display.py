@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 import json
-import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 
+from app.widgets.fields import choice, is_possible, number, switch
 from gelpolight_core.translation import tr
 
-COLOUR_MAPS = ("viridis", "cividis", "inferno", "magma", "CET-L1", "plasma")
-"""Perceptually uniform colour maps, by their names in pyqtgraph."""
-QUANTITIES = ("depth", "slope", "uncertainty", "flags", "difference")
-"""Quantities that can colour the 3D surface."""
 LIMITS_MM = -1.0, 5.0
 """Limits of a colour range that the user sets."""
 SURROUND = (21, 23, 26)
 """Around an image, in both themes: dark images can only be judged against a dark surround."""
 
 
-def colour_map_labels() -> dict[str, str]:
-    """Return the label of each colour map."""
-    return {
-        "viridis": tr("Viridis"),
-        "cividis": tr("Cividis (colour-blind safe)"),
-        "inferno": tr("Inferno"),
-        "magma": tr("Magma"),
-        "CET-L1": tr("Grey"),
-        "plasma": tr("Plasma"),
-    }
+COLOUR_MAPS = {
+    "viridis": tr("Viridis"),
+    "cividis": tr("Cividis (colour-blind safe)"),
+    "inferno": tr("Inferno"),
+    "magma": tr("Magma"),
+    "CET-L1": tr("Grey"),
+    "plasma": tr("Plasma"),
+}
+"""Perceptually uniform colour maps, by their names in pyqtgraph."""
+QUANTITIES = {
+    "depth": tr("Depth"),
+    "slope": tr("Slope"),
+    "uncertainty": tr("Uncertainty (when paused)"),
+    "flags": tr("Flags"),
+    "difference": tr("Difference from the reference"),
+}
+"""Quantities that can colour the 3D surface."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,27 +68,51 @@ class Display:
     ----------
     colours : str
         One of COLOUR_MAPS.
-    range_mm : (low, high) or None
-        Depths at the ends of the colours. None: the automatic range (`ColourRange`).
+    colour_by : str
+        Quantity shown by the colours in 3D: one of QUANTITIES.
+    locked : bool
+        Whether the colours have the range from `low_mm` to `high_mm`, not the automatic one.
+    low_mm, high_mm : float
+        Depths at the ends of a locked range.
     contour_mm : float
         Depth between contour lines. 0: none.
     relief : bool
         Whether the height map is shaded.
     exaggeration : float
         Scale of depth relative to width in 3D.
-    light : Light
-        The lamp.
-    colour_by : str
-        Quantity shown by the colours in 3D: one of QUANTITIES.
+    azimuth_deg, elevation_deg : float
+        Direction of the lamp, see :class:`Light`.
     """
 
-    colours: str = "viridis"
-    range_mm: tuple[float, float] | None = None
-    contour_mm: float = 0.0
-    relief: bool = True
-    exaggeration: float = 1.0
-    light: Light = field(default_factory=Light)
-    colour_by: str = "depth"
+    colours: str = choice("viridis", tr("Colours"), COLOUR_MAPS)
+    colour_by: str = choice("depth", tr("3D shows"), QUANTITIES)
+    locked: bool = switch(
+        False, tr("Range"), tr("Lock"),
+        tr("Keep the colour range. If unlocked, it follows the deepest press"), "K",
+    )  # fmt: skip
+    low_mm: float = number(
+        0.0, tr("From"), *LIMITS_MM, tr(" mm"), 2, step=0.1, when=lambda d: d.locked
+    )
+    high_mm: float = number(
+        1.0, tr("To"), *LIMITS_MM, tr(" mm"), 2, step=0.1, when=lambda d: d.locked
+    )
+    contour_mm: float = number(
+        0.0, tr("Contours"), 0.0, LIMITS_MM[1], tr(" mm"), 2, step=0.05, none=tr("none")
+    )
+    relief: bool = switch(True, "", tr("Shade the height map"))
+    exaggeration: float = number(1.0, tr("Stretch"), 1.0, 8.0, decimals=1, slider=True)
+    azimuth_deg: float = number(315.0, tr("Light"), 0.0, 359.0, slider=True)
+    elevation_deg: float = number(45.0, tr("Elevation"), 15.0, 85.0, slider=True)
+
+    @property
+    def range_mm(self) -> tuple[float, float] | None:
+        """Depths at the ends of the colours. None: the automatic range (`ColourRange`)."""
+        return (self.low_mm, max(self.high_mm, self.low_mm + 0.01)) if self.locked else None
+
+    @property
+    def light(self) -> Light:
+        """The lamp."""
+        return Light(self.azimuth_deg, self.elevation_deg)
 
 
 def display_as_text(display: Display) -> str:
@@ -96,27 +123,11 @@ def display_as_text(display: Display) -> str:
 def display_from_text(text: str) -> Display:
     """Return the display settings of a text. Missing or invalid values get their defaults."""
     try:
-        kept = json.loads(text)
-        span, light = kept["range_mm"], kept["light"]
-        display = Display(
-            colours=str(kept["colours"]),
-            range_mm=None if span is None else (float(span[0]), float(span[1])),
-            contour_mm=float(kept["contour_mm"]),
-            relief=bool(kept["relief"]),
-            exaggeration=float(kept["exaggeration"]),
-            light=Light(float(light["azimuth_deg"]), float(light["height_deg"])),
-            colour_by=str(kept.get("colour_by", "depth")),
-        )
-    except (ValueError, KeyError, TypeError, IndexError):
+        kept = dict(json.loads(text))
+    except (ValueError, TypeError):
         return Display()
-    known = display.colours in COLOUR_MAPS and display.colour_by in QUANTITIES
-    return display if known and _is_finite(display) else Display()
-
-
-def _is_finite(display: Display) -> bool:
-    light = display.light
-    numbers = (display.contour_mm, display.exaggeration, light.azimuth_deg, light.height_deg)
-    return all(math.isfinite(number) for number in (*numbers, *(display.range_mm or ())))
+    known = {f.name: kept[f.name] for f in fields(Display) if is_possible(f, kept.get(f.name))}
+    return Display(**known)
 
 
 @lru_cache(maxsize=16)

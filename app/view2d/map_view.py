@@ -130,9 +130,8 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         return lines
 
     def _make_words(self) -> PlainLabel:
-        words = PlainLabel(parent=self)
+        words = PlainLabel(parent=self, wrap=True)
         words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        words.setWordWrap(True)
         words.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
         words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         return words

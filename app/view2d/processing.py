@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.view2d.quantities import Reference
+from app.widgets.fields import choice, number
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import (
+    LARGEST_MEDIAN,
     difference,
     level_by_plane,
     level_by_points,
@@ -19,10 +21,9 @@ from gelpolight_core.measurement.map_processing import (
     smooth_median,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
-MASKS = ("none", "inside", "outside", "deeper", "sure")
-LEVELLINGS = ("none", "plane", "rectangle", "points")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +35,12 @@ class Processing:
     reference : Reference or None
         Its depth is subtracted.
     mask : str
-        One of MASKS, what is kept: the inside or outside of the rectangle, points that are deeper
+        What is kept: the inside or outside of the rectangle, points that are deeper
         than a limit, or points without a flag.
     deeper_mm : float
         The limit for ``deeper``.
     level : str
-        One of LEVELLINGS: by a plane of the untouched surface, of a rectangle, or three points.
+        By a plane of the untouched surface, of a rectangle, or three points.
     rectangle : Rectangle or None
         For mask and levelling, if they need it.
     points_mm : tuple of (x, y)
@@ -52,15 +53,48 @@ class Processing:
         Side of the median filter, odd.
     """
 
+    mask: str = choice(
+        "none", tr("Mask"), {
+            "none": tr("none"), "inside": tr("keep the rectangle"),
+            "outside": tr("leave out the rectangle"), "deeper": tr("keep deeper points"),
+            "sure": tr("leave out flagged points"),
+        },
+        tr("Keep a part of the points only. The others have no depth, and are left out of "
+           "levelling, filter, histogram and export"),
+    )  # fmt: skip
+    deeper_mm: float = number(
+        0.1, tr("Deeper than"), -5.0, 5.0, tr(" mm"), 3, step=0.05,
+        when=lambda p: p.mask == "deeper",
+    )  # fmt: skip
+    level: str = choice(
+        "none", tr("Levelling"), {
+            "none": tr("none"), "plane": tr("plane"), "rectangle": tr("plane of the rectangle"),
+            "points": tr("three points"),
+        },
+        tr("Subtract a plane: of the untouched surface (pressed objects are left out), of the "
+           "rectangle on the map, or through three points on the map"),
+    )  # fmt: skip
+    filter: str = choice(
+        "none", tr("Filter"),
+        {"none": tr("none"), "gaussian": tr("Gaussian"), "median": tr("median")},
+        tr("Smooth the height map. The uncertainty of a smoothed map is not known"),
+    )  # fmt: skip
+    sigma_mm: float = number(
+        0.1, tr("Sigma"), 0.01, 2.0, tr(" mm"), 2, step=0.05,
+        when=lambda p: p.filter == "gaussian",
+    )  # fmt: skip
+    nodes: int = number(
+        3, tr("Size"), 3, LARGEST_MEDIAN, tr(" points"), step=2,
+        when=lambda p: p.filter == "median",
+    )  # fmt: skip
     reference: Reference | None = None
-    mask: str = "none"
-    deeper_mm: float = 0.1
-    level: str = "none"
     rectangle: Rectangle | None = None
     points_mm: tuple[Point, ...] = ()
-    filter: str = "none"
-    sigma_mm: float = 0.1
-    nodes: int = 3
+
+    @property
+    def uses_rectangle(self) -> bool:
+        """Whether mask or levelling need the rectangle."""
+        return self.level == "rectangle" or self.mask in ("inside", "outside")
 
     @property
     def does_nothing(self) -> bool:

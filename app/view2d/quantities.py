@@ -32,17 +32,6 @@ FLAG_COLOURS = {
 """Colour of each flag, the most serious first."""
 
 
-def quantity_names() -> dict[str, str]:
-    """Return the name of each quantity."""
-    return {
-        "depth": tr("Depth"),
-        "slope": tr("Slope"),
-        "uncertainty": tr("Uncertainty (when paused)"),
-        "flags": tr("Flags"),
-        "difference": tr("Difference from the reference"),
-    }
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
     """A height map for comparison. Two are equal only if they are the same object."""

@@ -94,9 +94,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self.scene = Scene(self)
         self._orientation = self._add_orientation()
         self._plane: object | None = None
-        self._settle = QTimer(self)
-        self._settle.setSingleShot(True)
-        self._settle.setInterval(SETTLE_MS)
+        self._settle = QTimer(self, singleShot=True, interval=SETTLE_MS)
         self._settle.timeout.connect(self._refine)
         self._follow_theme()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
@@ -20,16 +20,8 @@ if TYPE_CHECKING:
 VIEWPOINTS = "viewpoints"
 
 
-def style_names() -> dict[str, str]:
-    """Return the label of each part of a style that can be switched."""
-    return {
-        "axes": tr("Axes in mm"),
-        "colour_bar": tr("Colour bar"),
-        "orientation": tr("Orientation widget"),
-        "scale_bar": tr("Scale bar"),
-        "wireframe": tr("Wireframe"),
-        "parallel": tr("Parallel projection"),
-    }
+STYLES = {f.name: f.metadata["text"] for f in fields(Style) if f.metadata}
+"""The label of each part of a style that can be switched."""
 
 
 class ViewMenu(QMenu):
@@ -63,7 +55,7 @@ class ViewMenu(QMenu):
         super().__init__(panel)
         self.setObjectName("view3d.options")
         self._panel, self._settings = panel, settings
-        for name, text in style_names().items():
+        for name, text in STYLES.items():
             action = self._add(f"style_{name}", text, lambda on, name=name: self._set(name, on))
             action.setCheckable(True)
         self.clip_action = self._add("clip", tr("Clip by a plane"), self._clip)
@@ -127,7 +119,7 @@ class ViewMenu(QMenu):
     def _follow(self) -> None:
         """Update the check marks, and enable what can be used now."""
         style = self._panel.style
-        for name in style_names():
+        for name in STYLES:
             self._action(f"style_{name}").setChecked(bool(getattr(style, name)))
         there = self._panel.view is not None and self._panel.view.scene.surface is not None
         for name in ("clip", "copy", "image", "movie", "mesh"):

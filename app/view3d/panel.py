@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
-    QHBoxLayout,
     QStackedWidget,
     QToolBar,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -30,6 +28,7 @@ from app.view3d.pins import pins_text, with_pin
 from app.view3d.style import Style, style_as_text, style_from_text
 from app.view3d.surface import Surface, SurfaceLine
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.native import give_own_window
 from gelpolight_core.errors import InputError
@@ -115,13 +114,11 @@ class SurfacePanel(QWidget):
 
     def _lay_out(self) -> None:
         self._stack = QStackedWidget()
-        self._words = PlainLabel(tr("No depth yet."))
-        self._words.setWordWrap(True)
+        self._words = PlainLabel(tr("No depth yet."), wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._words.setMargin(20)
         self._stack.addWidget(self._words)
-        self._why = named(PlainLabel(), "view3d.reason", tr("Why 3D is not available"))
-        self._why.setWordWrap(True)
+        self._why = named(PlainLabel(wrap=True), "view3d.reason", tr("Why 3D is not available"))
         self._why.hide()
         # A toolbar, because it has an arrow where it is too narrow for all buttons.
         bar = named(QToolBar(), "view3d.bar", tr("View directions"))
@@ -129,10 +126,7 @@ class SurfacePanel(QWidget):
         for name, (text, keys) in view_names().items():
             bar.addWidget(self._button(name, text, text, keys))
         bar.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
-        row = QHBoxLayout()
-        row.setContentsMargins(4, 2, 4, 2)
-        row.setSpacing(2)
-        row.addWidget(bar, 1)
+        row = hbox((bar, 1), margins=(4, 2, 4, 2), spacing=2)
         button = named(QToolButton(), "view3d.menu", tr("3D menu"), tr("Options of the 3D view"))
         button.setText(tr("3D options"))
         button.setAutoRaise(True)
@@ -142,13 +136,7 @@ class SurfacePanel(QWidget):
         self._tools = QWidget()
         self._tools.setLayout(row)
         self._hint = self._make_hint()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self._tools)
-        column.addWidget(self._why)
-        column.addWidget(self._stack, 1)
-        column.addWidget(self._hint)
+        vbox(self._tools, self._why, (self._stack, 1), self._hint, of=self, margins=0, spacing=0)
 
     def _button(self, name: str, text: str, tip: str, key: str = "") -> QToolButton:
         button = named(QToolButton(), f"view3d.{name}", text, tip, key)
@@ -160,15 +148,11 @@ class SurfacePanel(QWidget):
     def _make_hint(self) -> QWidget:
         bar = QWidget()
         text = PlainLabel(tr("Drag: rotate   Shift+drag: pan   Wheel: zoom   Click: pin   "
-                         "Right click: menu"))  # fmt: skip
-        text.setWordWrap(True)
+                         "Right click: menu"), wrap=True)  # fmt: skip
         button = named(QToolButton(), "view3d.hint_seen", tr("Hide the hint"))
         button.setText(tr("Got it"))
         button.clicked.connect(self._hide_hint)
-        row = QHBoxLayout(bar)
-        row.setContentsMargins(8, 2, 4, 2)
-        row.addWidget(text, 1)
-        row.addWidget(button)
+        hbox((text, 1), button, of=bar, margins=(8, 2, 4, 2))
         bar.hide()
         return bar
 
@@ -287,9 +271,7 @@ class SurfacePanel(QWidget):
         view.menu_wanted.connect(self._open_menu)
         # Complete it before it is added to the window, which Qt would otherwise rebuild.
         self._frame = QWidget()
-        box = QVBoxLayout(self._frame)
-        box.setContentsMargins(0, 0, 0, 0)
-        box.addWidget(view)
+        vbox(view, of=self._frame, margins=0)
         give_own_window(self._frame)
         self._stack.addWidget(self._frame)
         self._words.setText(tr("No depth yet."))

@@ -10,10 +10,11 @@ import numpy as np
 from PIL import Image
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QProgressDialog, QWidget
+from PySide6.QtWidgets import QProgressDialog, QWidget
 
+from app.services.file_dialogs import ask_save
 from app.services.settings import Settings
-from app.view3d.image_dialog import ImageChoice, ImageDialog, MovieChoice, MovieDialog
+from app.view3d.image_dialog import ImageChoice, MovieChoice, image_dialog, movie_dialog
 from app.view3d.panel import SurfacePanel
 from app.view3d.surface import Surface
 from app.widgets.naming import named
@@ -68,7 +69,7 @@ class ViewSaving(QObject):
 
     def ask_image(self) -> None:
         """Ask for the size of an image, and save it."""
-        dialog = ImageDialog(self._panel.size(), ("surface",), parent=self._owner)
+        dialog = image_dialog(self._panel.size(), ("surface",), self._owner)
         dialog.chosen.connect(self.ask_image_file)
         dialog.open()
 
@@ -82,7 +83,10 @@ class ViewSaving(QObject):
         from app.view3d.images import image_of  # with pyvista, which is loaded by now
 
         assert self._panel.view is not None
-        rgb = image_of(self._panel.view.scene, choice.size, transparent=choice.transparent)
+        rgb = image_of(
+            self._panel.view.scene, (choice.width_px, choice.height_px),
+            transparent=choice.transparent,
+        )  # fmt: skip
         try:
             write_atomically(path, lambda file: Image.fromarray(np.asarray(rgb)).save(file, "PNG"))
         except InputError as error:
@@ -93,7 +97,7 @@ class ViewSaving(QObject):
     def ask_movie(self) -> None:
         """Ask for the kind and size of a movie, and save it."""
         recording = self._player() is not None
-        dialog = MovieDialog(self._panel.size(), recording=recording, parent=self._owner)
+        dialog = movie_dialog(self._panel.size(), recording=recording, parent=self._owner)
         dialog.chosen.connect(self.ask_movie_file)
         dialog.open()
 
@@ -117,7 +121,8 @@ class ViewSaving(QObject):
         named(progress, "view3d.movie.progress", tr("Saving the movie"))
         progress.setWindowModality(Qt.WindowModality.WindowModal)
         progress.setMinimumDuration(0)
-        with studio(self._panel.view.scene, choice.size) as opened:
+        size = choice.width_px, choice.height_px
+        with studio(self._panel.view.scene, size) as opened:
             images = turntable(opened, count)
             if played is not None:
                 progress.setMaximum(played[0])
@@ -136,9 +141,4 @@ class ViewSaving(QObject):
 
     def _ask_path(self, ending: str, title: str, kinds: str) -> Path | None:
         name = f"surface-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.{ending}"
-        proposed = str(self._settings.folder("picture") / name)
-        chosen, _ = QFileDialog.getSaveFileName(self._owner, title, proposed, kinds)
-        if not chosen:
-            return None
-        self._settings.keep_folder("picture", Path(chosen).parent)
-        return Path(chosen)
+        return ask_save(self._owner, self._settings, "picture", title, name, kinds)

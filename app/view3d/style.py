@@ -6,6 +6,9 @@ import json
 import math
 from dataclasses import asdict, dataclass, fields
 
+from app.widgets.fields import is_possible, switch
+from gelpolight_core.translation import tr
+
 Vector = tuple[float, float, float]
 
 VIEWS: dict[str, tuple[Vector, Vector]] = {
@@ -32,12 +35,12 @@ class Style:
     """
 
     exaggeration: float = 1.0
-    axes: bool = True
-    colour_bar: bool = True
-    orientation: bool = True
-    scale_bar: bool = False
-    wireframe: bool = False
-    parallel: bool = False
+    axes: bool = switch(True, "", tr("Axes in mm"))
+    colour_bar: bool = switch(True, "", tr("Colour bar"))
+    orientation: bool = switch(True, "", tr("Orientation widget"))
+    scale_bar: bool = switch(False, "", tr("Scale bar"))
+    wireframe: bool = switch(False, "", tr("Wireframe"))
+    parallel: bool = switch(False, "", tr("Parallel projection"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +72,11 @@ def style_as_text(style: Style) -> str:
 def style_from_text(text: str) -> Style:
     """Return the style of a text. The default if the text is damaged."""
     try:
-        kept = json.loads(text)
-        known = {field.name for field in fields(Style)} - {"exaggeration"}
-        return Style(**{name: bool(kept[name]) for name in known if name in kept})
+        kept = dict(json.loads(text))
     except (ValueError, TypeError):
         return Style()
+    parts = (f for f in fields(Style) if f.metadata and is_possible(f, kept.get(f.name)))
+    return Style(**{f.name: kept[f.name] for f in parts})
 
 
 def viewpoints_as_text(viewpoints: dict[str, Viewpoint]) -> str:

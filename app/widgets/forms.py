@@ -1,9 +1,9 @@
-"""A form from a frozen dataclass: the metadata of a field say which input it gets."""
+"""A form from a frozen dataclass of :mod:`app.widgets.fields`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import Field, field, fields, replace
+from collections.abc import Callable
+from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -11,39 +11,12 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QLineEdit, QWidget
 
 from app.theme.icons import icon
+from app.widgets.fields import When
 from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 V = TypeVar("V")
-When = Callable[[Any], bool]
-"""Whether the row of a field is shown, from the value of the form."""
-
-
-def choice(default: Any, label: str, choices: Mapping[Any, str], tip: str = "") -> Any:
-    """Return a field with one of several values, each with its text."""
-    return field(default=default, metadata={"label": label, "choices": choices, "tip": tip})
-
-
-def number(
-    default: float, label: str, low: float, high: float, unit: str = "", decimals: int = 0, *,
-    step: float = 1.0, tip: str = "", none: str = "", slider: bool = False,
-    when: When | None = None,
-) -> Any:  # fmt: skip
-    """Return a field with a number. `none` is the text of the lowest value."""
-    span = {"span": (low, high), "unit": unit, "decimals": decimals, "step": step}
-    more = {"label": label, "tip": tip, "none": none, "slider": slider, "when": when}
-    return field(default=default, metadata=span | more)
-
-
-def switch(default: bool, label: str, text: str, tip: str = "", key: str = "") -> Any:
-    """Return a field with yes or no, a check box with a text. The tip names the key."""
-    return field(default=default, metadata={"label": label, "text": text, "tip": tip, "key": key})
-
-
-def folder(default: str, label: str, tip: str = "") -> Any:
-    """Return a field with the absolute path of a folder."""
-    return field(default=default, metadata={"label": label, "tip": tip})
 
 
 class Form(QWidget, Generic[V]):
@@ -121,7 +94,8 @@ class Form(QWidget, Generic[V]):
 
         if "choices" in meta:
             keys, box = list(meta["choices"]), ComboBox()
-            box.addItems(list(meta["choices"].values()))
+            for key, text in meta["choices"].items():
+                box.addItem(text, key)
             box.currentIndexChanged.connect(lambda index: change(keys[index]))
             self._show[name] = lambda v: box.setCurrentIndex(keys.index(v) if v in keys else 0)
             return box

@@ -9,7 +9,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QComboBox, QDial, QDoubleSpinBox, QSlider, QSpinBox
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QSlider, QSpinBox
 
 
 class _WheelNeedsFocus:
@@ -41,7 +41,3 @@ class ComboBox(_WheelNeedsFocus, QComboBox):
 
 class Slider(_WheelNeedsFocus, QSlider):
     """A slider."""
-
-
-class Dial(_WheelNeedsFocus, QDial):
-    """A round slider."""

@@ -28,10 +28,15 @@ class PlainLabel(QLabel):
         The text to show.
     parent : QWidget, optional
         Parent of the label.
+    wrap : bool, optional
+        Whether long lines are wrapped.
     """
 
-    def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
+    def __init__(
+        self, text: str = "", parent: QWidget | None = None, *, wrap: bool = False
+    ) -> None:
         super().__init__(parent)
+        self.setWordWrap(wrap)
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setText(text)
 
@@ -48,10 +53,15 @@ class MarkupLabel(QLabel):
         The markup to show.
     parent : QWidget, optional
         Parent of the label.
+    wrap : bool, optional
+        Whether long lines are wrapped.
     """
 
-    def __init__(self, markup: str = "", parent: QWidget | None = None) -> None:
+    def __init__(
+        self, markup: str = "", parent: QWidget | None = None, *, wrap: bool = False
+    ) -> None:
         super().__init__(parent)
+        self.setWordWrap(wrap)
         self._markup = ""
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setText(markup)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QSplitter, QVBoxLayout, QWidget
 
 Margins = int | tuple[int, int, int, int]
 
@@ -55,3 +56,16 @@ def _fill(
         else:
             box.addWidget(item, *more)
     return box
+
+
+def splitter(
+    orientation: Qt.Orientation, *parts: tuple[QWidget, int], sizes: tuple[int, ...] = ()
+) -> QSplitter:
+    """Return widgets with movable borders between them, each with its stretch."""
+    made = QSplitter(orientation, childrenCollapsible=False)
+    for place, (widget, stretch) in enumerate(parts):
+        made.addWidget(widget)
+        made.setStretchFactor(place, stretch)
+    if sizes:
+        made.setSizes(list(sizes))
+    return made

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -20,6 +19,7 @@ from app.theme import theme
 from app.theme.icons import icon
 from app.widgets.actions import make_action
 from app.widgets.label import plain_tip
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.quality import Figure, QualityTable, Verdict, verdict_word
 from gelpolight_core.translation import tr
@@ -118,9 +118,7 @@ class QualityTableWidget(QWidget):
         self._grid.resized.connect(self._fit)
         self._grid.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._grid)
+        vbox(self._grid, of=self, margins=0)
 
     def set_table(self, table: QualityTable) -> None:
         """Show a table. The same figures keep their rows and the selection."""

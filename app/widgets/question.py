@@ -10,11 +10,11 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.widgets.label import PlainLabel
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -45,8 +45,7 @@ class Question(QDialog):
         named(self, "question", title)
         self.setWindowTitle(title)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        label = named(PlainLabel(text, self), "question.text", text)
-        label.setWordWrap(True)
+        label = named(PlainLabel(text, self, wrap=True), "question.text", text)
         label.setMinimumWidth(WIDTH)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
         buttons.rejected.connect(self.reject)
@@ -59,15 +58,11 @@ class Question(QDialog):
         named(
             buttons.button(QDialogButtonBox.StandardButton.Cancel), "question.cancel", tr("Cancel")
         )
-        self._column = QVBoxLayout(self)
-        self._column.addWidget(label)
-        self._column.addWidget(buttons)
+        self._column = vbox(label, buttons, of=self)
 
     def require_text(self, hint: str, most: int) -> QLineEdit:
         """Add a line of text without which no answer can be chosen. Return it."""
-        line = named(QLineEdit(self), "question.line", hint)
-        line.setPlaceholderText(hint)
-        line.setMaxLength(most)
+        line = named(QLineEdit(self, placeholderText=hint, maxLength=most), "question.line", hint)
         self._column.insertWidget(1, line)
         for button in self.findChildren(QPushButton, QRegularExpression("question.answer")):
             button.setEnabled(False)

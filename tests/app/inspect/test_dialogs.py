@@ -11,12 +11,12 @@ from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.inspect.export_dialog import ExportDialog
-from app.view3d.image_dialog import ImageDialog, MovieDialog
+from app.view3d.image_dialog import image_dialog, movie_dialog
 
 MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
     "export": lambda host: ExportDialog(Path("depth"), count=3, at=1, parent=host),
-    "image": lambda host: ImageDialog(QSize(400, 300), ("surface", "views"), parent=host),
-    "movie": lambda host: MovieDialog(QSize(400, 300), recording=True, parent=host),
+    "image": lambda host: image_dialog(QSize(400, 300), ("surface", "views"), host),
+    "movie": lambda host: movie_dialog(QSize(400, 300), recording=True, parent=host),
 }
 
 

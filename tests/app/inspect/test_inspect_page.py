@@ -273,7 +273,7 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     source = page.live.stream.source  # type: ignore[union-attr]
     assert source.header.calibration_id == small_calibration.identity  # type: ignore[attr-defined]
     qtbot.waitUntil(lambda: page.views.surface.view is not None, timeout=WAIT_MS)
-    choice = MovieChoice("recording", (160, 120), 10.0, 1.0)
+    choice = MovieChoice("recording", 160, 120, 10.0, 1.0)
     page.file_actions.saving.save_movie(tmp_path / "press.mp4", choice)
     movie = cv2.VideoCapture(str(tmp_path / "press.mp4"))
     assert movie.get(cv2.CAP_PROP_FRAME_COUNT) == source.playback().count  # type: ignore[attr-defined]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import scene
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
@@ -29,7 +28,7 @@ def page(context: AppContext, qtbot: QtBot) -> StartPage:
 
 
 def words(card: Card) -> str:
-    return "\n".join(label.text() for label in card.findChildren(QLabel))
+    return f"{card.text()}\n{card.description()}"
 
 
 def session_of(context: AppContext, serial: str, name: str, *folders: str) -> Path:
@@ -56,7 +55,7 @@ def test_the_session_that_is_not_finished_is_continued_at_its_step(
     page.enter()
     assert page.go_on.isVisible()
     assert "S-1" in words(page.go_on) and "next: Lights" in words(page.go_on)
-    assert page.go_on._image.pixmap().width() > 40  # the newest image, not the sign
+    assert page.go_on.iconSize().width() > 40  # the newest image, not the sign
     with qtbot.waitSignal(context.requests.session) as asked:
         page.go_on.click()
     assert asked.args == [str(folder)]
@@ -105,4 +104,4 @@ def test_a_damaged_image_leaves_the_sign(page: StartPage, context: AppContext) -
     assert read_session_entry(folder).newest is not None
     page.enter()
     assert page.go_on.isVisible()
-    assert page.go_on._image.pixmap().width() < 40
+    assert page.go_on.iconSize().width() < 40

@@ -60,7 +60,7 @@ def test_a_transparent_image_has_no_background(
 ) -> None:
     path = tmp_path / "surface.png"
     reported = _reported(saving)
-    saving.save_image(path, ImageChoice("surface", (400, 300), transparent=True))
+    saving.save_image(path, ImageChoice("surface", 400, 300, transparent=True))
     alpha = np.asarray(Image.open(path))[..., 3]
     assert alpha.shape == (300, 400)
     assert alpha[2, 2] == 0 and (alpha == 255).sum() > 4_000
@@ -78,7 +78,7 @@ def test_a_turntable_turns_once(
     panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, ending: str
 ) -> None:
     path = tmp_path / f"turn.{ending}"
-    saving.save_movie(path, MovieChoice("turntable", (240, 180), 5.0, 1.2))
+    saving.save_movie(path, MovieChoice("turntable", 240, 180, 5.0, 1.2))
     frames = _frames(path)
     assert len(frames) == 6 and frames[0].shape == (180, 240, 3)
     assert np.abs(frames[0].astype(int) - frames[3]).mean() > 2.0  # half way round
@@ -113,7 +113,7 @@ def test_a_cancelled_movie_leaves_no_file(
     timer = QTimer(panel)
     timer.timeout.connect(cancel)
     timer.start(10)
-    choice = MovieChoice("turntable", (240, 180), 30.0, 10.0)
+    choice = MovieChoice("turntable", 240, 180, 30.0, 10.0)
     saving.save_movie(tmp_path / f"turn.{ending}", choice)
     assert [kind for _, kind in reported] == ["warn"]
     assert [p.name for p in tmp_path.iterdir() if "turn" in p.name] == []
@@ -125,7 +125,7 @@ def test_a_recording_is_saved_surface_by_surface(
     surfaces = [made(factor=factor, largest=128) for factor in (0.1, 0.5, 1.0)]
     played = len(surfaces), iter(surfaces)
     saving = ViewSaving(panel, panel, settings=settings, player=lambda: played)
-    saving.save_movie(tmp_path / "film.mp4", MovieChoice("recording", (240, 180), 5.0, 1.0))
+    saving.save_movie(tmp_path / "film.mp4", MovieChoice("recording", 240, 180, 5.0, 1.0))
     frames = _frames(tmp_path / "film.mp4")
     assert len(frames) == 3
     yellow = [int((np.abs(f.astype(int) - (253, 231, 37)).max(axis=2) < 60).sum()) for f in frames]

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QScrollArea, QVBoxLayout, QW
 from pytestqt.qtbot import QtBot
 
 import app
-from app.widgets.inputs import ComboBox, Dial, DoubleSpinBox, Slider, SpinBox
+from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
 
 INPUTS = {"QSpinBox", "QDoubleSpinBox", "QComboBox", "QSlider", "QDial"}
 
@@ -33,7 +33,7 @@ def turn_wheel(widget: QWidget) -> None:
     QApplication.processEvents()
 
 
-@pytest.mark.parametrize("make", [SpinBox, DoubleSpinBox, combo_box, Slider, Dial])
+@pytest.mark.parametrize("make", [SpinBox, DoubleSpinBox, combo_box, Slider])
 def test_only_the_focused_input_follows_the_wheel(
     qtbot: QtBot, make: Callable[[], QWidget]
 ) -> None:

@@ -1,0 +1,50 @@
+"""Fields of frozen dataclasses that :class:`app.widgets.forms.Form` shows. No Qt in here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import Field, field
+from typing import Any
+
+When = Callable[[Any], bool]
+"""Whether the row of a field is shown, from the value of the form."""
+
+
+def choice(default: Any, label: str, choices: Mapping[Any, str], tip: str = "") -> Any:
+    """Return a field with one of several values, each with its text."""
+    return field(default=default, metadata={"label": label, "choices": choices, "tip": tip})
+
+
+def number(
+    default: float, label: str, low: float, high: float, unit: str = "", decimals: int = 0, *,
+    step: float = 1.0, tip: str = "", none: str = "", slider: bool = False,
+    when: When | None = None,
+) -> Any:  # fmt: skip
+    """Return a field with a number. `none` is the text of the lowest value."""
+    span = {"span": (low, high), "unit": unit, "decimals": decimals, "step": step}
+    more = {"label": label, "tip": tip, "none": none, "slider": slider, "when": when}
+    return field(default=default, metadata=span | more)
+
+
+def switch(
+    default: bool, label: str, text: str, tip: str = "", key: str = "", when: When | None = None
+) -> Any:
+    """Return a field with yes or no, a check box with a text. The tip names the key."""
+    shown = {"label": label, "text": text, "tip": tip, "key": key, "when": when}
+    return field(default=default, metadata=shown)
+
+
+def folder(default: str, label: str, tip: str = "") -> Any:
+    """Return a field with the absolute path of a folder."""
+    return field(default=default, metadata={"label": label, "tip": tip})
+
+
+def is_possible(f: Field[Any], value: object) -> bool:
+    """Return whether a field can have a value, which may come from a file."""
+    if "choices" in f.metadata:
+        return value in f.metadata["choices"]
+    if "span" in f.metadata:
+        low, high = f.metadata["span"]
+        return type(value) in (int, float) and math.isfinite(value) and low <= value <= high  # type: ignore[arg-type]
+    return type(value) is type(f.default)
