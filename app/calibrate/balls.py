@@ -29,9 +29,9 @@ from app.calibrate.step_data import Step
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
-from app.widgets.boxes import hbox
 from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
@@ -217,7 +217,7 @@ class RadiusRow(QWidget):
         self.box.setDecimals(3)
         self.box.setSuffix(tr(" mm"))
         self.box.setKeyboardTracking(False)
-        hbox(PlainLabel(tr("Ball diameter")), (self.box, 1), parent=self, margins=0)
+        hbox(PlainLabel(tr("Ball diameter")), (self.box, 1), of=self, margins=0)
 
     @property
     def radius_mm(self) -> float:

@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.widgets.boxes import hbox
 from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
@@ -56,7 +56,7 @@ class FormPage(QScrollArea):
         holder.setLayout(column)
         holder.setMaximumWidth(FORM_WIDTH)
         holder.setMinimumWidth(LEAST_WIDTH)
-        hbox(1, holder, 1, parent=inside)
+        hbox(None, holder, None, of=inside)
         self._title, self._task = PlainLabel(title), PlainLabel(task)
         make_bold(self._title, size=1.35)
         self._task.setWordWrap(True)
@@ -135,7 +135,7 @@ class FormPage(QScrollArea):
             tr("Format, exposure, gain, white balance, focus, and a test of the image stability"),
         )
         self.camera_settings.clicked.connect(self.camera_wanted)
-        row = hbox((self.camera, 1), self.camera_settings, parent=box)
+        row = hbox((self.camera, 1), self.camera_settings, of=box)
         self._camera_row = row
         self.show_camera(tr("No camera is selected."), "", settable=False)
         return box

@@ -16,8 +16,8 @@ from app.calibrate.maps import MapsView, Panel
 from app.live.image_checks import Rgb
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -58,7 +58,7 @@ class ImageArea(QWidget):
         )
         self.back_to_live.clicked.connect(self.live_wanted)
         self.tabs.setCornerWidget(self.back_to_live)
-        vbox(self._build_lost(), (self.tabs, 1), self.strip, parent=self, margins=0, spacing=2)
+        vbox(self._build_lost(), (self.tabs, 1), self.strip, of=self, margins=0, spacing=2)
         self.show_capture_name("")
 
     def _build_lost(self) -> QWidget:
@@ -72,7 +72,7 @@ class ImageArea(QWidget):
             QPushButton(tr("Re&connect")), "calibrate.reconnect", tr("Open the camera again")
         )
         again.clicked.connect(self.reconnect_wanted)
-        hbox((self.why, 1), again, parent=self.lost, margins=(8, 4, 8, 4))
+        hbox((self.why, 1), again, of=self.lost, margins=(8, 4, 8, 4))
         self.lost.hide()
         return self.lost
 

@@ -14,8 +14,8 @@ from app.view2d import shading
 from app.view2d.display import SURROUND, Display, colour_table
 from app.view2d.map_image import map_image
 from app.view2d.map_view import Extent, Grid, MapView, extent_of
-from app.widgets.boxes import vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.widgets.units import per_mm, unit_word
@@ -179,7 +179,7 @@ class _PanelView(QWidget):
         for label in (self._title, self._caption):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
             label.setWordWrap(True)
-        vbox(self._title, (self._map, 1), self._caption, parent=self, margins=4)
+        vbox(self._title, (self._map, 1), self._caption, of=self, margins=4)
 
     def show_panel(self, panel: Panel) -> None:
         self._title.setText(panel.title)

@@ -6,8 +6,8 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from app.calibrate.model import WizardModel
-from app.widgets.boxes import hbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
@@ -49,7 +49,7 @@ class OutsideBar(QWidget):
         )
         self.reload.clicked.connect(self._reload)
         self.overwrite.clicked.connect(self._overwrite)
-        hbox((self.sentence, 1), self.reload, self.overwrite, parent=self, margins=(8, 4, 8, 4))
+        hbox((self.sentence, 1), self.reload, self.overwrite, of=self, margins=(8, 4, 8, 4))
         self._timer = QTimer(self)
         self._timer.setInterval(CHECK_MS)
         self._timer.timeout.connect(self.check)

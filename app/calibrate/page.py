@@ -18,7 +18,7 @@ from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
-from app.widgets.boxes import vbox
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.question import ask
 from app.workspace.sessions import unfinished
@@ -48,7 +48,7 @@ class CalibratePage(QWidget):
         self.wizard: Wizard | None = None
         self._shown = False
         self._stack = QStackedWidget()
-        vbox(self._stack, parent=self, margins=0)
+        vbox(self._stack, of=self, margins=0)
         self.start = StartView()
         self.question = QuestionView()
         self.form, self.closed_form = SetupForm(), ClosedForm()

@@ -21,8 +21,8 @@ from PySide6.QtWidgets import (
 from app.calibrate.film_strip import Capture
 from app.calibrate.states import state_icon, state_word
 from app.theme import theme
-from app.widgets.boxes import vbox
 from app.widgets.label import plain_tip
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -76,7 +76,7 @@ class ResidualTable(QWidget):
             tr("Exclude the capture with the largest residual, and capture a new one"),
         )
         self.repeat.clicked.connect(lambda: self.repeat_wanted.emit(self.worst))
-        vbox(self._table, self.repeat, parent=self, margins=0)
+        vbox(self._table, self.repeat, of=self, margins=0)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.hide()
 

@@ -25,8 +25,8 @@ from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from app.context.context import AppContext
 from app.services.jobs import Job
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -91,7 +91,7 @@ class ResultView(QWidget):
             buttons.addWidget(button)
         self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        vbox(self.headline, (scroll, 1), buttons, self.saved, parent=self)
+        vbox(self.headline, (scroll, 1), buttons, self.saved, of=self)
 
     def show_saved(self, sentence: str, role: str = "pass") -> None:
         """Show where the calibration or its report was saved, or why it was not."""
@@ -222,7 +222,7 @@ class _StageRow(QWidget):
         )
         self.table.hide()
         self.more.toggled.connect(self.table.setVisible)
-        vbox(row, self._sentence, self.table, parent=self, margins=(0, 2, 0, 2))
+        vbox(row, self._sentence, self.table, of=self, margins=(0, 2, 0, 2))
 
     def show_state(self, state: str, sentence: str, quality: QualityTable) -> None:
         self._sign.show_icon(state_icon(state))

@@ -23,8 +23,8 @@ from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.residual_table import ResidualTable
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.step_data import Step
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -87,7 +87,7 @@ class StepPanel(QWidget):
         self._build_capture()
         self._build_state()
         self._column.addStretch(1)
-        vbox((self._scroll, 1), self._build_foot(), parent=self, margins=0, spacing=0)
+        vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
 
     def _build_head(self) -> None:
         self.title = named(PlainLabel(), "calibrate.title", tr("Step"))
@@ -143,7 +143,7 @@ class StepPanel(QWidget):
             buttons,
             self.automatic,
             self.notice,
-            parent=self.capturing,
+            of=self.capturing,
             margins=0,
         )
         self._column.addWidget(self.capturing)

@@ -16,9 +16,9 @@ from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.step_data import Step
 from app.calibrate.step_panel import WIDTH, help_button, lay_button, side_scroll
 from app.calibrate.trial import KnownObject, Trial
-from app.widgets.boxes import hbox, vbox
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -56,7 +56,7 @@ class ValidationPanel(QWidget):
         self.setFixedWidth(WIDTH)
         self._has_calibration = self._has_camera = False
         scroll, inside = side_scroll("validation.scroll", tr("Validation"))
-        vbox(scroll, parent=self, margins=0)
+        vbox(scroll, of=self, margins=0)
         title = PlainLabel(step.title)
         make_bold(title, size=1.35)
         self.help = help_button("validation.help")
@@ -128,8 +128,8 @@ class ValidationPanel(QWidget):
             self.keep,
             self.verdict,
             self.use,
-            1,
-            parent=inside,
+            None,
+            of=inside,
             margins=(12, 10, 12, 10),
         )
         self.show_trial(None)

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
 from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
 from app.sources.camera.camera import Camera
-from app.widgets.boxes import vbox
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -39,7 +39,7 @@ class CameraDialog(QDialog):
         close = buttons.button(QDialogButtonBox.StandardButton.Close)
         named(close, "camera.close", tr("Close the camera settings"))
         buttons.rejected.connect(self.close)
-        vbox((self.panel, 1), buttons, parent=self)
+        vbox((self.panel, 1), buttons, of=self)
         self.resize(WIDTH, HEIGHT)
 
     def showEvent(self, event: QShowEvent) -> None:

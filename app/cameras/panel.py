@@ -25,8 +25,8 @@ from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.steadiness import SteadinessTest
 from app.sources.source import Rgb, Setting
 from app.sources.stream import Stream
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -62,7 +62,7 @@ class CameraPanel(QWidget):
         self._tick.setInterval(UPDATE_MS)
         self._tick.timeout.connect(self._update)
         self.formats, self.controls = FormatRows(), ControlRows()
-        hbox((self._build_settings(), 1), (self._build_verdicts(), 1), parent=self)
+        hbox((self._build_settings(), 1), (self._build_verdicts(), 1), of=self)
         self.formats.chosen.connect(lambda chosen: manager.choose_format(camera, chosen))
         self.controls.changed.connect(lambda key, value: manager.set(camera, {key: value}))
         self.lock.clicked.connect(lambda: manager.lock(camera))
@@ -75,7 +75,7 @@ class CameraPanel(QWidget):
         QVBoxLayout(formats).addWidget(self.formats)
         QVBoxLayout(controls).addWidget(self.controls)
         inside = QWidget()
-        vbox(formats, controls, 1, parent=inside)
+        vbox(formats, controls, None, of=inside)
         area = named(QScrollArea(), "camera.settings", tr("Format and settings"))
         area.setWidgetResizable(True)
         area.setFrameShape(QFrame.Shape.NoFrame)
@@ -133,7 +133,7 @@ class CameraPanel(QWidget):
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setWidget(tables)
         side = QWidget()
-        vbox(self.image, self.state, buttons, self.bar, (area, 1), parent=side)
+        vbox(self.image, self.state, buttons, self.bar, (area, 1), of=side)
         return side
 
     # Camera access

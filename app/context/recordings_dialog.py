@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -126,9 +126,9 @@ class RecordingsDialog(QDialog):
         other.clicked.connect(self.other_wanted)
         self.list.currentItemChanged.connect(self._show_chosen)
         self.list.itemDoubleClicked.connect(lambda _: self.play_chosen())
-        right = vbox(self.image, self.text, 1)
+        right = vbox(self.image, self.text, None)
         row = hbox((self.list, 1), right)
-        vbox((row, 1), buttons, parent=self)
+        vbox((row, 1), buttons, of=self)
         self.list.setCurrentRow(0)
         self.play_button.setEnabled(bool(recordings))
 

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from app.measure.judging import DEPTH_FIGURES
 from app.services.preferences import Limits
 from app.theme import theme
-from app.widgets.boxes import vbox
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
 from gelpolight_core.records.entry import MeasurementRecord
@@ -47,7 +47,7 @@ class ErrorPlot(QWidget):
             for line in lines:
                 self._plot.addItem(line)
         self.shown: dict[str, list[tuple[float, float]]] = {}
-        vbox(self._plot, parent=self, margins=0)
+        vbox(self._plot, of=self, margins=0)
         self._legend.addItem(self._series["plane"], tr("in the plane"))
         self._legend.addItem(self._series["depth"], tr("in depth"))
         self._colour()

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 
 from app.measure.placing import INDENTERS, kind_label
 from app.theme.icons import icon
-from app.widgets.boxes import hbox, vbox
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
@@ -56,7 +56,7 @@ class IndentersDialog(QDialog):
         buttons = QDialogButtonBox(kinds.Save | kinds.Cancel)
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
-        row = hbox(add, remove, 1, buttons)
+        row = hbox(add, remove, None, buttons)
         words = PlainLabel(
             tr(
                 "All lengths are in mm. Depth is the height of the indenter from its face to "
@@ -64,7 +64,7 @@ class IndentersDialog(QDialog):
             )
         )
         words.setWordWrap(True)
-        vbox(words, self.table, self.problem, row, parent=self)
+        vbox(words, self.table, self.problem, row, of=self)
         for indenter in indenters:
             self.add_row(indenter)
         self.table.setCurrentCell(0, NAME)

@@ -20,7 +20,7 @@ from app.measure.results_view import ResultsView
 from app.services.dropping import dropped_paths
 from app.services.jobs import Jobs
 from app.services.preferences import Limits
-from app.widgets.boxes import vbox
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.workspace.indenters import FILE as INDENTERS
 from app.workspace.indenters import Indenter, read_indenters, write_indenters
@@ -56,7 +56,7 @@ class MeasurePage(QWidget):
         self.tabs.addTab(self.results, tr("Records"))
         self.protocol = ProtocolView(context=context)
         self.tabs.addTab(self.protocol, tr("Evaluation protocol"))
-        vbox(self.tabs, parent=self, margins=0)
+        vbox(self.tabs, of=self, margins=0)
         self._shown = False
         self.tabs.currentChanged.connect(lambda _index: self._on_tab())
         self.press_view.indenters_wanted.connect(self.edit_indenters)

@@ -28,8 +28,8 @@ from app.measure.tool_map import ToolMap
 from app.measure.work import Work
 from app.services.jobs import Jobs
 from app.widgets.actions import make_action
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.io.user import user_name
@@ -95,7 +95,7 @@ class PressViewFrame(QMainWindow):
         self._split.setCollapsible(0, False)
         self._split.setSizes(FIRST_SIZES)
         across = hbox((self._split, 1), self.panel, spacing=0)
-        vbox(self.banner, (across, 1), self.replay, parent=middle, margins=0, spacing=0)
+        vbox(self.banner, (across, 1), self.replay, of=middle, margins=0, spacing=0)
         self.setCentralWidget(middle)
         self._build_bar()
         self._bench = QDockWidget(tr("Virtual bench"), self)

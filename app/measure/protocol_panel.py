@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
 
 from app.measure.press_check import object_name
 from app.theme import theme
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.protocol import SAME_REGION, PressWanted
@@ -62,7 +62,7 @@ class RunPanel(QWidget):
         super().__init__(parent)
         named(self, "protocol.panel", tr("Next press"))
         self.setFixedWidth(WIDTH)
-        column = vbox(parent=self, margins=(12, 10, 12, 10), spacing=8)
+        column = vbox(of=self, margins=(12, 10, 12, 10), spacing=8)
         self._build_task(column)
         self._build_buttons(column)
         self._build_progress(column)

@@ -11,8 +11,8 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from app.theme import theme
-from app.widgets.boxes import vbox
 from app.widgets.label import MarkupLabel
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
 from gelpolight_core.measurement.evaluation import (
@@ -47,7 +47,7 @@ class Fig13(QWidget):
         head.addWidget(self.legend, 1)
         self._grid = QGridLayout()
         self._grid.setSpacing(6)
-        vbox(head, (self._grid, 1), parent=self, margins=0, spacing=4)
+        vbox(head, (self._grid, 1), of=self, margins=0, spacing=4)
         self._plots: list[pg.PlotWidget] = []
         self._evaluation: Evaluation | None = None
         self._repaint = QTimer(self, interval=1, singleShot=True)

@@ -25,7 +25,7 @@ from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_work import ProtocolWork
 from app.sources.bench import Bench
 from app.sources.processor import Failure
-from app.widgets.boxes import hbox
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.steadiness import judge_press
@@ -102,7 +102,7 @@ class PressingView(QWidget):
         self._detection = LiveDetection(self.live)
         self.image = LiveView()
         self.panel = RunPanel()
-        hbox((self.image, 1), self.panel, parent=self, margins=0, spacing=0)
+        hbox((self.image, 1), self.panel, of=self, margins=0, spacing=0)
         self._tick = QTimer(self)
         self._tick.setInterval(HAND_MS)
         self._tick.timeout.connect(self._move_hand)

@@ -23,8 +23,8 @@ from PySide6.QtWidgets import (
 from app.context.context import AppContext
 from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -76,7 +76,7 @@ class ResultView(QWidget):
             self.sentence,
             (split, 1),
             self.progress,
-            parent=self,
+            of=self,
             margins=(12, 10, 12, 10),
             spacing=8,
         )
@@ -136,7 +136,7 @@ class ResultView(QWidget):
         quality = QualityTableWidget("protocol.errors", tr("Errors and their limits"))
         quality.set_table(document.sections[0].quality)
         holder = QWidget()
-        vbox(quality, 1, parent=holder)
+        vbox(quality, None, of=holder)
         self._tabs.addTab(holder, tr("Summary"))
         groups = document.sections[0].listings[0]
         self._tabs.addTab(listing_table("protocol.groups", groups), tr("By size and height"))
@@ -147,7 +147,7 @@ class ResultView(QWidget):
             pooled = PlainLabel("      ".join(f"{label}: {value}" for label, value in gauge.facts))
             named(pooled, "protocol.pooled", tr("Repeatability over all objects"))
             pooled.setWordWrap(True)
-            vbox(pooled, (table, 1), parent=holder)
+            vbox(pooled, (table, 1), of=holder)
             self._tabs.addTab(holder, tr("Repeatability"))
         self._tabs.addTab(listing_table("protocol.presses", document.sources), tr("Every press"))
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))

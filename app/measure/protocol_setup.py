@@ -21,9 +21,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.widgets.boxes import hbox
 from app.widgets.inputs import ComboBox, SpinBox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
@@ -77,7 +77,7 @@ class ProtocolSetup(QScrollArea):
         inside = QWidget()
         self.setWidget(inside)
         form, runs = QVBoxLayout(), QVBoxLayout()
-        hbox(1, form, runs, 1, parent=inside, margins=(24, 20, 24, 20), spacing=36)
+        hbox(None, form, runs, None, of=inside, margins=(24, 20, 24, 20), spacing=36)
         self._build_form(form)
         self._build_runs(runs)
         self._count()

@@ -18,8 +18,8 @@ from app.measure.protocol_result import ResultView
 from app.measure.protocol_setup import KnownRun, ProtocolSetup
 from app.measure.protocol_work import Equipped, ProtocolWork, equip
 from app.services.jobs import Job, Jobs
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
@@ -61,7 +61,7 @@ class ProtocolView(QWidget):
         self._jobs = Jobs("protocol set-up", self)
         self._jobs.refused.connect(self._on_refused)
         self._stack = QStackedWidget()
-        vbox(self._build_bar(), (self._stack, 1), parent=self, margins=0, spacing=0)
+        vbox(self._build_bar(), (self._stack, 1), of=self, margins=0, spacing=0)
         self.setup = ProtocolSetup()
         self._stack.addWidget(self.setup)
         self.setup.begin_wanted.connect(lambda path: self.begin(Path(path)))

@@ -34,9 +34,9 @@ from app.measure.record_table import (
 )
 from app.theme.icons import icon
 from app.widgets.actions import make_action
-from app.widgets.boxes import vbox
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.statistics import Statistics, statistics_of
@@ -110,9 +110,9 @@ class ResultsView(QWidget):
         for widget in (self.remove, self.export):
             bar.addWidget(widget)
         left = QWidget()
-        vbox((self.statistics, 1), parent=left, margins=(10, 4, 10, 4))
+        vbox((self.statistics, 1), of=left, margins=(10, 4, 10, 4))
         right = QWidget()
-        vbox(self.drift_title, (self.drift, 1), parent=right, margins=(0, 0, 8, 4))
+        vbox(self.drift_title, (self.drift, 1), of=right, margins=(0, 0, 8, 4))
         below = QSplitter(Qt.Orientation.Horizontal)
         below.addWidget(left)
         below.addWidget(right)

@@ -18,8 +18,8 @@ from app.measure.tool_layer import DrawnTool, ToolLayer
 from app.measure.work import Work
 from app.view2d.display import Display
 from app.view2d.map_point import read_at
-from app.widgets.boxes import hbox, vbox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.units import in_unit
 from gelpolight_core.errors import InputError
@@ -80,7 +80,7 @@ class ToolMap(QWidget):
     def _lay_out(self) -> None:
         foot = hbox((self.hint, 1), self.readout, margins=(8, 2, 8, 2))
         right = vbox((self.panel, 1), foot, spacing=0)
-        hbox(self.tools, (right, 1), parent=self, margins=0, spacing=0)
+        hbox(self.tools, (right, 1), of=self, margins=0, spacing=0)
 
     def _connect(self) -> None:
         self.tools.chosen.connect(self._on_kind)

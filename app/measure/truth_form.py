@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
 from app.measure.figures_text import UNITS
 from app.measure.judging import Judged, Stated
 from app.measure.placing import INDENTERS
-from app.widgets.boxes import hbox, vbox
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, escaped
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
 from gelpolight_core.measurement.tools import ToolResult
@@ -90,8 +90,8 @@ class TruthForm(QGroupBox):
         self._form.addRow(self.known)
         self._form.addRow(self.size_on, self.size)
         self._form.addRow(self.height_on, self.height)
-        row = hbox(edit, limits, 1)
-        vbox(self._form, self.again, row, self.verdict, parent=self)
+        row = hbox(edit, limits, None)
+        vbox(self._form, self.again, row, self.verdict, of=self)
 
     # True values
 

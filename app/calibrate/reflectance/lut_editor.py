@@ -21,8 +21,8 @@ from app.calibrate.reflectance.lut_effect import Effect
 from app.calibrate.reflectance.lut_live import LivePanel
 from app.calibrate.reflectance.lut_model import CurveEdit
 from app.calibrate.reflectance.lut_plot import CurvePlot
-from app.widgets.boxes import vbox
 from app.widgets.label import plain_tip
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.roomy_label import RoomyLabel
 from gelpolight_core.calibration.scatter import ReflectanceScatter
@@ -233,7 +233,7 @@ class LutEditor(QWidget):
             (split, 1),
             self._hint,
             self._notice,
-            parent=self,
+            of=self,
         )
 
     def _connect(self) -> None:

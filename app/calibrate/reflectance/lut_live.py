@@ -15,9 +15,9 @@ from app.calibrate.reflectance.lut_effect import Effect
 from app.calibrate.reflectance.lut_model import CurveEdit
 from app.services.newest_wins import NewestWins
 from app.theme import theme
-from app.widgets.boxes import vbox
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
 from gelpolight_core.errors import InputError
@@ -82,7 +82,7 @@ class LivePanel(QWidget):
             self._words,
             (self._profile, 3),
             (self._residual, 2),
-            parent=self,
+            of=self,
             margins=0,
         )
         self.apply_theme()
