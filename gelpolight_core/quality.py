@@ -10,6 +10,9 @@ from typing import Any
 
 from gelpolight_core.translation import joined, pattern, tr
 
+TINY = 1e-9
+"""Rounding error only: no figure's limit is this close to 0."""
+
 
 class Verdict(StrEnum):
     """How a figure, a stage or a calibration is judged."""
@@ -77,6 +80,28 @@ def verdict_word(verdict: Verdict) -> str:
         Verdict.WARN: tr("Warning"),
         Verdict.FAIL: tr("Fail"),
     }[verdict]
+
+
+def value_text(figure: Figure) -> str:
+    """Return a figure's value with its unit. Counts have no decimals."""
+    if not math.isfinite(figure.value):
+        return tr("unknown")
+    if abs(figure.value) < TINY:
+        number = "0"
+    elif not figure.unit and figure.value == round(figure.value):
+        number = f"{figure.value:.0f}"
+    else:
+        number = f"{figure.value:.3g}" if abs(figure.value) < 1000.0 else f"{figure.value:.0f}"
+    return f"{number} {figure.unit}".rstrip()
+
+
+def limit_text(figure: Figure) -> str:
+    """Return the pass limit of a figure, such as "≤ 0.3 px". Empty if it has none."""
+    limit = figure.warn_limit if figure.warn_limit is not None else figure.fail_limit
+    if limit is None:
+        return ""
+    sign = "≥" if figure.higher_is_better else "≤"
+    return f"{sign} {limit:.4g} {figure.unit}".rstrip()
 
 
 def judge(

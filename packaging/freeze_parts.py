@@ -19,7 +19,7 @@ PACKAGES = ("app", "gelpolight_core")
 # The picture of resources/ itself is the README's.
 RESOURCES = ("checkerboards", "designs", "icons")
 # What setuptools puts beside the modules: see package-data in pyproject.toml.
-PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.jinja", "*.mo", "*.po", "py.typed")
+PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.typ", "*.mo", "*.po", "py.typed")
 # Of the documentation: for search engines.
 GUIDE = ("*.md", "guide/*.md", "reference/*.md", "pictures/*")
 NOT_READ = ("sitemap.xml", "sitemap.xml.gz")
@@ -36,6 +36,7 @@ NAMED_VERSIONS = (
     "scipy",
     "tifffile",
     "trimesh",
+    "typst",
     "vtk",
 )
 

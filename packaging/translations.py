@@ -18,7 +18,6 @@ from pathlib import Path
 from babel.messages.catalog import Catalog
 from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
-from jinja2.ext import babel_extract
 
 from gelpolight_core import __version__
 from gelpolight_core.translation import LANGUAGES, catalogue_path
@@ -37,25 +36,13 @@ def texts_of(path: Path) -> Iterator[str]:
                     yield given.value
 
 
-def texts_of_template(path: Path) -> Iterator[str]:
-    """Yield the texts of a Jinja template that are translated."""
-    with path.open("rb") as file:
-        for _, _, text, _ in babel_extract(file, FUNCTIONS, (), {}):
-            if isinstance(text, str):
-                yield text
-
-
-READERS = {"*.py": texts_of, "*.jinja": texts_of_template}
-
-
 def template() -> Catalog:
     """Return all texts of the source with the files that contain them."""
     catalogue = Catalog(project="GelPoLight Studio", charset="utf-8")
     for package in PACKAGES:
-        for pattern, texts in READERS.items():
-            for path in sorted((ROOT / package).rglob(pattern)):
-                for text in texts(path):
-                    catalogue.add(text, locations=[(path.relative_to(ROOT).as_posix(), 0)])
+        for path in sorted((ROOT / package).rglob("*.py")):
+            for text in texts_of(path):
+                catalogue.add(text, locations=[(path.relative_to(ROOT).as_posix(), 0)])
     return catalogue
 
 

@@ -10,21 +10,23 @@ from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from gelpolight_core.drawing_thread import THREAD_NAME, in_drawing_thread
-from gelpolight_core.report.drawing import draw
+from gelpolight_core.report.drawing import drawing
 
 
-def words(figure: Figure) -> None:
+@drawing(20.0)
+def words(figure: Figure) -> str:
     figure.text(0.1, 0.5, "height (mm)", fontweight="bold")
+    return "words"
 
 
 def test_drawings_asked_for_at_once_are_made_one_after_the_other() -> None:
     style = dict(rcParams)
     meeting = threading.Barrier(3)
-    drawn: list[bytes] = []
+    drawn: list[str] = []
 
     def ask() -> None:
         meeting.wait()
-        drawn.append(draw("at once", 20.0, words).png)
+        drawn.append(words().svg)
 
     with ThreadPoolExecutor(3) as people:
         for asked in [people.submit(ask) for _ in range(3)]:

@@ -9,7 +9,6 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import (
-    QFileDialog,
     QFrame,
     QHBoxLayout,
     QPushButton,
@@ -24,6 +23,7 @@ from app.calibrate.states import RUNNING, is_done, state_icon, state_meaning, st
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from app.context.context import AppContext
+from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
@@ -32,6 +32,7 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.roomy_label import RoomyLabel
 from app.widgets.sign import Sign
+from app.workspace.report import stated_validation
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.status import StageState, StageStatus
@@ -288,29 +289,24 @@ class Saving(QObject):
 
     def report(self) -> None:
         """Ask for a file name and write the report there."""
-        session = self._model.project.session
-        settings = self._context.settings
-        proposed = settings.folder("report") / f"{session.sensor.serial}-report.html"
-        chosen, _ = QFileDialog.getSaveFileName(
-            self._view,
-            tr("Write the report"),
-            str(proposed),
-            tr("Web page (*.html);;PDF (*.pdf)"),
-        )
-        if chosen:
-            settings.keep_folder("report", Path(chosen).parent)
-            self.write_report(Path(chosen))
+        name = f"{self._model.project.session.sensor.serial}-report.pdf"
+        title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
+        path = ask_save(self._view, self._context.settings, "report", title, name, patterns)
+        if path is not None:
+            self.write_report(path)
 
     def write_report(self, path: Path) -> None:
         """Write the report of the session in its present state."""
-        project = self._model.project
+        project, workspace = self._model.project, self._context.workspace
 
         def work(_progress: object) -> CalibrationRun:
             from gelpolight_core.report.build import run_report  # slow to import
             from gelpolight_core.report.file import write_report
 
             run = project.finish()
-            write_report(run_report(run, project.session), path)
+            saved = workspace.entry_of(run.calibration.identity)
+            validation = None if saved is None else stated_validation(saved)
+            write_report(run_report(run, project.session, validation=validation), path)
             return run
 
         def done(_run: CalibrationRun) -> None:

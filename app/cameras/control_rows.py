@@ -14,11 +14,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.sources.camera.controls import CONTROLS
 from app.sources.source import Setting
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
+from gelpolight_core.session.camera_controls import CONTROLS
 from gelpolight_core.translation import tr
 
 MAINS_HZ = (0.0, 50.0, 60.0)

@@ -16,7 +16,7 @@ from gelpolight_core.measurement.press_pool import measure_folder
 from gelpolight_core.measurement.presses import open_ledger, press_measurement
 from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
 from gelpolight_core.measurement.truth import read_truth
-from gelpolight_core.report.evaluation_files import write_evaluation_files
+from gelpolight_core.report.evaluation import write_evaluation_files
 from gelpolight_core.translation import tr
 
 

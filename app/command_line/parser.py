@@ -101,7 +101,7 @@ def _commands() -> tuple[tuple[str, str, str], ...]:
             "drift",
             tr("compare an image of the untouched sensor with the calibration's background"),
         ),
-        ("report", "report", tr("write a calibration's report, HTML or PDF")),
+        ("report", "report", tr("write a calibration's report as PDF")),
         ("benchmark", "benchmark", tr("show the processing time of each step of a frame")),
         ("work-precision", "work_precision", tr("show error against run time")),
         ("stability", "stability", tr("run extreme cases")),

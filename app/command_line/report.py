@@ -9,9 +9,10 @@ from typing import Any
 from app.command_line.common import StageProgress, refuse_overwriting
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
+from app.workspace.entries import read_entry
+from app.workspace.report import stated_validation
 from gelpolight_core.calibration.any_session import calibrate_any
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.measurement.evaluation_run import evaluate_presses
@@ -20,17 +21,12 @@ from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.report.build import (
-    calibration_report,
-    in_place_report,
-    run_report,
-    validation_of,
-)
+from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report, Validation
+from gelpolight_core.report.evaluation import validation_of
 from gelpolight_core.report.file import refuse_other_endings, write_report
 from gelpolight_core.sensor_calibration import MODELS
 from gelpolight_core.session.closed import read_any_session
-from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 
@@ -44,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "a calibration file, or a session, which is calibrated again and shown with its images"
         ),
     )
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.html|FILE.pdf")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.pdf")
     parser.add_argument(
         "--presses",
         type=Path,
@@ -100,6 +96,8 @@ def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report
     calibration = read_calibration(options.source)
     with StageProgress() as progress:
         validation = _validate(calibration, presses, progress)
+    if validation is None:
+        validation = stated_validation(read_entry(options.source))
     return calibration_report(calibration, validation=validation)
 
 
@@ -111,9 +109,6 @@ def _of_session(options: argparse.Namespace, presses: Path | None) -> Report:
         result = calibrate_any(session, model=options.model, progress=progress)
         validation = _validate(result.calibration, presses, progress)
         progress(tr("report"), 1.0)
-        if isinstance(result, InPlaceRun):
-            return in_place_report(result, validation=validation)
-        assert isinstance(session, Session)
         return run_report(result, session, validation=validation)
 
 

@@ -31,7 +31,7 @@ from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.quality import verdict_word
 from gelpolight_core.report.document import Listing, Report
-from gelpolight_core.report.evaluation_document import evaluation_document
+from gelpolight_core.report.evaluation import evaluation_document, evaluation_sentence
 from gelpolight_core.translation import tr
 
 ROW_HEIGHT = 24
@@ -89,8 +89,8 @@ class ResultView(QWidget):
             name: named(QPushButton(text), f"protocol.{name}", tip)
             for name, text, tip in (
                 ("back", tr("&Continue pressing"), tr("Return to the presses")),
-                ("save", tr("&Save the report"), tr("Write CSV, HTML and PDF next to the run")),
-                ("save_as", tr("Save &as…"), tr("Write CSV, HTML and PDF into another folder")),
+                ("save", tr("&Save the report"), tr("Write CSV and PDF next to the run")),
+                ("save_as", tr("Save &as…"), tr("Write CSV and PDF into another folder")),
                 ("leave_result", tr("Lea&ve"), tr("Leave the run. Everything is saved")),
             )
         }
@@ -122,7 +122,7 @@ class ResultView(QWidget):
         serial = self._work.run.content.serial
         self.verdict.setText(f"{serial}: {word} ({state})")
         show_meaning(self.verdict, document.verdict.value)
-        self.sentence.setText(document.validation.sentence + ".")
+        self.sentence.setText(evaluation_sentence(evaluation) + ".")
         self.figure.show_evaluation(evaluation)
         self._show_tables(document)
         self.buttons["back"].setEnabled(self._work.run.next() is not None)
@@ -149,7 +149,9 @@ class ResultView(QWidget):
             pooled.setWordWrap(True)
             vbox(pooled, (table, 1), of=holder)
             self._tabs.addTab(holder, tr("Repeatability"))
-        self._tabs.addTab(listing_table("protocol.presses", document.sources), tr("Every press"))
+        self._tabs.addTab(
+            listing_table("protocol.presses", document.listings[0]), tr("Every press")
+        )
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))
 
     def show_work(self, title: str, share: float) -> None:

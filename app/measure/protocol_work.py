@@ -25,7 +25,7 @@ from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.report.evaluation_files import write_evaluation_files
+from gelpolight_core.report.evaluation import write_evaluation_files
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)

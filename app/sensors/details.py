@@ -22,7 +22,7 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
-from app.workspace.entries import Entry, parse_time
+from app.workspace.entries import Entry, validation_lines
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.quality import Verdict, verdict_word
@@ -140,30 +140,4 @@ def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
         uses,
         summary.accepted and tr("Used although it failed: {why}").format(why=summary.accepted),
     ]
-    return "\n".join((*filter(None, lines), *trial_lines(entry)))
-
-
-def trial_lines(entry: Entry) -> list[str]:
-    """Return the validation of a calibration on an object of known size, with its results."""
-    trial = entry.validation
-    if trial is None or entry.validation_note:
-        note = entry.validation_note or tr("press an object of known size to validate it")
-        return [tr("Not validated: {note}").format(note=note)]
-    word = tr("Validated") if trial.passed else tr("Validation failed")
-    when = parse_time(trial.when)
-    day = trial.when if when is None else f"{when.astimezone():%Y-%m-%d %H:%M}"
-    by = tr("by {name}").format(name=trial.who) if trial.who else ""
-    line = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
-    return [
-        f"{word}: {trial.indenter}, {day} {by}".rstrip(),
-        *(
-            line.format(
-                what=c.quantity,
-                a=c.measured_mm,
-                b=c.true_mm,
-                e=c.error_percent,
-                l=c.limit_percent,
-            )
-            for c in trial.comparisons
-        ),
-    ]
+    return "\n".join((*filter(None, lines), *validation_lines(entry)))

@@ -20,7 +20,6 @@ from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
 from app.sensors.model import cells_of, library_titles
-from app.sensors.report_writer import write_entry_report
 from app.sensors.sessions_box import SessionsBox
 from app.sensors.tables import Cell, CellsTable
 from app.sensors.trash_dialog import TrashDialog
@@ -32,6 +31,7 @@ from app.widgets.layout import splitter, vbox
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.gel_care import presses_text, read_presses
+from app.workspace.report import write_entry_report
 from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
@@ -104,7 +104,7 @@ class SensorsPage(QWidget):
         )  # fmt: skip
         self.report = self._action(
             "report", tr("Re&port…"), self.choose_report, "report",
-            tr("Write a report of this calibration as web page or PDF"),
+            tr("Write a report of this calibration as PDF"),
         )  # fmt: skip
         self.reveal = self._action(
             "reveal", tr("Show in fol&der"),
@@ -183,7 +183,7 @@ class SensorsPage(QWidget):
         if entry is not None:
             path = ask_save(
                 self, self._context.settings, "report", tr("Save the report"),
-                f"{entry.path.stem}-report.html", tr("Web page (*.html);;PDF (*.pdf)"),
+                f"{entry.path.stem}-report.pdf", tr("PDF (*.pdf)"),
             )  # fmt: skip
             if path is not None:
                 self._write_report(entry, path)

@@ -32,6 +32,7 @@ PARTS = (
     "matplotlib",
     "tifffile",
     "trimesh",
+    "typst",
     "pyvista",
     "pyvistaqt",
     "vtk",

@@ -9,10 +9,9 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.context.context import AppContext
 from app.tools.work_dialog import WorkDialog
-from app.widgets.quality_table import limit_text, value_text
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.design_check.check import DesignCheckResult, check_design
-from gelpolight_core.quality import Verdict, verdict_word
+from gelpolight_core.quality import Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.studies.files import write_table
 from gelpolight_core.translation import tr
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
@@ -21,37 +19,20 @@ from app.widgets.actions import make_action
 from app.widgets.label import plain_tip
 from app.widgets.layout import vbox
 from app.widgets.naming import named
-from gelpolight_core.quality import Figure, QualityTable, Verdict, verdict_word
+from gelpolight_core.quality import (
+    Figure,
+    QualityTable,
+    Verdict,
+    limit_text,
+    value_text,
+    verdict_word,
+)
 from gelpolight_core.translation import tr
 
 VERDICT_COLUMN, LABEL_COLUMN, VALUE_COLUMN, LIMIT_COLUMN = range(4)
 COLUMNS = 4
 ROW_HEIGHT = 24
-# Rounding error only. No figure's limit is this close.
-TINY = 1e-9
 MARGIN = 6
-
-
-def value_text(figure: Figure) -> str:
-    """Return a figure's value with its unit. Counts have no decimals."""
-    if not math.isfinite(figure.value):
-        return tr("unknown")
-    if abs(figure.value) < TINY:
-        number = "0"
-    elif not figure.unit and figure.value == round(figure.value):
-        number = f"{figure.value:.0f}"
-    else:
-        number = f"{figure.value:.3g}" if abs(figure.value) < 1000.0 else f"{figure.value:.0f}"
-    return f"{number} {figure.unit}".rstrip()
-
-
-def limit_text(figure: Figure) -> str:
-    """Return the pass limit of a figure, such as "≤ 0.3 px". Empty if it has none."""
-    limit = figure.warn_limit if figure.warn_limit is not None else figure.fail_limit
-    if limit is None:
-        return ""
-    sign = "≥" if figure.higher_is_better else "≤"
-    return f"{sign} {limit:.4g} {figure.unit}".rstrip()
 
 
 class _Grid(QTableWidget):

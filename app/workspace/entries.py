@@ -106,3 +106,29 @@ def read_entry(path: Path, *, in_use: bool = False) -> Entry:
     if validation is not None and validation.identity != summary.identity:
         note = tr("the validation next to it belongs to another calibration")
     return Entry(path, summary, "", validation, note, in_use)
+
+
+def validation_lines(entry: Entry) -> list[str]:
+    """Return the validation of a calibration on an object of known size, with its results."""
+    trial = entry.validation
+    if trial is None or entry.validation_note:
+        note = entry.validation_note or tr("press an object of known size to validate it")
+        return [tr("Not validated: {note}").format(note=note)]
+    word = tr("Validated") if trial.passed else tr("Validation failed")
+    when = parse_time(trial.when)
+    day = trial.when if when is None else f"{when.astimezone():%Y-%m-%d %H:%M}"
+    by = tr("by {name}").format(name=trial.who) if trial.who else ""
+    line = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
+    return [
+        f"{word}: {trial.indenter}, {day} {by}".rstrip(),
+        *(
+            line.format(
+                what=c.quantity,
+                a=c.measured_mm,
+                b=c.true_mm,
+                e=c.error_percent,
+                l=c.limit_percent,
+            )
+            for c in trial.comparisons
+        ),
+    ]

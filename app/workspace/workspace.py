@@ -199,6 +199,11 @@ class Workspace:
             raise self._unreadable(error) from error
         return _in_order(read_entry(path, in_use=path == in_use) for path in files)
 
+    def entry_of(self, identity: str) -> Entry | None:
+        """Return a calibration by its identity; None if it is not in the library."""
+        entries = (e for e in self.entries() if e.summary is not None)
+        return next((e for e in entries if e.summary.identity == identity), None)
+
     def sessions(self) -> tuple[SessionEntry, ...]:
         """Return every session, by sensor, the last changed first.
 

@@ -93,9 +93,9 @@ def write_calibration(
     >>> calibration = gp.read_calibration("sensor.gplcal")
     >>> gp.write_calibration(calibration, "copy.gplcal")
     """
-    arrays = _arrays_of(calibration)
+    arrays = arrays_of(calibration)
     encoded = {name: _encode(array) for name, array in arrays.items()}
-    manifest = _manifest_of(calibration)
+    manifest = manifest_of(calibration)
     manifest["arrays"] = {
         name: {
             "shape": list(array.shape),
@@ -170,7 +170,8 @@ def _encode(array: NDArray[Any]) -> bytes:
     return buffer.getvalue()
 
 
-def _arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
+def arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a calibration by their names in the file."""
     if isinstance(c, InPlaceCalibration):
         return in_place_arrays(c)
     arrays: dict[str, NDArray[Any]] = {
@@ -195,7 +196,8 @@ def _arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
+def manifest_of(c: AnyCalibration) -> dict[str, Any]:
+    """Return the manifest of a calibration file, without its arrays."""
     provenance = asdict(c.provenance)
     remarks = {key: text for key in REMARKS if (text := provenance.pop(key))}
     manifest = {

@@ -141,10 +141,17 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     evaluation : Evaluation
         From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
     """
+    figure = Figure(figsize=(11.0, 11.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    paint_evaluation(figure, evaluation)
+    return figure
+
+
+def paint_evaluation(figure: Figure, evaluation: Evaluation) -> None:
+    """Paint :func:`evaluation_figure` on an empty figure, whose height follows from its width."""
     kinds = region_kinds(evaluation.results)
     series = [name for name in kinds if name != ALL] or [ALL]
-    figure = Figure(figsize=(11.0, 0.6 + 3.7 * len(series)), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure.set_figheight(figure.get_figwidth() * (0.06 + 0.34 * len(series)))
     panels = figure.subplots(len(series), 2, squeeze=False)
     for row, name in zip(panels, series, strict=True):
         for axes, direction in zip(row, DIRECTIONS, strict=True):
@@ -153,9 +160,8 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     note = tr("bars: mean, whiskers: one standard deviation, dots: presses")
     if evaluation.failed:
         note += f"; {evaluation.failure}"
-    figure.supxlabel(note, fontsize=9, color="0.35")
+    figure.supxlabel(note, fontsize="medium", color="0.35")
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-    return figure
 
 
 @in_drawing_thread
@@ -312,7 +318,7 @@ def _panel(axes: Axes, results: Sequence[PressResult], direction: str, regions: 
     )
     axes.set_ylabel(tr("absolute error (%)"))
     title = tr("planar direction") if direction == "planar" else tr("depth direction")
-    axes.set_title(title if regions == ALL else f"{title}, {regions}", fontsize=11)
+    axes.set_title(title if regions == ALL else f"{title}, {regions}", fontsize="medium")
     axes.spines[["top", "right"]].set_visible(False)
 
 

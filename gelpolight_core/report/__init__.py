@@ -1,1 +1,1 @@
-"""The calibration report: one document, written as HTML or PDF."""
+"""The calibration report and that of an evaluation: data, drawings, and one template."""

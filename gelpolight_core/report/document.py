@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
-from gelpolight_core.quality import Figure, QualityTable, Verdict
-from gelpolight_core.translation import tr
+from gelpolight_core.quality import QualityTable, Verdict
 
-ROUNDING = 1e-12
+T = TypeVar("T")
 MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}
 """A symbol next to each verdict, so that it is not shown by colour alone."""
 
@@ -20,22 +20,18 @@ class Drawing:
     Attributes
     ----------
     caption : str
-        What the drawing shows and how to read it.
-    png : bytes
-        The image.
-    width_mm, height_mm : float
-        Size on paper.
+        What the drawing shows and how to read it, without the last full stop.
+    svg : str
+        The drawing, of its size on paper.
     """
 
     caption: str
-    png: bytes
-    width_mm: float
-    height_mm: float
+    svg: str
 
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """A table: a title, column headings and rows of text.
+    """A table of texts.
 
     Attributes
     ----------
@@ -44,34 +40,34 @@ class Listing:
     heads : tuple of str
         One for each column.
     rows : tuple of tuple of str
-        Cells.
-    widths : tuple of float
-        Relative widths of the columns on paper.
-    fixed_width : bool
-        Whether the last column uses a fixed-width font, as for hashes.
+        Cells. A column of numbers is aligned to the right.
     """
 
     title: str
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    widths: tuple[float, ...]
-    fixed_width: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """Drawings and tables of one stage.
+def listing(title: str, items: Iterable[T], *columns: tuple[str, Callable[[T], str]]) -> Listing:
+    """Return a table with a row for each item.
 
-    Attributes
+    Parameters
     ----------
-    drawings : tuple of Drawing
-        Its results as drawings.
-    listings : tuple of Listing
-        Tables beside its quality.
+    title : str
+        Above the table.
+    items : iterable
+        What is listed.
+    columns : tuple of (str, callable)
+        Each with its heading, and what returns its cell for an item.
     """
+    heads, cells = zip(*columns, strict=True)
+    return Listing(title, heads, tuple(tuple(cell(item) for cell in cells) for item in items))
 
-    drawings: tuple[Drawing, ...] = ()
-    listings: tuple[Listing, ...] = ()
+
+Facts = tuple[tuple[str, str], ...]
+"""Labels and values."""
+Parts = tuple[tuple[Drawing, ...], tuple[Listing, ...]]
+"""Drawings and tables of a stage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +77,7 @@ class Section:
     Attributes
     ----------
     key, title, intro : str
-        Name for links, heading, and a description of the stage.
+        Name for programs, heading, and a description of the stage without the last full stop.
     quality : QualityTable
         Its judged figures.
     facts : tuple of (label, value)
@@ -96,25 +92,31 @@ class Section:
     title: str
     intro: str
     quality: QualityTable
-    facts: tuple[tuple[str, str], ...] = ()
+    facts: Facts = ()
     drawings: tuple[Drawing, ...] = ()
     listings: tuple[Listing, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """Validation of the calibration on objects of known size.
+    """What is known of the result on objects of known size.
 
     Attributes
     ----------
     sentence : str
         The result as a sentence without a full stop.
+    verdict : Verdict
+        A warning where nothing was measured.
     listing : Listing or None
         Each object.
+    data : mapping
+        Its numbers for programs: plain values.
     """
 
     sentence: str
+    verdict: Verdict
     listing: Listing | None = None
+    data: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,43 +128,26 @@ class Report:
     title : str
         Heading.
     verdict : Verdict
-        Verdict on the calibration.
+        Verdict on all of it.
+    sections : tuple of Section
+        In their order.
     facts : tuple of (label, value)
         Sensor and provenance.
-    validation : Validation
+    validation : Validation or None
         Results on objects of known size.
-    sections : tuple of Section
-        The stages in order.
-    sources : Listing
-        Every source file, with its hash.
+    listings : tuple of Listing
+        Long tables at the end.
+    created : str
+        ISO 8601 time of what is reported; empty if unknown.
+    data : mapping
+        Further numbers for programs: plain values.
     """
 
     title: str
     verdict: Verdict
-    facts: tuple[tuple[str, str], ...]
-    validation: Validation
     sections: tuple[Section, ...]
-    sources: Listing
-
-
-def value_text(figure: Figure) -> str:
-    """Return a figure's value with its unit."""
-    # Show a rounded negative zero as zero.
-    value = 0.0 if abs(figure.value) < ROUNDING else figure.value
-    number = f"{value:.4g}" if math.isfinite(value) else tr("not a number")
-    return f"{number} {figure.unit}".rstrip()
-
-
-def limit_text(figure: Figure) -> str:
-    """Return the limits of a figure; empty if it is only reported."""
-    limits = [x for x in (figure.warn_limit, figure.fail_limit) if x is not None]
-    if not limits:
-        return ""
-    at_most = not figure.higher_is_better
-    sign = "\N{LESS-THAN OR EQUAL TO}" if at_most else "\N{GREATER-THAN OR EQUAL TO}"
-    text = f"{sign} {limits[0]:.4g}"
-    if figure.warn_limit is not None and figure.fail_limit is not None:
-        text += tr(" (fails {sign} {limit:.4g})").format(
-            sign=">" if at_most else "<", limit=figure.fail_limit
-        )
-    return text
+    facts: Facts = ()
+    validation: Validation | None = None
+    listings: tuple[Listing, ...] = ()
+    created: str = ""
+    data: Mapping[str, Any] = field(default_factory=dict)

@@ -1,18 +1,21 @@
-"""Common parts of all drawings of the report: sizes, colours, images and maps in millimetres."""
+"""What all drawings of the report share: size, style, images and maps in millimetres."""
 
 from __future__ import annotations
 
+import functools
 import io
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec
 
 import cv2
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import get_data_path, rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.font_manager import get_font
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
@@ -20,20 +23,22 @@ from gelpolight_core.drawing_thread import in_drawing_thread
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
 
+P = ParamSpec("P")
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-FULL_MM = 180.0
-"""Width between the margins of an A4 page."""
-DPI = 200
+FULL_MM = 178.0
+"""Width between the margins of the page; see ``report.typ``."""
+FONTS = Path(get_data_path()) / "fonts" / "ttf"
 COLOURS = ("#c62828", "#2e7d32", "#1f4fbf")
 MARKERS = ("o", "s", "^")
 """A marker shape for each channel, for colour-blind readers and grey printers."""
 ACCENT = "#e69f00"
-MAP_COLOURS = "cividis"
+ACROSS = 6
+"""Images side by side."""
 _STYLE: dict[Any, Any] = {
-    "font.size": 8.0,
-    "axes.titlesize": 8.5,
-    "axes.titleweight": "bold",
+    "font.family": "DejaVu Sans",
+    "font.size": 7.5,
+    "axes.titlesize": 8.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": "0.4",
@@ -42,23 +47,49 @@ _STYLE: dict[Any, Any] = {
     "ytick.labelsize": 7.0,
     "legend.fontsize": 7.0,
     "legend.frameon": False,
+    # Maps and images are shown with their own pixels.
+    "image.interpolation": "none",
+    "svg.fonttype": "none",
+    # The same names in every file.
+    "svg.hashsalt": "report",
     # File names may contain dollar signs.
     "text.parse_math": False,
 }
 
 
-@in_drawing_thread
-def draw(
-    caption: str, height_mm: float, paint: Callable[[Figure], None], *, width_mm: float = FULL_MM
-) -> Drawing:
-    """Return the drawing made by `paint` on an empty figure of the given size."""
-    with rc_context(_STYLE):
-        figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
-        FigureCanvasAgg(figure)
-        paint(figure)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=DPI)
-    return Drawing(caption, stream.getvalue(), width_mm, height_mm)
+def drawing(
+    height_mm: float, width_mm: float = FULL_MM
+) -> Callable[[Callable[Concatenate[Figure, P], str]], Callable[P, Drawing]]:
+    """Decorate a function that paints on a figure and returns its caption: it returns a drawing.
+
+    Parameters
+    ----------
+    height_mm, width_mm : float
+        Size of the figure on paper.
+    """
+
+    def decorate(paint: Callable[Concatenate[Figure, P], str]) -> Callable[P, Drawing]:
+        @functools.wraps(paint)
+        @in_drawing_thread
+        def drawn(*arguments: P.args, **named: P.kwargs) -> Drawing:
+            with rc_context(_STYLE):
+                size_inch = (width_mm / 25.4, height_mm / 25.4)
+                figure = Figure(figsize=size_inch, layout="constrained")
+                FigureCanvasSVG(figure)
+                caption, stream = paint(figure, *arguments, **named), io.StringIO()
+                figure.savefig(stream, format="svg", metadata={"Date": None})
+            return Drawing(caption, stream.getvalue())
+
+        return drawn
+
+    return decorate
+
+
+def printable(text: str) -> str:
+    """Return text on one line, with a white square for every character that the font lacks."""
+    known = get_font(str(FONTS / "DejaVuSans.ttf")).get_charmap()
+    shown = " ".join(text.split())
+    return "".join(c if ord(c) in known else "\N{WHITE SQUARE}" for c in shown)
 
 
 def round_to_one_digit(value: float) -> float:
@@ -74,15 +105,21 @@ def show_image(axes: Axes, rgb: Map, *, width_px: int = 900, extent: Sequence[fl
     if columns > width_px:
         size = (width_px, max(round(rows * width_px / columns), 1))
         shown = np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), np.float32)
-    full = tuple(extent) or (-0.5, columns - 0.5, rows - 0.5, -0.5)
-    axes.imshow(
-        np.clip(shown, 0.0, 1.0) ** (1 / 2.2),
-        extent=(full[0], full[1], full[2], full[3]),
-        interpolation="antialiased",
-    )
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.spines[:].set_visible(False)
+    left, right, bottom, top = extent or (-0.5, columns - 0.5, rows - 0.5, -0.5)
+    encoded = np.round(255.0 * np.clip(shown, 0.0, 1.0) ** (1 / 2.2)).astype(np.uint8)
+    axes.imshow(encoded, extent=(left, right, bottom, top))
+    axes.set_axis_off()
+
+
+def tiles(figure: Figure, count: int, ratio: float) -> list[Axes]:
+    """Return axes for images side by side, each `ratio` times as high as wide with its title."""
+    rows = math.ceil(count / ACROSS)
+    width, tallest = figure.get_size_inches()
+    figure.set_figheight(min(rows * ratio * width / ACROSS, tallest))
+    panels = figure.subplots(rows, ACROSS, squeeze=False).ravel()
+    for axes in panels:
+        axes.set_axis_off()
+    return list(panels[:count])
 
 
 def grid_extent(grid: MembraneGrid) -> tuple[float, float, float, float]:
@@ -92,10 +129,9 @@ def grid_extent(grid: MembraneGrid) -> tuple[float, float, float, float]:
     return float(x[0] - half), float(x[-1] + half), float(y[-1] + half), float(y[0] - half)
 
 
-def three_maps(
-    figure: Figure, maps: Map, known: NDArray[np.bool_], grid: MembraneGrid, label: str
-) -> Sequence[Axes]:
-    """Show one map per channel with a common scale, robust against specks; return their axes."""
+def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Sequence[Axes]:
+    """Show a map of each channel with a common scale, robust against specks; 0 is unknown."""
+    known = np.asarray((maps > 0.0).all(axis=2))
     shown = np.where(known[..., None], maps, np.nan)
     low, high = np.nanpercentile(shown, [0.5, 99.5]) if known.any() else (0.0, 1.0)
     step = max(maps.shape[1] // 420, 1)
@@ -104,7 +140,7 @@ def three_maps(
         image = axes.imshow(
             shown[::step, ::step, k],
             extent=grid_extent(grid),
-            cmap=MAP_COLOURS,
+            cmap="cividis",
             vmin=float(low),
             vmax=float(high),
         )

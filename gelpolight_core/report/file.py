@@ -1,44 +1,56 @@
-"""The report file: HTML or PDF depending on its extension, written completely or not at all."""
+"""The report file: A4 pages as PDF, set by typst, with the report's data attached as JSON."""
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from datetime import datetime
+from itertools import count
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import typst
+
+from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.report.document import Report
-from gelpolight_core.report.html import report_html
-from gelpolight_core.report.pdf import report_pdf
-from gelpolight_core.translation import tr
+from gelpolight_core.quality import Figure, Verdict, limit_text, value_text, verdict_word
+from gelpolight_core.report.document import MARKS, Report
+from gelpolight_core.report.drawing import FONTS
+from gelpolight_core.translation import current_language, tr
 
-ENDINGS = (".html", ".pdf")
+ENDING = ".pdf"
+TEMPLATE = Path(__file__).with_name("report.typ")
 
 
 def refuse_other_endings(path: Path) -> None:
-    """Refuse a report name that ends in neither .html nor .pdf.
+    """Refuse a report name that does not end in .pdf.
 
     Raises
     ------
     InputError
         If it does not.
     """
-    if path.suffix.lower() not in ENDINGS:
+    if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("A report can only be written as HTML or PDF"),
+            tr("A report can only be written as PDF"),
             where=str(path),
-            advice=tr("Use a file name that ends in .html or .pdf"),
+            advice=tr("Use a file name that ends in .pdf"),
         )
 
 
 def write_report(report: Report, path: Path) -> None:
-    """Write a report as HTML or PDF.
+    """Write a report as PDF, completely or not at all.
 
     Parameters
     ----------
     report : Report
         The report.
     path : Path
-        Ending in ``.html`` or ``.pdf``.
+        Ending in ``.pdf``.
 
     Raises
     ------
@@ -46,5 +58,96 @@ def write_report(report: Report, path: Path) -> None:
         If the name has another extension, or the file cannot be written.
     """
     refuse_other_endings(path)
-    content = report_pdf(report) if path.suffix.lower() == ".pdf" else report_html(report).encode()
+    content = report_pdf(report)
     write_atomically(path, lambda stream: stream.write(content))
+
+
+def report_pdf(report: Report) -> bytes:
+    """Return the report as a PDF file; the same report gives the same file."""
+    drawings = [drawing.svg for section in report.sections for drawing in section.drawings]
+    pdf: bytes = typst.compile(
+        TEMPLATE,
+        font_paths=[FONTS],
+        ignore_system_fonts=True,
+        sys_inputs={
+            "report": json.dumps(report_json(report), indent=1, allow_nan=False),
+            **{f"drawing-{number}": svg for number, svg in enumerate(drawings)},
+        },
+    )
+    return pdf
+
+
+def report_json(report: Report) -> Any:
+    """Return the report as plain values: what the template shows and the file contains.
+
+    Numbers that are not finite are None.
+    """
+    number = count()
+    texts = {
+        "summary": tr("Summary"),
+        "stage": tr("Stage"),
+        "todo": tr("What to do"),
+        "figure": tr("Figure"),
+        "value": tr("Value"),
+        "limit": tr("Limit"),
+        "verdict": tr("Verdict"),
+    }
+    sections = [
+        {
+            "key": s.key,
+            "title": s.title,
+            "intro": s.intro,
+            "verdict": s.quality.verdict,
+            "advice": s.quality.advice,
+            "figures": [_figure(figure) for figure in s.quality.figures],
+            "facts": s.facts,
+            "drawings": [{"number": next(number), "caption": d.caption} for d in s.drawings],
+            "listings": [asdict(listing) for listing in s.listings],
+        }
+        for s in report.sections
+    ]
+    return _plain(
+        {
+            "format": "gelpolight-report",
+            "version": 1,
+            "program": f"GelPoLight Studio {__version__}",
+            "language": current_language(),
+            **asdict(replace(report, sections=())),
+            "date": _date(report.created),
+            "sections": sections,
+            "texts": texts,
+            "verdicts": {
+                verdict: f"{MARKS[verdict]} {verdict_word(verdict)}" for verdict in Verdict
+            },
+        }
+    )
+
+
+def _figure(figure: Figure) -> dict[str, Any]:
+    limit = limit_text(figure)
+    if figure.warn_limit is not None and figure.fail_limit is not None:
+        sign = "<" if figure.higher_is_better else ">"
+        limit += tr(" (fails {sign} {limit:.4g})").format(sign=sign, limit=figure.fail_limit)
+    return {**asdict(figure), "value_text": value_text(figure), "limit_text": limit}
+
+
+def _date(created: str) -> tuple[int, ...] | None:
+    """Return year to second of an ISO 8601 time; None if it is not one."""
+    try:
+        return tuple(datetime.fromisoformat(created).timetuple()[:6])
+    except ValueError:
+        return None
+
+
+def _plain(value: Any) -> Any:
+    """Return nested values as those of JSON."""
+    if isinstance(value, Mapping):
+        return {_plain(key): _plain(part) for key, part in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(part) for part in value]
+    if isinstance(value, str):
+        # Names of files may contain bytes that are not text.
+        return value.encode("utf-8", "replace").decode("utf-8")
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -21,6 +21,7 @@ def label(key: str) -> str:
         "ball": tr("ball"),
         "ok": tr("ok"),
         "doubtful": tr("doubtful"),
+        "not measured": tr("not measured"),
         "reflectance": tr("reflectance"),
         "background": tr("background"),
         "two-lobe": tr("two-lobe"),

@@ -162,7 +162,7 @@ def test_the_evaluation_measures_every_press_of_the_folder(
     kept = [rows[0], *(r for r in rows if r.startswith(("cylinder_s5_d100", "cuboid_s4_d100")))]
     (presses / "truth.csv").write_text("\n".join(kept) + "\n")
     assert main(["evaluate", str(calibration), str(presses), "-o", str(tmp_path / "e")]) == 0
-    endings = ("csv", "html", "json", "pdf", "png", "txt")
+    endings = ("csv", "json", "pdf", "png", "txt")
     assert {f"evaluation.{ending}" for ending in endings} == {
         p.name for p in (tmp_path / "e").iterdir()
     }

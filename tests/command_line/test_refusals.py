@@ -193,8 +193,8 @@ def test_no_report_overwrites_files_of_a_session(
 ) -> None:
     decided = Decisions(excluded=frozenset({"balls/ball_00.png"}))
     folder = damaged(session, tmp_path, lambda copy: write_decisions(decided, copy))
-    (tmp_path / "r.html").symlink_to(folder / name)
-    given = ("report", str(folder), "-o", str(tmp_path / "r.html"))
+    (tmp_path / "r.pdf").symlink_to(folder / name)
+    given = ("report", str(folder), "-o", str(tmp_path / "r.pdf"))
     assert "overwrite" in refusal(capsys, *given)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from one_line import refusal
+from report_pdf import report_data, report_text
 
 from app.command_line.main import main
 from gelpolight_core.measurement.protocol import Protocol
@@ -34,14 +35,16 @@ def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
     calibration: Path, run_folder: Path, tmp_path: Path
 ) -> None:
     """Both commands accept the folder of a run, or that of its presses."""
-    page, presses = tmp_path / "r.html", str(run_folder / "presses")
+    page, presses = tmp_path / "r.pdf", str(run_folder / "presses")
     assert main(["evaluate", str(calibration), str(run_folder), "-o", str(tmp_path / "e")]) == 0
     overall = json.loads((tmp_path / "e" / "evaluation.json").read_text())["overall"]
     assert {overall[direction]["count"] for direction in ("planar", "depth")} == {1}
     assert main(["report", str(calibration), "-o", str(page), "--presses", presses]) == 0
     planar, depth = (overall[name]["mean_absolute_percent"] for name in ("planar", "depth"))
-    output = f"mean absolute error {planar:.1f} % in size and {depth:.1f} % in height"
-    assert output in page.read_text()
+    found = report_data(page)["validation"]["data"]["overall"]
+    assert found["planar"]["mean_absolute_percent"] == planar
+    assert found["depth"]["mean_absolute_percent"] == depth
+    assert f"depth direction {depth:.2f} %" in report_text(page)
 
 
 def test_an_evaluation_gives_the_same_numbers_with_one_process_or_two(
@@ -64,6 +67,6 @@ def test_an_evaluation_gives_the_same_numbers_with_one_process_or_two(
 def test_presses_without_a_folder_are_refused_before_any_work(
     run_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], named: str
 ) -> None:
-    presses, page = str(run_folder / named), str(tmp_path / "r.html")
+    presses, page = str(run_folder / named), str(tmp_path / "r.pdf")
     line = refusal(capsys, "report", "none.gplcal", "-o", page, "--presses", presses)
     assert "not a folder" in line

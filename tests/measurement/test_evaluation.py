@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene
+from report_pdf import report_data, report_text
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.drape import cylinder_depth
@@ -33,8 +34,7 @@ from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.measurement.truth import PressTruth, read_truth
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.report.evaluation_document import evaluation_document
-from gelpolight_core.report.evaluation_files import write_evaluation_files
+from gelpolight_core.report.evaluation import evaluation_document, write_evaluation_files
 
 HEADER = "file,shape,diameter_mm,side_mm,height_mm\n"
 
@@ -281,18 +281,19 @@ def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -
     assert gauge_rows(evaluate([press("cuboid", 5.0, 1.0)], found[:1])) == ()
 
 
-def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
+def test_the_report_is_whole(tmp_path: Path) -> None:
     evaluation = paper_protocol(sizes=[5.0])
     written = write_evaluation_files(evaluation, tmp_path, calibration=scene.calibration())
     assert {path.name for path in written} == {
-        *(f"evaluation.{ending}" for ending in ("txt", "csv", "json", "png", "html", "pdf")),
+        *(f"evaluation.{ending}" for ending in ("txt", "csv", "json", "png", "pdf")),
         "gauge.csv",
     }
-    page = (tmp_path / "evaluation.html").read_text()
-    assert "Fail</span>" not in page
+    text = report_text(tmp_path / "evaluation.pdf")
     for output in ("T-1", "Repeatability, depth", "60 of 60 presses", "cuboid_5_1_r24_29.png"):
-        assert output in page
-    assert (tmp_path / "evaluation.pdf").read_bytes().startswith(b"%PDF")
+        assert output in text
+    data = report_data(tmp_path / "evaluation.pdf")
+    assert data["verdict"] == "pass"
+    assert data["data"]["evaluation"] == json.loads((tmp_path / "evaluation.json").read_text())
     with (tmp_path / "gauge.csv").open() as file:
         gauge = list(csv.DictReader(file))
     assert len(gauge) == 2 * 2
@@ -304,13 +305,13 @@ def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
 
 def test_the_reports_files_are_judged_by_the_limits_that_are_given(tmp_path: Path) -> None:
     write_evaluation_files(paper_protocol(sizes=[5.0]), tmp_path, limits_percent=(5.0, 0.1))
-    assert "Fail</span>" in (tmp_path / "evaluation.html").read_text()
+    assert report_data(tmp_path / "evaluation.pdf")["verdict"] == "fail"
 
 
 def test_a_report_without_regions_or_measurements_says_so(tmp_path: Path) -> None:
     evaluation = evaluate([press("ball", 6.0, 0.8)], ["the image is all black"])
     written = write_evaluation_files(evaluation, tmp_path)
     assert "gauge.csv" not in {path.name for path in written}
-    page = (tmp_path / "evaluation.html").read_text()
-    assert "None of 1 presses could be measured" in page
-    assert "the image is all black" in page
+    text = report_text(tmp_path / "evaluation.pdf")
+    assert "None of 1 presses could be measured" in text
+    assert "the image is all black" in text

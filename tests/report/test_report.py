@@ -1,63 +1,40 @@
-"""The report is complete, self-contained, and printable."""
+"""The report is complete, printable, and readable by programs."""
 
 from __future__ import annotations
 
-import base64
-import re
 import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 from shutil import which
 
-import cv2
 import numpy as np
 import pytest
 import scene
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from report_pdf import report_data, report_text
 
 from app.command_line.main import MENDABLE, main
+from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
-from gelpolight_core.quality import Figure, QualityTable, Verdict, judge
+from gelpolight_core.quality import Figure, QualityTable, Verdict, judge, limit_text
 from gelpolight_core.report.build import calibration_report, run_report
-from gelpolight_core.report.document import Report, limit_text
-from gelpolight_core.report.html import report_html
-from gelpolight_core.report.pdf import line_width_mm, report_pdf, wrap
-from gelpolight_core.report.stage_facts import stage_facts
-from gelpolight_core.report.typeface import printable
+from gelpolight_core.report.document import Report
+from gelpolight_core.report.facts import head_facts, stage_facts
+from gelpolight_core.report.file import report_pdf, write_report
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
+from gelpolight_core.translation import use_language
 
-NASTY = '<script src="http://evil.example/x.js">&"\'$\\frac{1}$ \u4e2d\u6587'
-
-
-class Page(HTMLParser):
-    """Collects the tags and the visible text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.seen: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note the tag."""
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        """Note the text."""
-        self.seen.append(data)
-
-
-def parsed(report: Report) -> Page:
-    """Return the report's HTML, read."""
-    page = Page()
-    page.feed(report_html(report))
-    return page
+NASTY = (
+    '#panic("x") *b* $1/0$ <l> @r \\u{41} `raw` // /* \u4e2d\u6587 \udcff \x00 "q"\n= h ' + 90 * "w"
+)
+"""Markup of typst, characters without a glyph, and a word longer than a column."""
 
 
 @cache
@@ -72,48 +49,82 @@ def whole(virtual_run: CalibrationRun, virtual_session: Path) -> Report:
     return run_report(virtual_run, read_session(virtual_session))
 
 
-def test_the_report_shows_every_stage_with_figures_and_a_drawing(
-    virtual_run: CalibrationRun, whole: Report
+@pytest.fixture(scope="module")
+def whole_file(whole: Report, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the file of the whole report."""
+    path = tmp_path_factory.mktemp("report") / "report.pdf"
+    write_report(whole, path)
+    return path
+
+
+@pytest.fixture
+def german() -> Iterator[None]:
+    """Show texts in German."""
+    use_language("de")
+    yield
+    use_language("en")
+
+
+def written(report: Report, folder: Path) -> Path:
+    """Write a report into a folder; return its path."""
+    write_report(report, folder / "r.pdf")
+    return folder / "r.pdf"
+
+
+def test_programs_find_every_figure_of_every_stage_in_the_file(
+    virtual_run: CalibrationRun, whole_file: Path
 ) -> None:
-    assert [s.key for s in whole.sections] == list(virtual_run.calibration.quality)
-    shown = " ".join(parsed(whole).seen)
+    data = report_data(whole_file)
+    quality = virtual_run.calibration.quality
+    assert [section["key"] for section in data["sections"]] == list(quality)
+    for section in data["sections"]:
+        found = {figure["key"]: figure["value"] for figure in section["figures"]}
+        assert found == {f.key: f.value for f in quality[section["key"]].figures}
+    calibration = data["data"]["calibration"]
+    assert calibration["identity"] == virtual_run.calibration.identity
+    leds = np.array(calibration["led_positions_mm"])
+    assert (leds == virtual_run.calibration.led_positions_mm).all()
+
+
+def test_the_pages_show_every_figure_drawing_and_source(
+    virtual_run: CalibrationRun, whole: Report, whole_file: Path
+) -> None:
+    text = report_text(whole_file)
     for section in whole.sections:
-        # The drawings of background and balls are in the sections on factors and reflectance.
-        assert section.drawings or section.key in ("background", "balls"), section.key
-        for figure in virtual_run.calibration.quality[section.key].figures:
-            assert figure.label in shown
-
-
-def test_every_source_is_listed_with_its_hash(virtual_run: CalibrationRun, whole: Report) -> None:
-    shown = set(parsed(whole).seen)
+        # Background and balls are drawn in the sections on factors and reflectance.
+        shown = section.drawings or section.key in ("background", "balls", "crosstalk", "joint")
+        assert shown, section.key
+        assert section.title in text
+        for figure in section.quality.figures:
+            assert figure.label[:30] in text  # its first line
+        for drawing in section.drawings:
+            assert drawing.caption in text
+            assert "<path" in drawing.svg
     for name, digest in virtual_run.calibration.provenance.sources.items():
-        assert {name, digest} <= shown
+        assert name in text and digest in text
+    assert "Not validated" in text
 
 
-def test_the_html_needs_no_other_file(whole: Report) -> None:
-    """It is mailed, archived, and opened on machines without a network."""
-    text = report_html(whole)
-    assert "<script" not in text
-    assert "url(" not in text and "@import" not in text
-    for tag, attributes in parsed(whole).tags:
-        assert tag not in ("link", "iframe", "object", "embed")
-        for name in ("src", "href"):
-            target = attributes.get(name)
-            assert target is None or target.startswith(("data:image/png;base64,", "#")), target
+def test_the_pages_are_a4(whole_file: Path) -> None:
+    if which("pdfinfo") is None:
+        pytest.skip("pdfinfo is not installed")
+    output = subprocess.check_output(["pdfinfo", str(whole_file)], text=True)
+    assert "(A4)" in output
+    assert "Calibration of sensor" in output
 
 
-def test_the_drawings_are_complete(whole: Report) -> None:
-    images = [a["src"] for tag, a in parsed(whole).tags if tag == "img"]
-    assert len(images) == sum(len(s.drawings) for s in whole.sections)
-    for source in images:
-        assert source is not None
-        data = np.frombuffer(base64.b64decode(source.split(",")[1]), np.uint8)
-        image = cv2.imdecode(data, cv2.IMREAD_COLOR)
-        assert image.std() > 5.0  # something is drawn on it
-
-
-def test_a_calibration_without_known_objects_is_reported_as_not_validated(whole: Report) -> None:
-    assert any("Not validated" in text for text in parsed(whole).seen)
+def test_a_german_report_has_the_same_numbers(
+    whole_file: Path, virtual_run: CalibrationRun, tmp_path: Path, german: None
+) -> None:
+    path = written(calibration_report(virtual_run.calibration), tmp_path)
+    data, english = report_data(path), report_data(whole_file)
+    assert (data["language"], english["language"]) == ("de", "en")
+    assert data["data"] == english["data"]
+    assert [s["figures"][0]["value"] for s in data["sections"]] == [
+        s["figures"][0]["value"] for s in english["sections"]
+    ]
+    text = report_text(path)
+    assert "Kalibrierung des Sensors" in text and "Nicht validiert" in text and "Bestanden" in text
 
 
 def test_too_few_presses_to_hold_any_out_are_reported(
@@ -122,26 +133,33 @@ def test_too_few_presses_to_hold_any_out_are_reported(
     """Nothing was compared: there is neither a loss nor a verdict on the refinement."""
     full = virtual_calibration.full
     assert full is not None
-    assert "Loss on held-out presses" in dict(stage_facts(virtual_calibration, "joint"))
+    assert "Loss on held-out presses" in dict(stage_facts(virtual_calibration)["joint"])
     few = replace(virtual_calibration, full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
-    facts = dict(stage_facts(few, "joint"))
+    facts = dict(stage_facts(few)["joint"])
     assert "too few presses" in facts["LEDs used"]
     assert "Loss on held-out presses" not in facts
 
 
-def test_names_from_files_are_shown_and_never_obeyed() -> None:
+def test_texts_from_files_are_shown_and_never_obeyed(tmp_path: Path) -> None:
     c = small()
+    figure = judge(NASTY, NASTY, float("nan"), NASTY, warn=1.0, advice=NASTY)
     hostile = replace(
         c,
         sensor=replace(c.sensor, serial=NASTY),
-        provenance=replace(c.provenance, operator=NASTY, sources={NASTY: NASTY}),
-        quality={NASTY: QualityTable((judge(NASTY, NASTY, 2.0, NASTY, warn=1.0, advice=NASTY),))},
+        provenance=replace(c.provenance, operator=NASTY, created=NASTY, sources={NASTY: NASTY}),
+        quality={NASTY: QualityTable((figure,))},
     )
-    report = calibration_report(hostile)
-    page = parsed(report)
-    assert "script" not in {tag for tag, _ in page.tags}
-    assert NASTY in page.seen
-    assert report_pdf(report).startswith(b"%PDF")
+    path = written(calibration_report(hostile), tmp_path)
+    (section,) = report_data(path)["sections"]
+    assert section["figures"][0]["label"] == NASTY.replace("\udcff", "?")
+    assert section["figures"][0]["value"] is None and section["verdict"] == "fail"
+    assert '#panic("x") *b* $1/0$ <l> @r' in report_text(path)
+
+
+@settings(max_examples=30)
+@given(st.text(max_size=60))
+def test_any_text_can_be_reported(text: str) -> None:
+    assert report_pdf(Report(text, Verdict.PASS, (), facts=((text, text),))).startswith(b"%PDF")
 
 
 def test_edits_by_hand_are_reported() -> None:
@@ -149,20 +167,41 @@ def test_edits_by_hand_are_reported() -> None:
     c = small()
     curve = (np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 11) ** 1.2)
     changed = edited(c, {1: curve}, operator="A. Person", made="2026-03-04T05:06:07+00:00")
-    shown = " ".join(parsed(calibration_report(changed)).seen)
-    assert "Edited by hand" in shown
+    shown = dict(head_facts(changed))["Edited by hand"]
     assert "green" in shown and "A. Person" in shown and "2026-03-04" in shown
-    assert "Edited by hand" not in " ".join(parsed(calibration_report(c)).seen)
+    assert "Edited by hand" not in dict(head_facts(c))
 
 
-def test_a_figure_that_did_not_pass_comes_with_its_advice() -> None:
+def test_camera_settings_are_named_and_unknown_ones_left_out() -> None:
+    c = small()
+    texts = {
+        "name": "Camera A",
+        "identity": "usb-1",
+        "pixel_format": "YUYV",
+        "width": "640",
+        "height": "480",
+        "rate_hz": "0.0",
+        "control.exposure_ms": "12.5",
+        "control.gain_auto": "0",
+    }
+    made = replace(c.provenance, camera_settings=texts)
+    facts = dict(head_facts(replace(c, provenance=made)))
+    assert facts["Camera"] == "Camera A, 640 \N{MULTIPLICATION SIGN} 480 px, YUYV"
+    assert facts["Exposure"] == "12.5 ms" and facts["Automatic gain"] == "off"
+
+
+def test_a_figure_that_did_not_pass_comes_with_its_advice(tmp_path: Path) -> None:
     advice = "Press harder"
-    table = QualityTable((judge("a", "A", 2.0, "mm", warn=1.0, fail=3.0, advice=advice),))
-    report = calibration_report(replace(small(), quality={"lens": table}))
+    tables = {
+        "lens": QualityTable((judge("a", "A", 2.0, "mm", warn=1.0, fail=3.0, advice=advice),)),
+        "balls": QualityTable((judge("b", "B", 0.5, "mm", warn=1.0, advice="Never shown"),)),
+    }
+    report = calibration_report(replace(small(), quality=tables))
     assert report.verdict is Verdict.WARN
-    shown = "".join(parsed(report).seen)
-    assert shown.count(advice) == 2  # in the summary, and beside the figure
-    assert "Warning" in shown
+    text = report_text(written(report, tmp_path))
+    assert text.count(advice) == 2  # in the summary, and beside the figure
+    assert "Warning" in text and "Never shown" not in text
+    assert "\N{LESS-THAN OR EQUAL TO} 1 mm (fails > 3)" in text
 
 
 @given(
@@ -187,35 +226,8 @@ def test_a_figure_that_is_only_reported_has_no_limit() -> None:
     assert limit_text(Figure("k", "l", 1.0, "", None, None, Verdict.PASS, "")) == ""
 
 
-@given(st.text(max_size=120), st.floats(8.0, 180.0))
-def test_lines_fit_their_column_and_lose_no_word(text: str, width_mm: float) -> None:
-    lines = wrap(text, width_mm, 8.0)
-    for line in lines:
-        assert len(line) == 1 or line_width_mm(line, 8.0) <= width_mm
-    assert "".join(lines).replace(" ", "") == printable(text).replace(" ", "")
-
-
-def test_the_pdf_is_of_a4_pages_with_its_text_to_search(whole: Report, tmp_path: Path) -> None:
-    path = tmp_path / "r.pdf"
-    path.write_bytes(report_pdf(whole))
-    boxes = re.findall(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+)", path.read_bytes())
-    assert len(boxes) > 3
-    for width, height in boxes:
-        assert float(width) == pytest.approx(595.3, abs=0.5)
-        assert float(height) == pytest.approx(841.9, abs=0.5)
-    if which("pdftotext") is None:
-        pytest.skip("pdftotext is not installed")
-    text = subprocess.run(
-        ["pdftotext", str(path), "-"], capture_output=True, text=True, check=True
-    ).stdout
-    for section in whole.sections:
-        assert section.title in text
-
-
 def test_the_same_report_gives_the_same_file() -> None:
-    report = calibration_report(small())
-    assert report_html(report) == report_html(report)
-    assert report_pdf(report) == report_pdf(report)
+    assert report_pdf(calibration_report(small())) == report_pdf(calibration_report(small()))
 
 
 def test_the_scatter_is_what_the_curves_were_fitted_to(
@@ -233,21 +245,35 @@ def test_the_scatter_is_what_the_curves_were_fitted_to(
         assert set(np.unique(scatter.presses[k])) == set(range(len(scatter.names)))
 
 
-def test_the_command_writes_both_kinds_from_a_calibration(
-    virtual_calibration: Calibration, tmp_path: Path
+@pytest.mark.parametrize(
+    ("measured_mm", "word", "verdict"),
+    [(1.01, "Validated", "pass"), (1.2, "Validation failed", "fail")],
+)
+def test_the_command_states_the_validation_of_the_window(
+    virtual_calibration: Calibration, tmp_path: Path, measured_mm: float, word: str, verdict: str
 ) -> None:
     source = tmp_path / "c.gplcal"
     write_calibration(virtual_calibration, source)
-    for name in ("r.html", "r.pdf"):
-        assert main(["report", str(source), "-o", str(tmp_path / name)]) == 0
-        assert (tmp_path / name).stat().st_size > 10_000
+    lengths = (Comparison("height", measured_mm, 1.0, 8.0),)
+    identity = virtual_calibration.identity
+    # As the Validation step of the wizard keeps it.
+    write_validation(
+        Validation(identity, "2026-01-02T03:04:05+00:00", "M", "cylinder", lengths), source
+    )
+    assert main(["report", str(source), "-o", str(tmp_path / "r.pdf")]) == 0
+    data = report_data(tmp_path / "r.pdf")
+    assert data["validation"]["sentence"].startswith(f"{word}: cylinder")
+    assert data["validation"]["verdict"] == verdict
+    assert data["validation"]["data"]["comparisons"][0]["measured_mm"] == measured_mm
+    assert "Not validated" not in report_text(tmp_path / "r.pdf")
 
 
 def test_the_command_refuses_what_it_cannot_write_before_any_work(
     virtual_session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["report", str(virtual_session), "-o", str(tmp_path / "r.doc")]) == MENDABLE
-    assert "HTML or PDF" in capsys.readouterr().err
-    missing = tmp_path / "none" / "r.html"
+    assert main(["report", str(virtual_session), "-o", str(tmp_path / "r.html")]) == MENDABLE
+    line = capsys.readouterr().err
+    assert "only be written as PDF" in line and "ends in .pdf" in line
+    missing = tmp_path / "none" / "r.pdf"
     assert main(["report", str(virtual_session), "-o", str(missing)]) == MENDABLE
     assert "folder does not exist" in capsys.readouterr().err

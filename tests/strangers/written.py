@@ -112,8 +112,8 @@ def _table(folder: Path, which: int) -> None:
     write_csv([replace(RECORD, note=f"note {which}")] * 3, folder / "records.csv")
 
 
-def _report(ending: str, folder: Path, which: int) -> None:
-    write_report(replace(report(), title=f"Report {which}"), folder / f"report.{ending}")
+def _report(folder: Path, which: int) -> None:
+    write_report(replace(report(), title=f"Report {which}"), folder / "report.pdf")
 
 
 def _protocol(folder: Path, which: int) -> None:
@@ -193,7 +193,7 @@ KINDS = (
     *(Written(f"heights as {name}", partial(_heights, name)) for name in FORMATS),
     Written("profile", _profile),
     Written("table of records", _table),
-    Written("report as HTML", partial(_report, "html")),
+    Written("report", _report),
     Written("protocol", _protocol),
     Written("press of a protocol", _press),
     Written("refusal of a press", _refusal),

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from app.sources.camera.controls import CONTROLS, MAIN, ORDER
 from app.sources.camera.driver import CameraGone, Format, OpenCamera
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
 from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.session.camera_controls import CONTROLS, MAIN, ORDER
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
@@ -56,14 +56,10 @@ class Applied:
         """Message for the user if the value was not accepted."""
         if self.read is None:
             return tr("{what}: the camera has no such setting").format(what=self.label)
+        kind = CONTROLS[self.key]
         return tr("{what} is {read}, not {wanted}").format(
-            what=self.label, read=self._words(self.read), wanted=self._words(self.wanted)
+            what=self.label, read=kind.text(self.read), wanted=kind.text(self.wanted)
         )
-
-    def _words(self, value: float) -> str:
-        if CONTROLS[self.key].switch:
-            return tr("on") if value else tr("off")
-        return f"{value:g} {self.unit}".rstrip()
 
 
 def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:

@@ -12,9 +12,9 @@ from typing import Any
 
 import cv2
 
-from app.sources.camera.controls import CONTROLS
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.camera_controls import CONTROLS
 from gelpolight_core.translation import tr
 
 ABSENT = -1.0

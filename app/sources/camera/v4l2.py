@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from app.sources.camera.controls import CONTROLS, ORDER
 from app.sources.camera.driver import CameraGone, Format
 from app.sources.camera.v4l2_structures import (
     CAPTURE,
@@ -39,6 +38,7 @@ from app.sources.camera.v4l2_structures import (
 )
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.camera_controls import CONTROLS, ORDER
 from gelpolight_core.translation import tr
 
 Ioctl = Callable[[int, int, Any], Any]

@@ -44,9 +44,9 @@ def test_a_waiting_report_that_was_stopped_is_reported(
     technician.begin(computed_project(), "result")
     wizard = technician.wizard
     wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait(60.0)))
-    wizard.at("result").saving.write_report(tmp_path / "report.html")
+    wizard.at("result").saving.write_report(tmp_path / "report.pdf")
     wizard.panel.cancel_wanted.emit()
     hold.set()
     technician.rest()
     assert wizard.at("result").view.saved.text() == "Writing the report: stopped"
-    assert not (tmp_path / "report.html").exists()
+    assert not (tmp_path / "report.pdf").exists()

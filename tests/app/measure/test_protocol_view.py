@@ -12,6 +12,7 @@ import scene
 from protocol_camera import SceneCamera, image
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
+from report_pdf import report_data
 
 from app.command_line.main import main
 from app.context.context import AppContext
@@ -215,12 +216,12 @@ def test_presses_are_captured_automatically_continued_and_reported(
     view.result.save(folder / "report")
     qtbot.waitUntil((folder / "report" / "gauge.csv").is_file, timeout=WAIT_MS)
     names = {path.suffix for path in (folder / "report").iterdir()}
-    assert {".csv", ".html", ".pdf"} <= names
+    assert {".csv", ".json", ".pdf"} <= names
 
     # The report uses the limits that were shown, not the present ones.
     assert context.settings.limits == Limits()
     assert "Fail (" in view.result.verdict.text()
-    assert "Fail</span>" in (folder / "report" / "evaluation.html").read_text()
+    assert report_data(folder / "report" / "evaluation.pdf")["verdict"] == "fail"
 
     calibration = context.workspace.entries()[0].path
     assert main(["evaluate", str(calibration), str(folder), "-o", str(tmp_path / "out")]) == 0

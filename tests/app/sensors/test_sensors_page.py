@@ -21,18 +21,19 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from report_pdf import report_data
 
 from app.context.context import AppContext
 from app.sensors.gel_care import GelCarePanel
 from app.sensors.model import cells_of
 from app.sensors.page import SensorsPage
-from app.sensors.report_writer import write_entry_report
 from app.sensors.trash_dialog import TrashDialog
 from app.services.preferences import Limits
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from app.workspace.gel_care import presses_text, write_presses
+from app.workspace.report import write_entry_report
 from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
@@ -141,8 +142,10 @@ def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
     answer.click()
     assert context.workspace.in_use == path
     assert "Used although it failed: for teaching" in words(page)
-    write_entry_report(read_entry(path), tmp_path / "report.html")
-    assert "for teaching" in (tmp_path / "report.html").read_text("utf-8")
+    write_entry_report(read_entry(path), tmp_path / "report.pdf")
+    assert ["Used although it failed", "for teaching"] in report_data(tmp_path / "report.pdf")[
+        "facts"
+    ]
     page._library.undo.undo()
     assert context.workspace.in_use is None
 
@@ -291,12 +294,11 @@ def test_a_session_can_be_continued_before_there_is_a_calibration(
     assert asked.args == [str(folder)]
 
 
-@pytest.mark.parametrize("ending", ["html", "pdf"])
 def test_a_report_is_written_in_the_background(
     page: SensorsPage, source: Path, context: AppContext, tmp_path: Path, qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch, ending: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    place = tmp_path / f"report.{ending}"
+    place = tmp_path / "report.pdf"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(place), ""))
     page.open_path(source)
     bar = page.findChild(QProgressBar, "sensors.busy")
@@ -313,7 +315,7 @@ def test_a_failed_report_is_shown_to_the_user(
     page: SensorsPage, source: Path, context: AppContext, tmp_path: Path, qtbot: QtBot,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    place = tmp_path / "nowhere" / "report.html"
+    place = tmp_path / "nowhere" / "report.pdf"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(place), ""))
     page.open_path(source)
     page.report.trigger()
@@ -325,17 +327,20 @@ def test_a_failed_report_is_shown_to_the_user(
 def test_the_report_contains_the_validation(source: Path, tmp_path: Path) -> None:
     place = tmp_path / "c.gplcal"
     place.write_bytes(source.read_bytes())
-    write_entry_report(read_entry(place), tmp_path / "before.html")
+    write_entry_report(read_entry(place), tmp_path / "before.pdf")
     trial = Validation(
         read_entry(place).summary.identity, "2026-01-02T03:04:05+00:00", "M", "cylinder",
         (Comparison("height", 1.01, 1.0, 8.0),),
     )  # fmt: skip
     write_validation(trial, place)
-    write_entry_report(read_entry(place), tmp_path / "after.html")
-    output = [(tmp_path / f"{name}.html").read_text() for name in ("before", "after")]
-    assert "1.010 mm measured" not in output[0]
-    assert "Validated: cylinder" in output[1]
-    assert "1.010 mm measured" in output[1]
+    write_entry_report(read_entry(place), tmp_path / "after.pdf")
+    before, after = (
+        report_data(tmp_path / f"{name}.pdf")["validation"]["sentence"]
+        for name in ("before", "after")
+    )
+    assert "Not validated" in before
+    assert "Validated: cylinder" in after
+    assert "1.010 mm measured" in after
 
 
 def test_the_gel_of_a_calibration_is_shown_and_named(

@@ -9,8 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.widgets.quality_table import QualityTableWidget, limit_text, value_text
-from gelpolight_core.quality import Figure, QualityTable, judge
+from app.widgets.quality_table import QualityTableWidget
+from gelpolight_core.quality import Figure, QualityTable, judge, limit_text, value_text
 
 RMS = {"unit": "px", "warn": 0.3, "fail": 1.0, "advice": "Focus the camera"}
 VIEWS = {"warn": 8, "fail": 4, "advice": "Capture more views", "higher_is_better": True}

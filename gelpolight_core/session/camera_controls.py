@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.translation import tr
 
 
@@ -31,6 +32,12 @@ class ControlKind:
     automatic: str = ""
     switch: bool = False
     locked_value: float | None = None
+
+    def text(self, value: float) -> str:
+        """Return a value with its unit, or on or off."""
+        if self.switch:
+            return tr("on") if value else tr("off")
+        return f"{value:g} {self.unit}".rstrip()
 
 
 # Switches come before the settings that they unlock; settings are applied in this order.
@@ -59,3 +66,29 @@ CONTROLS: Mapping[str, ControlKind] = {
 ORDER = tuple(CONTROLS)
 MAIN = ("exposure_ms", "white_balance_k", "gain", "focus")
 """The settings that are most important to lock."""
+
+
+def settings_facts(texts: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """Return labels and values of the camera settings of a calibration; unknown ones are left out.
+
+    Parameters
+    ----------
+    texts : mapping
+        As in the provenance of a calibration.
+    """
+    camera = settings_of_texts(texts)
+    if camera is None:
+        return ()
+    width, height = camera.size
+    parts = (
+        camera.name,
+        f"{width} \N{MULTIPLICATION SIGN} {height} px" if width and height else "",
+        camera.pixel_format,
+        tr("{hz:g} images/s").format(hz=camera.rate_hz) if camera.rate_hz else "",
+    )
+    controls = tuple(
+        (kind.label(), kind.text(camera.controls[key]))
+        for key, kind in CONTROLS.items()
+        if key in camera.controls
+    )
+    return ((tr("Camera"), ", ".join(filter(None, parts))), *controls)

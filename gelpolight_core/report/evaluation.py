@@ -1,0 +1,324 @@
+"""The report of an evaluation (the paper's Fig. 13, the gauge, every press) and all its files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.measurement.evaluation import (
+    ALL,
+    DIRECTIONS,
+    PAPER_PERCENT,
+    Evaluation,
+)
+from gelpolight_core.measurement.evaluation_report import (
+    evaluation_json,
+    paint_evaluation,
+    write_evaluation,
+)
+from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
+from gelpolight_core.quality import QualityTable, Verdict, judge
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
+from gelpolight_core.report.document import (
+    Facts,
+    Listing,
+    Report,
+    Section,
+    Validation,
+    listing,
+)
+from gelpolight_core.report.drawing import drawing
+from gelpolight_core.report.facts import head_facts
+from gelpolight_core.report.file import write_report
+from gelpolight_core.report.labels import label
+from gelpolight_core.translation import tr
+
+EM_DASH = "\N{EM DASH}"
+PAPER_LIMITS = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"])
+
+
+def evaluation_document(
+    evaluation: Evaluation,
+    *,
+    facts: Facts = (),
+    limits_percent: tuple[float, float] = PAPER_LIMITS,
+) -> Report:
+    """Return the report of an evaluation.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Presses compared with their truth.
+    facts : tuple of (label, value), optional
+        Sensor, calibration and other facts for the head of the report.
+    limits_percent : (float, float), optional
+        Largest mean absolute errors, planar and in depth, for it to pass.
+    """
+    errors = evaluation_errors(evaluation, limits_percent)
+    sections = [
+        Section(
+            "errors",
+            tr("Errors by size and height"),
+            tr(
+                "As in the paper's Fig. 13: planar errors are errors of diameters and sides, "
+                "depth errors are errors of heights"
+            ),
+            errors,
+            drawings=(_draw_errors(evaluation),),
+            listings=(_groups(evaluation),),
+        )
+    ]
+    gauge = gauge_rows(evaluation)
+    if gauge:
+        sections.append(_gauge_section(evaluation, gauge))
+    return Report(
+        title=tr("Evaluation on objects of known size"),
+        verdict=errors.verdict,
+        facts=facts,
+        validation=Validation(evaluation_sentence(evaluation), errors.verdict),
+        sections=tuple(sections),
+        listings=(known_objects(evaluation, tr("Every press")),),
+        data={"evaluation": evaluation_json(evaluation)},
+    )
+
+
+def validation_of(evaluation: Evaluation) -> Validation:
+    """Return the validation of a calibration from an evaluation on presses of known size.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Made with the calibration.
+    """
+    verdict, word = evaluation_errors(evaluation).verdict, tr("Validated")
+    if len(evaluation.failed) == len(evaluation.results):
+        verdict, word = Verdict.WARN, tr("Not validated")
+    elif verdict is Verdict.FAIL:
+        word = tr("Validation failed")
+    return Validation(
+        f"{word}: {evaluation_sentence(evaluation)}",
+        verdict,
+        known_objects(evaluation, tr("Objects of known size")),
+        evaluation_json(evaluation),
+    )
+
+
+def evaluation_errors(
+    evaluation: Evaluation, limits_percent: tuple[float, float] = PAPER_LIMITS
+) -> QualityTable:
+    """Return the mean errors, judged by the limits of the planar and the depth direction."""
+    title = tr("Mean absolute error, {direction}")
+    title_in = tr("Mean absolute error, {direction}, {regions}")
+    advice = tr("Calibrate again, or check the worst presses")
+    figures = []
+    for direction, limit in zip(DIRECTIONS, limits_percent, strict=True):
+        if not evaluation.series(direction):
+            continue  # there is no press for this direction yet
+        name = label(direction)
+        mean = evaluation.overall(direction).mean_absolute_percent
+        key, text = f"{direction}_mean", title.format(direction=name)
+        figures.append(judge(key, text, mean, "%", fail=limit, advice=advice))
+        for group in evaluation.groups:
+            overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
+            mean = group.statistic.mean_absolute_percent
+            if group.direction == direction and overall and math.isfinite(mean):
+                key = f"{direction}_{group.regions.replace(' ', '_')}"
+                text = title_in.format(direction=name, regions=label(group.regions))
+                figures.append(judge(key, text, mean, "%"))
+    return QualityTable(tuple(figures))
+
+
+@drawing(70.0)
+def _draw_errors(figure: Figure, evaluation: Evaluation) -> str:
+    paint_evaluation(figure, evaluation)
+    return tr(
+        "Absolute errors: bars are means, whiskers one standard deviation, dots the presses; the "
+        "dashed line is the mean reported in the paper"
+    )
+
+
+def _groups(evaluation: Evaluation) -> Listing:
+    return listing(
+        tr("Errors in percent of the true length"),
+        evaluation.groups,
+        (tr("regions"), lambda group: label(group.regions)),
+        (tr("direction"), lambda group: label(group.direction)),
+        (tr("shape"), lambda group: label(group.shape)),
+        (tr("mm"), lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
+        (tr("n"), lambda group: str(group.statistic.count)),
+        (tr("mean |e|"), lambda group: _number(group.statistic.mean_absolute_percent, ".2f")),
+        (tr("mean"), lambda group: _number(group.statistic.mean_percent, "+.2f")),
+        (tr("sd"), lambda group: _number(group.statistic.sd_percent, ".2f")),
+        (tr("lowest"), lambda group: _number(group.statistic.lowest_percent, "+.2f")),
+        (tr("highest"), lambda group: _number(group.statistic.highest_percent, "+.2f")),
+    )
+
+
+def _gauge_section(evaluation: Evaluation, gauge: tuple[GaugeRow, ...]) -> Section:
+    texts = {
+        "within_region_mm": tr("Repeatability, {direction}, all objects"),
+        "between_regions_mm": tr("Reproducibility, {direction}, all objects"),
+    }
+    return Section(
+        "gauge",
+        tr("Repeatability of the gauge"),
+        tr(
+            "Repeatability is the standard deviation of presses in one region; reproducibility "
+            "is the additional scatter between regions"
+        ),
+        QualityTable(),
+        tuple(
+            (text.format(direction=label(pooled.direction)), _micrometres(getattr(pooled, name)))
+            for pooled in evaluation.repeatability
+            for name, text in texts.items()
+        ),
+        listings=(_gauge_listing(gauge),),
+    )
+
+
+def _gauge_listing(gauge: tuple[GaugeRow, ...]) -> Listing:
+    return listing(
+        tr("Object by object"),
+        gauge,
+        (tr("direction"), lambda row: label(row.direction)),
+        (tr("shape"), lambda row: label(row.truth.shape)),
+        (tr("true (mm)"), lambda row: f"{row.true_mm:g}"),
+        (tr("n, same region"), lambda row: str(row.same.count)),
+        (tr("mean (mm)"), lambda row: _number(row.same.mean_mm, ".4f")),
+        (tr("sd: repeatability"), lambda row: _micrometres(row.same.sd_mm)),
+        (tr("n, random regions"), lambda row: str(row.random.count)),
+        (tr("mean (mm)"), lambda row: _number(row.random.mean_mm, ".4f")),
+        (tr("sd"), lambda row: _micrometres(row.random.sd_mm)),
+        (tr("reproducibility"), lambda row: _micrometres(row.reproducibility_mm)),
+    )
+
+
+def known_objects(evaluation: Evaluation, title: str) -> Listing:
+    """Return every press with its true and its measured lengths."""
+    presses: list[dict[str, Any]] = evaluation_json(evaluation)["presses"]
+    return listing(
+        title,
+        presses,
+        (tr("image"), lambda press: press["file"]),
+        (tr("shape"), lambda press: label(press["shape"])),
+        (tr("size (mm)"), lambda press: f"{press['true_size_mm']:g}"),
+        (tr("measured"), lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
+        (tr("error"), lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
+        (tr("height (mm)"), lambda press: f"{press['true_height_mm']:g}"),
+        (tr("measured"), lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
+        (tr("error"), lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
+        (tr("verdict"), lambda p: ": ".join(filter(None, (label(p["verdict"]), p["reason"])))),
+    )
+
+
+def evaluation_sentence(evaluation: Evaluation) -> str:
+    """Return the result of an evaluation as a sentence without a full stop."""
+    count = len(evaluation.results)
+    measured = count - len(evaluation.failed)
+    if not measured:
+        return tr("None of {n} presses could be measured").format(n=count)
+    summary = [tr("{measured} of {n} presses were measured").format(measured=measured, n=count)]
+    texts = {
+        "planar": tr(
+            "mean absolute error in the planar direction {e:.2f} % (paper: about {p:.0f} %)"
+        ),
+        "depth": tr(
+            "mean absolute error in the depth direction {e:.2f} % (paper: about {p:.0f} %)"
+        ),
+    }
+    for direction, text in texts.items():
+        error = evaluation.overall(direction).mean_absolute_percent
+        if math.isfinite(error):
+            summary.append(text.format(e=error, p=PAPER_PERCENT[direction]))
+    return "; ".join(summary)
+
+
+def _number(value: float | None, form: str, unit: str = "") -> str:
+    known = value is not None and math.isfinite(value)
+    return f"{value:{form}}{unit}" if known else EM_DASH
+
+
+def _micrometres(value_mm: float) -> str:
+    return _number(1e3 * value_mm, ".1f", " \N{MICRO SIGN}m")
+
+
+def _with_sd(value_mm: float | None, sd_mm: float | None) -> str:
+    return "" if value_mm is None else f"{value_mm:.3f} \N{PLUS-MINUS SIGN} {sd_mm:.3f}"
+
+
+def write_evaluation_files(
+    evaluation: Evaluation,
+    folder: Path,
+    *,
+    calibration: AnyCalibration | None = None,
+    limits_percent: tuple[float, float] = PAPER_LIMITS,
+) -> tuple[Path, ...]:
+    """Write ``evaluation.txt``, ``.csv``, ``.json``, ``.png``, ``.pdf`` and a gauge CSV.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Presses compared with their truth.
+    folder : Path
+        Destination; it must exist.
+    calibration : Calibration, optional
+        Named in the report.
+    limits_percent : (float, float), optional
+        Largest mean absolute errors, planar and in depth, for it to pass.
+
+    Returns
+    -------
+    tuple of Path
+        The files written; ``gauge.csv`` only if presses have regions.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    written = list(write_evaluation(evaluation, folder))
+    document = evaluation_document(
+        evaluation,
+        facts=() if calibration is None else head_facts(calibration),
+        limits_percent=limits_percent,
+    )
+    written.append(folder / "evaluation.pdf")
+    write_report(document, written[-1])
+    gauge = gauge_rows(evaluation)
+    if gauge:
+        path = folder / "gauge.csv"
+        text = gauge_csv(gauge)
+        write_atomically(path, lambda stream: stream.write(text.encode()))
+        written.append(path)
+    return tuple(written)
+
+
+def gauge_csv(gauge: tuple[GaugeRow, ...]) -> str:
+    """Return the gauge table as CSV, one line for each object and direction."""
+    rows = [
+        {
+            "direction": row.direction,
+            "shape": row.truth.shape,
+            "size_mm": row.truth.size_mm,
+            "height_mm": row.truth.height_mm,
+            "same_region_n": row.same.count,
+            "same_region_mean_mm": row.same.mean_mm,
+            "repeatability_sd_mm": row.same.sd_mm,
+            "random_regions_n": row.random.count,
+            "random_regions_mean_mm": row.random.mean_mm,
+            "random_regions_sd_mm": row.random.sd_mm,
+            "reproducibility_sd_mm": row.reproducibility_mm,
+        }
+        for row in gauge
+    ]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: "" if v != v else v for k, v in row.items()} for row in rows)
+    return text.getvalue()

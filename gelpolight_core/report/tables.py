@@ -1,0 +1,163 @@
+"""Tables of a calibration's report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import PurePath
+
+import numpy as np
+
+from gelpolight_core.calibration.joint import JointResult
+from gelpolight_core.channels import channel_name
+from gelpolight_core.in_place.calibrate import InPlaceResult
+from gelpolight_core.lights.mirror import MirrorSpots
+from gelpolight_core.optics.lens import LensResult
+from gelpolight_core.quality import verdict_word
+from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
+from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.report.document import MARKS, Listing, listing
+from gelpolight_core.report.drawing import Array
+from gelpolight_core.translation import tr
+
+
+def leds(leds_mm: Array, sd_mm: Array, moved_mm: Array | None = None) -> Listing:
+    """Return the positions of the LEDs, and how far a refinement moved them.
+
+    Parameters
+    ----------
+    leds_mm, sd_mm : (3, 3)
+        Positions in the sensor frame, row k is LED k, with standard deviations.
+    moved_mm : (3, 3), optional
+        Distance from the positions before.
+    """
+    heads: tuple[str, ...] = (tr("LED"), "x", "y", "z")
+    rows: list[tuple[str, ...]] = []
+    for k, (led, sd) in enumerate(zip(leds_mm, sd_mm, strict=True)):
+        position = (f"{x:.3f} \N{PLUS-MINUS SIGN} {s:.3f}" for x, s in zip(led, sd, strict=True))
+        rows.append((channel_name(k), *position))
+    title = tr("LED positions in the sensor frame (mm)")
+    if moved_mm is not None:
+        title = tr("LED positions in the sensor frame, and their shift by the refinement (mm)")
+        heads += tuple(tr("shift in {axis}").format(axis=axis) for axis in "xyz")
+        rows = [
+            (*row, *(f"{x:+.3f}" for x in moved)) for row, moved in zip(rows, moved_mm, strict=True)
+        ]
+    return Listing(title, heads, tuple(rows))
+
+
+def crosstalk_shares(crosstalk: Array) -> Listing:
+    """Return the share of each LED's light that the other channels see.
+
+    Parameters
+    ----------
+    crosstalk : (3, 3)
+        ``I_raw = crosstalk @ I_true``; column k is LED k.
+    """
+    heads = ("", *(tr("{name} LED").format(name=channel_name(k)) for k in range(3)))
+    rows = []
+    for j, shares in enumerate(crosstalk):
+        name = tr("seen by the {name} channel").format(name=channel_name(j))
+        cells = ("" if j == k else f"{100.0 * share:.2f} %" for k, share in enumerate(shares))
+        rows.append((name, *cells))
+    title = tr("Share of each LED's light that the other two channels see")
+    return Listing(title, heads, tuple(rows))
+
+
+def left_out_views(lens: LensResult) -> Listing:
+    """Return the checkerboard views that were left out, each with the reason."""
+    return listing(
+        tr("Views left out"),
+        (view for view in lens.views if not view.used),
+        (tr("image"), lambda view: view.name),
+        (tr("reason"), lambda view: view.reason),
+        (tr("advice"), lambda view: view.advice),
+    )
+
+
+def rejected_glints(spots: MirrorSpots) -> Listing:
+    """Return the spots on the mirror that are no LED, each with the reason."""
+    return listing(
+        tr("Rejected glints"),
+        enumerate(spots.rejected, start=1),
+        (tr("number"), lambda item: str(item[0])),
+        (tr("position (px)"), lambda item: "({:.1f}, {:.1f})".format(*item[1][0].centre_px)),
+        (tr("reason"), lambda item: item[1][1]),
+    )
+
+
+def ball_presses(presses: Sequence[BallPress]) -> Listing:
+    """Return every ball press with its verdict."""
+
+    def verdict(press: BallPress) -> str:
+        word = f"{MARKS[press.quality.verdict]} {verdict_word(press.quality.verdict)}"
+        return ": ".join((word, *press.quality.advice))
+
+    return listing(
+        tr("Ball presses (lengths in mm)"),
+        presses,
+        (tr("image"), lambda press: PurePath(press.name).name),
+        (tr("ball radius"), lambda press: f"{press.pose.radius_mm:.3f}"),
+        (tr("centre"), lambda press: "({:.3f}, {:.3f})".format(*press.pose.centre_mm)),
+        (tr("depth"), lambda press: f"{press.pose.depth_mm:.3f}"),
+        (tr("contact radius"), lambda press: f"{press.contact_radius_mm:.3f}"),
+        (tr("misfit"), lambda press: f"{100.0 * press.shading_misfit:.1f} %"),
+        (tr("verdict"), verdict),
+    )
+
+
+def refined_presses(presses: Sequence[BallPress], joint: JointResult) -> Listing:
+    """Return the residual of each press before and after the joint refinement, and its shift.
+
+    Parameters
+    ----------
+    presses : sequence of BallPress
+        With the misfit of their separate refinement.
+    joint : JointResult
+        With the misfit of each press after the joint refinement.
+    """
+
+    def moved(k: int) -> Array:
+        before, after = presses[k].pose, joint.balls[k]
+        x_mm, y_mm = np.subtract(after.centre_mm, before.centre_mm)
+        return 1e3 * np.array([x_mm, y_mm, after.depth_mm - before.depth_mm])
+
+    return listing(
+        tr("Residual of each ball press, and the shift of the balls by the joint refinement"),
+        range(len(presses)),
+        (tr("image"), lambda k: PurePath(presses[k].name).name),
+        (tr("misfit alone"), lambda k: f"{100.0 * presses[k].shading_misfit:.2f} %"),
+        (tr("misfit together"), lambda k: f"{100.0 * joint.ball_misfits[k]:.2f} %"),
+        (tr("shift in x (\N{MICRO SIGN}m)"), lambda k: f"{moved(k)[0]:+.1f}"),
+        (tr("shift in y (\N{MICRO SIGN}m)"), lambda k: f"{moved(k)[1]:+.1f}"),
+        (tr("shift in depth (\N{MICRO SIGN}m)"), lambda k: f"{moved(k)[2]:+.1f}"),
+    )
+
+
+def closed_presses(c: InPlaceCalibration, result: InPlaceResult) -> Listing:
+    """Return every press of a closed sensor, compared with the other presses."""
+
+    def percent(ratio: float) -> str:
+        return f"{100.0 * (ratio - 1.0):+.1f} %" if math.isfinite(ratio) else ""
+
+    return listing(
+        tr("Each press compared with the other presses"),
+        zip(c.balls, (press.held_out for press in result.presses), strict=True),
+        (tr("image"), lambda press: PurePath(press[0][0]).name),
+        (tr("radius (mm)"), lambda press: f"{press[0][4]:.3f}"),
+        (tr("position (mm)"), lambda press: f"{press[0][1]:.2f}, {press[0][2]:.2f}"),
+        (tr("contact (mm)"), lambda press: f"{press[0][3]:.2f}"),
+        (tr("normals"), lambda press: f"{press[1].normal_deg:.2f}\N{DEGREE SIGN}"),
+        (tr("height"), lambda press: percent(press[1].cap_ratio)),
+        (tr("diameter"), lambda press: percent(press[1].diameter_ratio)),
+    )
+
+
+def refused_presses(result: InPlaceResult) -> Listing:
+    """Return the presses of a closed sensor that were left out, each with the reason."""
+    return listing(
+        tr("Presses left out"),
+        sorted(result.refused.items()),
+        (tr("image"), lambda item: PurePath(item[0]).name),
+        (tr("reason"), lambda item: f"{item[1].found}. {item[1].advice}."),
+    )
