@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,27 +55,6 @@ class DepthScore:
     height_percent: float
     size_percent: float
     rms_um: float
-
-
-@dataclass(frozen=True, slots=True)
-class ScoreSummary:
-    """Scores of several presses.
-
-    Attributes
-    ----------
-    height_percent, size_percent : float
-        Mean absolute errors.
-    rms_um, worst_rms_um : float
-        Mean and largest RMS.
-    count : int
-        Presses.
-    """
-
-    height_percent: float
-    size_percent: float
-    rms_um: float
-    worst_rms_um: float
-    count: int
 
 
 def score_depth(
@@ -133,13 +111,6 @@ def score_depth(
 def scored_radius_mm(sensor: SensorData) -> float:
     """Return the radius in which a depth is compared with its truth, which has no edge."""
     return 0.5 * sensor.working_diameter_mm - EDGE_MM
-
-
-def summarise(scores: Iterable[DepthScore]) -> ScoreSummary:
-    """Return the mean absolute errors of several presses, and the worst RMS."""
-    table = np.abs([(s.height_percent, s.size_percent, s.rms_um) for s in scores])
-    height, size, rms = table.mean(axis=0).tolist()
-    return ScoreSummary(height, size, rms, float(table[:, 2].max()), len(table))
 
 
 def read_true_depth(path: Path) -> TrueDepth:
