@@ -57,7 +57,7 @@ MOST = {
     "gelpolight_core/in_place": 1221,
     "gelpolight_core/io": 497,
     "gelpolight_core/lights": 581,
-    "gelpolight_core/measurement": 4665,
+    "gelpolight_core/measurement": 4653,
     "gelpolight_core/optics": 1656,
     "gelpolight_core/radiance": 224,
     "gelpolight_core/reconstruction": 5768,
@@ -91,7 +91,7 @@ MOST = {
     "tests/optics": 510,
     "tests/packaging": 306,
     "tests/radiance": 78,
-    "tests/reconstruction": 2759,
+    "tests/reconstruction": 2791,
     "tests/recording": 312,
     "tests/records": 381,
     "tests/reflectance": 965,
@@ -100,7 +100,7 @@ MOST = {
     "tests/session": 484,
     "tests/simulation": 742,
     "tests/strangers": 1075,
-    "tests/studies": 384,
+    "tests/studies": 1149,
 }
 
 
