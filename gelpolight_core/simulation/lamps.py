@@ -1,8 +1,7 @@
-"""The lights of the virtual sensor: small near lamps, or parallel light."""
+"""The lights of the virtual sensor: small near lamps."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +10,6 @@ from numpy.typing import NDArray
 from gelpolight_core.design.sensor_design import SensorDesign
 
 Array = NDArray[np.float64]
-
-# Columns of the lamp table read by the compiled code.
-X, Y, Z, POWER, LOBE, RADIUS, PARALLEL = range(7)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,40 +38,7 @@ class PointLamp:
     def row(self) -> tuple[float, ...]:
         """Return the lamp in the format of the compiled code."""
         radius = 0.5 * self.diameter_mm
-        return (
-            self.x_mm, self.y_mm, -self.height_mm, self.power, self.lobe_exponent, radius, 0.0
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class ParallelLamp:
-    """Parallel light, the "directional lighting" of earlier sensors (paper, Fig. 1a).
-
-    Attributes
-    ----------
-    azimuth_deg : float
-        Direction of the light source, from x to y.
-    elevation_deg : float
-        Angle between the light and the top surface; 90 is perpendicular.
-    power : float
-        Irradiance on a facing surface.
-    """
-
-    azimuth_deg: float
-    elevation_deg: float
-    power: float = 1.0
-
-    def row(self) -> tuple[float, ...]:
-        """Return the lamp for the compiled code; x, y, z are the unit direction to it."""
-        azimuth, elevation = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
-        flat = math.cos(elevation)
-        return (
-            flat * math.cos(azimuth), flat * math.sin(azimuth), -math.sin(elevation),
-            self.power, 0.0, 0.0, 1.0,
-        )  # fmt: skip
-
-
-Lamp = PointLamp | ParallelLamp
+        return self.x_mm, self.y_mm, -self.height_mm, self.power, self.lobe_exponent, radius
 
 
 def lamps_of(design: SensorDesign) -> tuple[PointLamp, ...]:
@@ -89,6 +52,6 @@ def lamps_of(design: SensorDesign) -> tuple[PointLamp, ...]:
     )
 
 
-def lamp_table(lamps: tuple[Lamp, ...]) -> Array:
-    """Return (lamps, 7) float64 for the compiled code."""
+def lamp_table(lamps: tuple[PointLamp, ...]) -> Array:
+    """Return (lamps, 6) float64 for the compiled code."""
     return np.array([lamp.row() for lamp in lamps], dtype=np.float64)

@@ -185,19 +185,15 @@ def lamp_share(
         Position of the depth map.
     point : (x_mm, y_mm, depth_mm)
         The point.
-    lamp : (7,)
+    lamp : (6,)
         A row of the lamp table.
     """
     x0, y0, pitch, deepest = grid
     d = point[2]
     if d >= deepest:
         return 1.0
-    if lamp[6] > 0.5:
-        away, rise_mm = math.hypot(lamp[0], lamp[1]), -lamp[2]
-        dx, dy, radius = lamp[0], lamp[1], 0.0
-    else:
-        dx, dy = lamp[0] - point[0], lamp[1] - point[1]
-        away, rise_mm, radius = math.hypot(dx, dy), -lamp[2] - d, lamp[5]
+    dx, dy = lamp[0] - point[0], lamp[1] - point[1]
+    away, rise_mm, radius = math.hypot(dx, dy), -lamp[2] - d, lamp[5]
     if rise_mm <= 0.0:
         return 0.0
     if away < 1e-9:
@@ -213,38 +209,6 @@ def lamp_share(
     if radius <= 0.0:
         return 0.0 if cut < away else 1.0
     return disc_share((cut - away) / radius)
-
-
-@compiled
-def lit_share(
-    depth: Any, tile_max: Any, grid: Any, slopes: Any, lamps: Any
-) -> Any:  # pragma: no cover - compiled
-    """Return (rows, columns, lamps): the visible share of each lamp from each cell.
-
-    A cell whose surface faces away from a lamp does not see it.
-
-    Parameters
-    ----------
-    depth, tile_max, grid
-        As in :func:`lamp_share`.
-    slopes : (slope_x, slope_y)
-        Slopes of the depth map.
-    lamps : (lamps, 7)
-        Lamp table.
-    """
-    rows, columns = depth.shape
-    share = np.zeros((rows, columns, lamps.shape[0]))
-    for i in range(rows):
-        for j in range(columns):
-            x, y, d = grid[0] + j * grid[2], grid[1] + i * grid[2], depth[i, j]
-            for k in range(lamps.shape[0]):
-                lamp = lamps[k]
-                lx, ly, lz = lamp[0], lamp[1], lamp[2]
-                if lamp[6] < 0.5:
-                    lx, ly, lz = lx - x, ly - y, lz + d
-                if -(slopes[0][i, j] * lx + slopes[1][i, j] * ly + lz) > 0.0:
-                    share[i, j, k] = lamp_share(depth, tile_max, grid, (x, y, d), lamp)
-    return share
 
 
 @compiled

@@ -246,7 +246,7 @@ def gather(
         x_mm, y_mm and the slopes of the camera's ray.
     numbers : (nodes,)
         Number of each node's random sequence.
-    scene : (surface, grid, factor, lamps, material, layers)
+    scene : (surface, grid, factor, lamps (lamps, 6), material, layers)
         As for the pixels; layers: elastomer's thickness and index, window's thickness and index.
     bounces : int
         Largest number of reflections before a node.

@@ -93,17 +93,13 @@ def point_brightness(
     Irradiance is proportional to 1/r^2, the lamp's lobe and the cosine at the surface; a Lambertian
     surface of reflectance 1 has the brightness of its irradiance.
     """
-    if lamp[6] > 0.5:
-        lx, ly, lz = lamp[0], lamp[1], lamp[2]
-        strength = lamp[3]
-    else:
-        lx, ly, lz = lamp[0] - point[0], lamp[1] - point[1], lamp[2] + point[2]
-        r2 = lx * lx + ly * ly + lz * lz
-        r = math.sqrt(r2)
-        lx, ly, lz = lx / r, ly / r, lz / r
-        if lz >= 0.0:
-            return 0.0
-        strength = lamp[3] * (-lz) ** lamp[4] / r2
+    lx, ly, lz = lamp[0] - point[0], lamp[1] - point[1], lamp[2] + point[2]
+    r2 = lx * lx + ly * ly + lz * lz
+    r = math.sqrt(r2)
+    lx, ly, lz = lx / r, ly / r, lz / r
+    if lz >= 0.0:
+        return 0.0
+    strength = lamp[3] * (-lz) ** lamp[4] / r2
     n_l = normal[0] * lx + normal[1] * ly + normal[2] * lz
     if n_l <= 0.0:
         return 0.0
@@ -226,7 +222,7 @@ def shade_pressed(
         The patch.
     factors : (map, first position in mm, pitch in mm, working radius in mm)
         Reflectance factor over the membrane.
-    lamps : (lamps, 7)
+    lamps : (lamps, 6)
         Lamp table.
     material : Material
         Material of the membrane.

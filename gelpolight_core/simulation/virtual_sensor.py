@@ -15,7 +15,7 @@ from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
 from gelpolight_core.simulation.indirect_light import IndirectLight
 from gelpolight_core.simulation.interreflection import FLAT, indirect_light
-from gelpolight_core.simulation.lamps import Lamp, PointLamp, lamp_table, lamps_of
+from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.membrane import even_factor, reflectance_factor
 from gelpolight_core.simulation.occlusion import sample_all
 from gelpolight_core.simulation.rays import (
@@ -94,7 +94,7 @@ class VirtualSensor:
     seed : int, optional
         Seed of the membrane's pattern and of the noise; the same seed gives the same sequence of
         bytes.
-    lamps : tuple of PointLamp or ParallelLamp, optional
+    lamps : tuple of PointLamp, optional
         Lights that replace the design's three LEDs.
     interrupt : callable, optional
         Called regularly during construction; an exception raised by it stops the work.
@@ -110,7 +110,7 @@ class VirtualSensor:
         design: SensorDesign,
         seed: int = 0,
         *,
-        lamps: tuple[Lamp, ...] | None = None,
+        lamps: tuple[PointLamp, ...] | None = None,
         interrupt: Interrupt = never,
     ) -> None:
         self.design = validate_design(design)
@@ -256,8 +256,6 @@ class VirtualSensor:
         out = np.zeros((camera.height_px, camera.width_px, len(self.lamps)))
         rim = 0.5 * self.design.membrane.working_diameter_mm
         for k, lamp in enumerate(self.lamps):
-            if not isinstance(lamp, PointLamp):
-                continue
             twin = camera_points(layers, np.array([lamp.x_mm, lamp.y_mm, lamp.height_mm]))
             u, v = project_to_pixels(camera, twin)
             reach = 2 + math.ceil(camera.fx * lamp.diameter_mm / twin[2])

@@ -14,8 +14,8 @@ from gelpolight_core.design.parts import CameraDesign, LayerDesign, LedDesign, M
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder, press
-from gelpolight_core.simulation.lamps import ParallelLamp, PointLamp, lamp_table
-from gelpolight_core.simulation.occlusion import lit_share, visible_depth
+from gelpolight_core.simulation.lamps import PointLamp, lamp_table
+from gelpolight_core.simulation.occlusion import visible_depth
 from gelpolight_core.simulation.rays import (
     project_through_layers,
     trace_pixels,
@@ -28,6 +28,7 @@ from gelpolight_core.simulation.virtual_sensor import (
     VirtualSensor,
     Whiteboard,
 )
+from tests.studies.point_light import lit_share, parallel_light
 
 QUIET = CameraDesign(shot_variance=0.0, read_sd=0.0, blur_sigma_px=0.0)
 PLAIN = MembraneDesign(specular_weight=0.0, variation=0.0, speck_count=0)
@@ -124,7 +125,7 @@ def test_mirror_spots_stand_at_the_mirror_twins() -> None:
 @pytest.mark.parametrize("elevation", [20.0, 35.0, 50.0])
 def test_step_throws_a_shadow_of_its_height_over_the_tangent(elevation: float) -> None:
     surface = step_surface(1.0)
-    lamp = ParallelLamp(180.0, elevation)
+    lamp = parallel_light(180.0, elevation)
     share = lit_share(
         surface.depth_mm,
         surface.tile_max,

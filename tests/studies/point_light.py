@@ -18,9 +18,10 @@ from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.score import TrueDepth, score_depth, scored_radius_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.simulation.compiled import compiled
 from gelpolight_core.simulation.indenters import Cylinder, press
-from gelpolight_core.simulation.lamps import Lamp, ParallelLamp, lamp_table, lamps_of
-from gelpolight_core.simulation.occlusion import lit_share
+from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
+from gelpolight_core.simulation.occlusion import lamp_share
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 from gelpolight_core.studies.known_sensor import KnownSensor, exact_calibration, matt
@@ -28,7 +29,7 @@ from gelpolight_core.studies.known_sensor import KnownSensor, exact_calibration,
 AZIMUTHS_DEG = (90.0, 210.0, 330.0)
 DEPTH_MM = 1.0
 WIDTH_PX = 320
-TOUCHED_MM, FAR_MM = 0.02, 1e4
+TOUCHED_MM, FAR_MM, INFINITE_MM = 0.02, 1e4, 1e6
 HEIGHT_SHARES, ELEVATIONS_DEG = (0.6, 1.0, 1.5), (15.0, 30.0, 45.0)
 
 
@@ -43,12 +44,34 @@ class Row:
     directional_um: float | None
 
 
-def directional_lamps(elevation_deg: float) -> tuple[ParallelLamp, ...]:
-    """Return three parallel lights 120 degrees apart."""
-    return tuple(ParallelLamp(azimuth, elevation_deg) for azimuth in AZIMUTHS_DEG)
+def parallel_light(azimuth_deg: float, elevation_deg: float) -> PointLamp:
+    """Return a lamp so far away that its light is parallel, of power 1 on a surface facing it."""
+    azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
+    x_mm, y_mm = INFINITE_MM * np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+    return PointLamp(x_mm, y_mm, INFINITE_MM * np.sin(elevation), INFINITE_MM**2, 0.0, 0.0)
 
 
-def shadow_areas(surface: PressedSurface, lamps: tuple[Lamp, ...]) -> tuple[float, float, float]:
+@compiled
+def lit_share(depth, tile_max, grid, slopes, lamps):  # pragma: no cover - compiled
+    """Return (rows, columns, lamps): the visible share of each lamp from each cell.
+
+    A cell whose surface faces away from a lamp does not see it.
+    """
+    rows, columns = depth.shape
+    share = np.zeros((rows, columns, lamps.shape[0]))
+    for i in range(rows):
+        for j in range(columns):
+            x, y, d = grid[0] + j * grid[2], grid[1] + i * grid[2], depth[i, j]
+            for k in range(lamps.shape[0]):
+                lx, ly, lz = lamps[k, 0] - x, lamps[k, 1] - y, lamps[k, 2] + d
+                if -(slopes[0][i, j] * lx + slopes[1][i, j] * ly + lz) > 0.0:
+                    share[i, j, k] = lamp_share(depth, tile_max, grid, (x, y, d), lamps[k])
+    return share
+
+
+def shadow_areas(
+    surface: PressedSurface, lamps: tuple[PointLamp, ...]
+) -> tuple[float, float, float]:
     """Return the areas dark under one lamp (mean), under any, and under two or more, in mm2."""
     deepest = float(surface.depth_mm.max(initial=0.0))
     grid = (surface.x0_mm, surface.y0_mm, surface.pitch_mm, deepest)
@@ -77,7 +100,7 @@ def rows(
         name = f"point, LEDs at {-places[:, 2].mean():.1f} mm"
         yield _row(name, VirtualSensor(lit, lamps=lamps_of(lit)), lamps_of(lit), places, surface)
     for elevation in elevations_deg:
-        lamps = directional_lamps(elevation)
+        lamps = tuple(parallel_light(azimuth, elevation) for azimuth in AZIMUTHS_DEG)
         azimuth, rise = np.radians(AZIMUTHS_DEG), np.radians(elevation)
         towards = np.column_stack(
             [
@@ -96,7 +119,7 @@ def rows(
 def _row(
     name: str,
     sensor: VirtualSensor,
-    lamps: tuple[Lamp, ...],
+    lamps: tuple[PointLamp, ...],
     leds_mm: np.ndarray,
     surface: PressedSurface,
 ) -> Row:

@@ -8,7 +8,7 @@ import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.indenters import Cylinder, press
-from tests.studies.point_light import directional_lamps, rows, shadow_areas
+from tests.studies.point_light import parallel_light, rows, shadow_areas
 
 
 def test_each_method_is_right_under_its_own_light() -> None:
@@ -24,5 +24,5 @@ def test_low_light_shadow_has_the_size_that_the_outline_gives() -> None:
     # The shadow of a cylinder is its outline moved away from the light: diameter x length.
     depth, elevation = 1.0, 10.0
     surface = press(Cylinder(4.0, depth), pitch_mm=0.05, decay_mm=0.05, margin_mm=7.0)
-    mean, _, _ = shadow_areas(surface, directional_lamps(elevation)[:1])
+    mean, _, _ = shadow_areas(surface, (parallel_light(90.0, elevation),))
     assert mean == pytest.approx(4.0 * depth / math.tan(math.radians(elevation)), rel=0.05)
