@@ -26,10 +26,8 @@ from gelpolight_core.calibration.manifest import (
     HEAD_LIMIT,
     MANIFEST,
     REMARKS,
-    UNREADABLE,
     VERSION,
     check_arrays,
-    damaged,
     declared_bytes,
     opened,
     quality_rows,
@@ -136,21 +134,17 @@ def read_calibration(path: str | PathLike[str]) -> AnyCalibration:
     'full'
     """
     path = Path(path)
-    try:
-        with opened(path) as archive:
-            manifest = read_manifest(archive, path)
-            check_arrays(manifest["arrays"], archive)
-            arrays = {
-                name: _read_array(archive, name, entry)
-                for name, entry in manifest["arrays"].items()
-            }
+    with opened(path) as archive:
+        manifest = read_manifest(archive, path)
+        check_arrays(manifest["arrays"], archive)
+        arrays = {
+            name: _read_array(archive, name, entry) for name, entry in manifest["arrays"].items()
+        }
         calibration = _build(manifest, arrays)
         # Records and validations know the name in the file. Other versions of the program may give
         # another name to the same numbers; a changed copy computes its own.
         vars(calibration)["identity"] = written_text(manifest["identity"])
-        return calibration
-    except UNREADABLE as error:
-        raise damaged(path, error) from error
+    return calibration
 
 
 def read_open_calibration(path: Path) -> Calibration:
@@ -275,7 +269,9 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> AnyCali
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
         provenance=_read_provenance(manifest),
         full=read_full(manifest["full"], arrays) if "full" in manifest else None,
-        response=_read_response(arrays.get("camera_response")),
+        response=CameraResponse(arrays["camera_response"].astype(np.float64))
+        if "camera_response" in arrays
+        else None,
         bad=_read_bad_pixels(arrays.get(BAD_PIXELS), camera["height"], camera["width"]),
         lens_blur_px=_read_blur(manifest.get("lens_blur_px")),
     )
@@ -325,10 +321,6 @@ def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
         (values[0], values[1], values[2]),
         arrays["reflectance_coverage"],
     )
-
-
-def _read_response(curves: NDArray[Any] | None) -> CameraResponse | None:
-    return None if curves is None else CameraResponse(curves.astype(np.float64))
 
 
 def _read_blur(stated: Any) -> float | None:

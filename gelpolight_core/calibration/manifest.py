@@ -24,6 +24,7 @@ from gelpolight_core.io.reading import (
     parse_json,
     read_member,
     refuse_bomb,
+    refusing,
     written_text,
 )
 from gelpolight_core.io.texts import text_of_file
@@ -42,22 +43,6 @@ MANIFEST_LIMIT = 4_000_000
 MOST_ARRAYS = 64
 MOST_DIMENSIONS = 4
 HEAD_LIMIT = 4096
-# Exceptions raised while reading a damaged zip, damaged JSON text or values of the wrong type.
-UNREADABLE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    EOFError,
-    OSError,
-    NotImplementedError,
-    RuntimeError,
-    RecursionError,
-    KeyError,
-    IndexError,
-    TypeError,
-    ValueError,
-    AttributeError,
-    ArithmeticError,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,17 +101,12 @@ def read_summary(path: Path) -> CalibrationSummary:
     InputError
         If the file is missing, damaged, truncated or has a newer version.
     """
-    try:
-        with opened(path) as archive:
-            manifest = read_manifest(archive, path)
-            for part in ("in_place" if "in_place" in manifest else "plane", "grid"):
-                manifest[part]
-            for name in manifest["arrays"]:
-                archive.getinfo(f"{name}.npy")
-            check_arrays(manifest["arrays"], archive)
+    with opened(path) as archive:
+        manifest = read_manifest(archive, path)
+        for part in ("in_place" if "in_place" in manifest else "plane", "grid"):
+            manifest[part]
+        check_arrays(manifest["arrays"], archive)
         return _summarise(manifest)
-    except UNREADABLE as error:
-        raise damaged(path, error) from error
 
 
 def refuse_damaged_arrays(path: Path) -> None:
@@ -137,18 +117,15 @@ def refuse_damaged_arrays(path: Path) -> None:
     InputError
         If one of them, or the file, is damaged.
     """
-    try:
-        with opened(path) as archive:
-            arrays = read_manifest(archive, path)["arrays"]
-            check_arrays(arrays, archive)
-            for name, entry in arrays.items():
-                with archive.open(f"{name}.npy") as stream:
-                    # typeshed describes the reader of a zip as a plain byte stream only
-                    found = hashlib.file_digest(stream, "sha256")  # type: ignore[arg-type]
-                if found.hexdigest() != entry["sha256"]:
-                    raise ValueError(f"the checksum of {name} is wrong")
-    except UNREADABLE as error:
-        raise damaged(path, error) from error
+    with opened(path) as archive:
+        arrays = read_manifest(archive, path)["arrays"]
+        check_arrays(arrays, archive)
+        for name, entry in arrays.items():
+            with archive.open(f"{name}.npy") as stream:
+                # typeshed describes the reader of a zip as a plain byte stream only
+                found = hashlib.file_digest(stream, "sha256")  # type: ignore[arg-type]
+            if found.hexdigest() != entry["sha256"]:
+                raise ValueError(f"the checksum of {name} is wrong")
 
 
 def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
@@ -247,36 +224,29 @@ def check_arrays(arrays: Mapping[str, dict[str, Any]], archive: zipfile.ZipFile)
 
 @contextmanager
 def opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a calibration file as a zip archive.
+    """Open a calibration file as a zip archive, and refuse it if its content is invalid.
 
     Raises
     ------
     InputError
-        If the file does not exist or cannot be read.
+        If the file does not exist or cannot be read, or if an error of damaged archives, texts or
+        values is raised while it is open.
     """
     try:
         stream = open_file(path)
     except FileNotFoundError as error:
-        raise missing(path) from error
-    with stream, zipfile.ZipFile(stream) as archive:
-        yield archive
-
-
-def missing(path: Path) -> InputError:
-    """Return the error for a missing file."""
-    return InputError(
-        tr("The file does not exist"),
-        where=str(path),
-        advice=tr("Create it with gelpolight calibrate"),
-    )
-
-
-def damaged(path: Path, error: Exception) -> InputError:
-    """Return the error for a damaged file."""
-    return InputError(
-        tr("The file is damaged, or is not a calibration ({error})").format(
-            error=brief(str(error).splitlines()[0], 200) if str(error) else type(error).__name__
-        ),
-        where=str(path),
+        raise InputError(
+            tr("The file does not exist"),
+            where=str(path),
+            advice=tr("Create it with gelpolight calibrate"),
+        ) from error
+    with refusing(
+        tr("The file is damaged, or is not a calibration ({error})"),
+        path,
         advice=tr("Use a backup copy, or calibrate again from the session"),
-    )
+    ):
+        try:
+            with stream, zipfile.ZipFile(stream) as archive:
+                yield archive
+        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
+            raise ValueError(str(error) or type(error).__name__) from error

@@ -67,14 +67,9 @@ def judged(stage: Stage, results: StageResults) -> StageStatus:
 
 def judged_by(stage: Stage, table: QualityTable) -> StageStatus:
     """Return the status of a stage by the figures of its up-to-date result."""
-    state = {
-        Verdict.PASS: StageState.PASS,
-        Verdict.WARN: StageState.WARN,
-        Verdict.FAIL: StageState.FAIL,
-    }[table.verdict]
     advice = ". ".join(table.advice)
     sentence = f"{advice}." if advice else tr("Everything is within its limits.")
-    return StageStatus(stage, state, sentence, table)
+    return StageStatus(stage, StageState(table.verdict.value), sentence, table)
 
 
 def quality_of(stage: Stage, results: StageResults) -> QualityTable:

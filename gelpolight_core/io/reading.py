@@ -249,10 +249,9 @@ def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
     """
     try:
         yield
-    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-        raise InputError(
-            found.format(error=brief(str(error), 200)), where=str(path), advice=advice
-        ) from error
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
+        reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
+        raise InputError(found.format(error=reason), where=str(path), advice=advice) from error
 
 
 def plain_text(value: Any, most: int = 10_000) -> str:

@@ -12,13 +12,13 @@ from __future__ import annotations
 import sqlite3
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.closing import Closing
-from gelpolight_core.io.reading import brief, written_text
+from gelpolight_core.io.reading import refusing, written_text
 from gelpolight_core.records.database import connect, in_plain_words, is_damage, keep_aside
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of
@@ -129,10 +129,8 @@ class Records(Closing):
                 f" WHERE {chosen} ORDER BY q.measurement_id, q.position",
                 (serial,),
             ).fetchall()
-        try:
+        with self._refusing():
             return records_of(rows, parts)
-        except (ValueError, TypeError, KeyError, ArithmeticError) as error:
-            raise self._no_measurement(error) from error
 
     def update_note(self, number: int, note: str) -> None:
         """Change the note of a measurement.
@@ -194,10 +192,8 @@ class Records(Closing):
         """Return the serial numbers of all sensors with measurements."""
         with self._reading() as connection:
             rows = connection.execute("SELECT serial FROM sensors ORDER BY serial").fetchall()
-        try:
+        with self._refusing():
             return tuple(written_text(row["serial"]) for row in rows)
-        except ValueError as error:
-            raise self._no_measurement(error) from error
 
     def uses(self, calibration_id: str) -> tuple[int, datetime | None]:
         """Return the number of measurements with a calibration, and the time of the last one.
@@ -218,10 +214,8 @@ class Records(Closing):
                 " WHERE calibration_id = ? AND removed IS NULL",
                 (calibration_id,),
             ).fetchone()
-        try:
+        with self._refusing():
             return int(row["n"]), row["last"] and datetime.fromisoformat(row["last"])
-        except (ValueError, TypeError) as error:
-            raise self._no_measurement(error) from error
 
     def know_calibration(
         self, identity: str, serial: str, *, model: str = "", made: str = "", verdict: str = ""
@@ -252,12 +246,10 @@ class Records(Closing):
         with self._lock:
             self._connection.close()
 
-    def _no_measurement(self, error: Exception) -> InputError:
-        return InputError(
-            tr("The records contain an invalid measurement ({reason})").format(
-                reason=brief(str(error), 200)
-            ),
-            where=str(self.path),
+    def _refusing(self) -> AbstractContextManager[None]:
+        return refusing(
+            tr("The records contain an invalid measurement ({error})"),
+            self.path,
             advice=tr("Move the file away, or restore an older copy of it"),
         )
 
