@@ -34,7 +34,6 @@ from gelpolight_core.reconstruction.near_light.maps import (
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.near_light.structures import (
     RatioImage,
-    Scale,
     Steps,
     slopes_like,
 )
@@ -288,7 +287,8 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     depth_mm : (rows, columns) float32
         Start values.
     """
-    scale = _scale(full, field)
+    kind = kinds(field.usable, field.usable, 1)
+    scale = sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)
     membrane, steps = membrane_numbers(full), Steps(STEPS, SETTLED**2, True, False)
     rows, columns = depth_mm.shape
     reflected = membrane.interreflection is not None
@@ -320,8 +320,3 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
             tolerance=TOLERANCE,
         ).depth_mm
     return depth_mm
-
-
-def _scale(full: FullModel, field: SyntheticPress) -> Scale:
-    kind = kinds(field.usable, field.usable, 1)
-    return sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)

@@ -18,7 +18,6 @@ from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.calibration.results import StageResults, need
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.masks import reflects_light
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.press import BallPress
@@ -71,11 +70,13 @@ def refine(session: Session, results: StageResults) -> StageResults:
     leds = lights.led_positions_mm
     radiance = need(results.radiance, "balls").radiance
     board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds)
-    large = _median_contact_px(results.presses) >= LEAST_CONTACT_PX
+    contacts_px = [press.indentation.contact_radius_px for press in results.presses]
+    large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
     joint = refine_jointly(results.presses, pixels, leds, slab, board=board, check_radii=large)
+    mirror_sd_mm = np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2))
     full = FullModel(
         joint.led_positions_mm,
-        joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
+        joint.led_sd_mm if joint.kept == "refined" else mirror_sd_mm,
         joint.membrane,
         background,
         joint.decay_mm,
@@ -163,11 +164,3 @@ def bare_calibration(session: Session, results: StageResults) -> Calibration:
 def press_noise(presses: tuple[BallPress, ...]) -> NDArray[np.float64]:
     """Return the noise of press minus background, per channel, over all presses."""
     return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
-
-
-def _median_contact_px(presses: tuple[BallPress, ...]) -> float:
-    return float(np.median([p.indentation.contact_radius_px for p in presses])) if presses else 0.0
-
-
-def _mirror_sd(lights: LightResult) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)))

@@ -58,7 +58,8 @@ def beyond_saturation(
     places, _ = label(cv2.dilate(anywhere, size))
     for box in find_objects(places):
         light = _filled_light(full, bare[box], background[box], lost[box], crosstalk, table, box)
-        near = _near(lost[box].any(axis=-1), reach) & lost[box].any(axis=-1)
+        some = lost[box].any(axis=-1)
+        near = some & (cv2.distanceTransform(some.astype(np.uint8), cv2.DIST_L2, 5) <= reach)
         background[box][near] = light[near]
         known = (factors[box] > 0.0).all(axis=-1)
         for k in range(3):
@@ -117,9 +118,3 @@ def _evened(values: Map, known: Mask, pitch_mm: float) -> Map:
         found = np.where((found == 0.0) & (share > 1e-3), mean, found).astype(np.float32)
         size *= 1.5
     return found
-
-
-def _near(lost: Mask, reach: int) -> Mask:
-    """Return the nodes that have a node that is not lost within `reach`."""
-    distance = cv2.distanceTransform(lost.astype(np.uint8), cv2.DIST_L2, 5)
-    return np.asarray(distance <= reach)

@@ -152,12 +152,14 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     if square_pixels and shared is not None:
         fit = shared
         held_out = hold_out(seen, size, fit, square_pixels=True)
-    camera = _camera(fit.values, size)
+    fx, fy, cx, cy, k1, k2, p1, p2, k3 = map(float, fit.values)
+    camera = Camera(*size, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
     spread_deg = normal_spread_deg(fit)
     sd = np.maximum(fit.sd, held_out.sd)
     try:
         refuse_unobservable(sd, fit, spread_deg)
-        _refuse_nonsense(camera)
+        if (nonsense := find_nonsense(camera)) is not None:
+            raise InputError(nonsense, where=tr("checkerboard"), advice=more_views_advice())
     except InputError as fault:
         raise LensRefusal(fault, views) from fault
     return _assemble(views, fit, held_out, camera, sd, spread_deg, square_pixels)
@@ -244,17 +246,6 @@ def _solve_without_outliers(
             used=False,
             reason=reason.format(a=fit.view_rms_px[worst], b=typical),
         )
-
-
-def _camera(values: Array, size: tuple[int, int]) -> Camera:
-    fx, fy, cx, cy, k1, k2, p1, p2, k3 = (float(v) for v in values)
-    return Camera(size[0], size[1], fx, fy, cx, cy, (k1, k2, p1, p2, k3))
-
-
-def _refuse_nonsense(camera: Camera) -> None:
-    nonsense = find_nonsense(camera)
-    if nonsense is not None:
-        raise InputError(nonsense, where=tr("checkerboard"), advice=more_views_advice())
 
 
 def _assemble(

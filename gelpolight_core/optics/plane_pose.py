@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import cv2
@@ -107,7 +108,7 @@ def _describe_pose(
     variance = float(np.sum(residuals**2)) / freedom
     covariance = variance * np.linalg.inv(slopes.T @ slopes)
     # n turns by w x n, and the distance n . t changes by (w x n) . t + n . dt.
-    normal_by_turn = -_cross_matrix(normal)
+    normal_by_turn = np.cross(np.eye(3), normal).T
     distance_by_pose = np.concatenate([np.cross(normal, shift_mm), normal])
     normal_variance = np.trace(normal_by_turn @ covariance[:3, :3] @ normal_by_turn.T)
     return PlanePose(
@@ -135,10 +136,6 @@ def _slope_along(camera: Camera, points_mm: Array, move: Array) -> Array:
     step = 1e-5
     ahead, behind = camera.project(points_mm + step * move), camera.project(points_mm - step * move)
     return np.asarray((ahead - behind).ravel() / (2.0 * step))
-
-
-def _cross_matrix(v: Array) -> Array:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
 def as_plane(normal: Array, distance_mm: float) -> TopPlane:
@@ -187,7 +184,10 @@ def choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, f
     margin : float
         Difference of chi-square, never negative; infinite if there is no other side.
     """
-    tried = [(_cost(candidates, pose), pose) for view in candidates for pose in view]
+    tried = [
+        (sum(_pose_cost(view, nearest_pose(view, pose), pose) for view in candidates), pose)
+        for pose in chain.from_iterable(candidates)
+    ]
     cost, best = min(tried, key=lambda item: item[0])
     chosen = [nearest_pose(view, best) for view in candidates]
     others = [item for item in tried if not any(item[1] is pose for pose in chosen)]
@@ -198,10 +198,6 @@ def choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, f
     if margin < SURE_MARGIN and other.tilt_deg < best.tilt_deg:
         return other, margin
     return best, margin
-
-
-def _cost(candidates: Sequence[Sequence[PlanePose]], truth: PlanePose) -> float:
-    return sum(_pose_cost(view, nearest_pose(view, truth), truth) for view in candidates)
 
 
 def nearest_pose(view: Sequence[PlanePose], truth: PlanePose) -> PlanePose:

@@ -208,8 +208,8 @@ def _fits(mark: FrameMark, offset: int, size: int, before: list[FrameMark]) -> b
         offset < strip.offset and strip.offset + strip.size <= end for strip in mark.strips
     )
     # The last strip may be shorter; an incompressible strip is slightly larger than its data.
-    most = _most_bytes(mark) if mark.strips else 0
-    inside = inside and all(strip.size <= most for strip in mark.strips)
+    plain = mark.rows_per_strip * mark.columns * 3 * mark.bits // 8 if mark.strips else 0
+    inside = inside and all(strip.size <= plain + plain // 8 + 4096 for strip in mark.strips)
     shaped = (
         mark.bits in (8, 16)
         and 0 < mark.rows * mark.columns <= MAX_PIXELS
@@ -220,9 +220,3 @@ def _fits(mark: FrameMark, offset: int, size: int, before: list[FrameMark]) -> b
         and mark.number > before[-1].number
     )
     return inside and shaped and alike and math.isfinite(mark.time_s)
-
-
-def _most_bytes(mark: FrameMark) -> int:
-    """Return the largest possible size of a compressed strip, before memory is allocated."""
-    plain = mark.rows_per_strip * mark.columns * 3 * mark.bits // 8
-    return plain + plain // 8 + 4096

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.design.parts import BallPress, Press
+from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically, write_text
@@ -166,9 +166,15 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
     design = sensor.design
     # The slowest first, so that the last image does not keep a single thread busy.
     for name, item in zip(press_names(design.presses), design.presses, strict=True):
-        yield _Shot("presses", f"{name}.png", _press_maker(design, item), keeps_truth=True)
+        pressed = partial(
+            pressed_membrane, design, indenter_of(item),
+            x_mm=item.x_mm, y_mm=item.y_mm, yaw_deg=item.yaw_deg,
+        )  # fmt: skip
+        yield _Shot("presses", f"{name}.png", pressed, keeps_truth=True)
     for number, ball in enumerate(design.balls):
-        yield _Shot("balls", f"ball_{number:02d}.png", _ball_maker(design, ball))
+        shape = Ball(ball.radius_mm, ball.depth_mm)
+        pressed = partial(pressed_membrane, design, shape, x_mm=ball.x_mm, y_mm=ball.y_mm)
+        yield _Shot("balls", f"ball_{number:02d}.png", pressed)
     for number, pose in enumerate(checkerboard_poses(design, sensor.seed)):
         state = Checkerboard(pose)
         yield _Shot("checkerboard", f"view_{number:02d}.png", lambda state=state: state)  # type: ignore[misc]
@@ -204,17 +210,6 @@ def indenter_of(item: Press) -> Indenter:
     if item.shape == "cuboid":
         return Cuboid(item.size_mm, item.depth_mm, item.edge_radius_mm)
     return (coin if item.shape == "coin" else nut)(item.size_mm, item.depth_mm)
-
-
-def _press_maker(design: SensorDesign, item: Press) -> Callable[[], State]:
-    return lambda: pressed_membrane(
-        design, indenter_of(item), x_mm=item.x_mm, y_mm=item.y_mm, yaw_deg=item.yaw_deg
-    )
-
-
-def _ball_maker(design: SensorDesign, ball: BallPress) -> Callable[[], State]:
-    shape = Ball(ball.radius_mm, ball.depth_mm)
-    return lambda: pressed_membrane(design, shape, x_mm=ball.x_mm, y_mm=ball.y_mm)
 
 
 def pressed_membrane(
