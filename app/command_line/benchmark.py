@@ -8,31 +8,28 @@ from pathlib import Path
 
 import numpy as np
 
-from app.command_line.common import refuse_overwriting
+from app.command_line.common import check_outputs
 from app.command_line.reconstructing import add_effort, add_model, load_reconstructor, trace_lines
 from app.command_line.terminal import say
-from gelpolight_core.io.atomic import refuse_unwritable, write_json
+from gelpolight_core.io.atomic import write_json
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("image", type=Path, metavar="IMAGE")
     parser.add_argument("--json", type=Path, metavar="FILE")
     parser.add_argument("--repeats", type=int, default=25, metavar="N")
     add_effort(parser)
     add_model(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Time the frame and print a table."""
-    if options.json:
-        refuse_overwriting([options.json], [options.calibration, options.image])
-        refuse_unwritable(options.json)
+    check_outputs([options.json], [options.calibration, options.image])
     reconstructor = load_reconstructor(
         options.calibration, model=options.model, effort=options.effort
     )

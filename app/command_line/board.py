@@ -12,7 +12,7 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     usual = BoardSpec()
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.pdf")
     parser.add_argument(
@@ -32,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help=tr("side of a square in mm (default: {s:g})").format(s=usual.square_mm),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

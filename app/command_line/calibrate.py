@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import StageProgress, quality_lines, refuse_overwriting
+from app.command_line.common import StageProgress, check_outputs, quality_lines
 from app.command_line.reconstructing import add_model, report_failure
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
@@ -16,30 +16,26 @@ from gelpolight_core.calibration.any_session import calibrate_any
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.calibration.pipeline import CalibrationRun
-from gelpolight_core.io.atomic import refuse_unwritable, write_json
+from gelpolight_core.io.atomic import write_json
 from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN
 from gelpolight_core.session.closed import read_any_session
 from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("session", type=Path, metavar="SESSION")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="CALIBRATION")
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help=tr("write the results of every stage as JSON")
     )
     add_model(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
     session = read_any_session(options.session)
-    outputs = [path for path in (options.output, options.json) if path is not None]
-    refuse_overwriting(outputs, session_files(session))
-    for path in outputs:
-        refuse_unwritable(path)
+    check_outputs([options.output, options.json], session_files(session))
     with StageProgress() as progress:
         result = calibrate_any(session, model=options.model, progress=progress)
     write_calibration(result.calibration, options.output)

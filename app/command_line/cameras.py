@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,8 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -103,16 +103,7 @@ def _entry(
         "model": device.model,
         "place": device.address,
         "trouble": trouble or None,
-        "formats": [
-            {
-                "code": f.code,
-                "width": f.width,
-                "height": f.height,
-                "rate_hz": f.rate_hz,
-                "compressed": f.compressed,
-            }
-            for f in formats
-        ],
+        "formats": [{**asdict(f), "compressed": f.compressed} for f in formats],
         "controls": {
             c.key: {"value": c.value, "low": c.low, "high": c.high, "step": c.step, "unit": c.unit}
             for c in controls

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from tqdm import tqdm
 
 from app.command_line.terminal import harmless
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
@@ -33,20 +33,6 @@ class StageProgress:
         self._bar.set_description_str(stage)
         self._bar.n = round(100 * share)
         self._bar.refresh()
-
-
-def add_workers(parser: argparse.ArgumentParser, *, default: int) -> None:
-    """Add ``--workers``: the number of images processed at the same time."""
-    parser.add_argument(
-        "--workers",
-        type=int,
-        choices=range(1, 65),
-        default=default,
-        metavar="N",
-        help=tr(
-            "number of images processed at the same time, one process each (default: {n})"
-        ).format(n=default),
-    )
 
 
 def numbers(text: str) -> list[float]:
@@ -72,6 +58,18 @@ def points(given: Iterable[Iterable[float]], *, where: str) -> list[tuple[float,
     return list(zip(flat[::2], flat[1::2], strict=True))
 
 
+def one_point(given: Iterable[Iterable[float]], *, where: str) -> tuple[float, float]:
+    """Return one point from numbers X Y, see :func:`points`."""
+    found = points(given, where=where)
+    if len(found) != 1:
+        raise InputError(
+            tr("Number of points: {n}").format(n=len(found)),
+            where=where,
+            advice=tr("Give one point: X and Y in mm"),
+        )
+    return found[0]
+
+
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Raise an error if a result would overwrite an input or another result."""
     used = {path.resolve() for path in inputs}
@@ -84,6 +82,17 @@ def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
                 advice=tr("Choose another name or folder for the result"),
             )
         used.add(result)
+
+
+def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
+    """Raise an error if a result would overwrite a file that is used, or cannot be written.
+
+    None is a file that is not requested.
+    """
+    results = [path for path in outputs if path is not None]
+    refuse_overwriting(results, [path for path in inputs if path is not None])
+    for path in results:
+        refuse_unwritable(path)
 
 
 def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:

@@ -15,9 +15,8 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("design", type=Path, metavar="FILE")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,18 +6,18 @@ import argparse
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.command_line.common import quality_lines, refuse_overwriting
+from app.command_line.common import check_outputs, quality_lines
 from app.command_line.reconstructing import load_reconstructor, read_frame
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.io.atomic import refuse_unwritable, write_json
+from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("image", type=Path, metavar="IMAGE")
     parser.add_argument("--json", type=Path, metavar="FILE")
@@ -27,15 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=tr("write the calibration with this image as its new background"),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Compare, print the figures, and write the calibration with the new background."""
-    outputs = [path for path in (options.json, options.zero) if path is not None]
-    refuse_overwriting(outputs, [options.calibration, options.image])
-    for path in outputs:
-        refuse_unwritable(path)
+    check_outputs([options.json, options.zero], [options.calibration, options.image])
     reconstructor = load_reconstructor(options.calibration)
     frame = read_frame(options.image, reconstructor)
     shift = background_shift(frame, reconstructor.calibration)

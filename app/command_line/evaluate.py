@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from app.command_line.common import StageProgress, add_workers
+from app.command_line.common import StageProgress
 from app.command_line.reconstructing import add_model, load_reconstructor
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
@@ -21,7 +21,7 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument(
         "presses",
@@ -31,8 +31,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
     add_model(parser)
-    add_workers(parser, default=1)
-    parser.set_defaults(run=run)
+    parser.add_argument(
+        "--workers",
+        type=int,
+        choices=range(1, 65),
+        default=1,
+        metavar="N",
+        help=tr("number of images processed at the same time, one process each"),
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     names = ", ".join(sorted(preset.key for preset in presets()))
     parser.add_argument(
         "folder", type=Path, metavar="FOLDER", help=tr("with one of: {forms}").format(forms=FORMS)
@@ -32,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--background", type=Path, metavar="IMAGE", help=tr("the untouched membrane")
     )
     parser.add_argument("--serial", default="", metavar="NAME", help=tr("name of the sensor"))
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -10,7 +10,6 @@ import numpy as np
 from app.command_line.common import quality_lines
 from app.command_line.terminal import harmless, say
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN, InPlaceCalibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording, is_recording
@@ -20,16 +19,8 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("file", type=Path, metavar="FILE")
-    parser.set_defaults(run=run)
-
-
-def response_text(response: CameraResponse | None) -> str:
-    """Return a description of the camera response that is corrected in every image."""
-    if response is None:
-        return tr("linear")
-    return tr("up to {x:.1f} % of full scale from linear").format(x=100.0 * response.departure)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -74,6 +65,10 @@ def _print_calibration(path: Path) -> None:
     p, grid = c.provenance, c.table.grid
     closed = isinstance(c, InPlaceCalibration)
     channels = tr("{part} ({channels}) {made} {operator}")
+    response = tr("linear")
+    if c.response is not None:
+        text = tr("up to {x:.1f} % of full scale from linear")
+        response = text.format(x=100.0 * c.response.departure)
     rows = [
         (tr("calibration"), c.identity),
         (tr("sensor"), c.sensor.serial),
@@ -85,7 +80,7 @@ def _print_calibration(path: Path) -> None:
         (tr("program"), p.program_version),
         (tr("session"), f"{p.session} ({len(p.sources)} files)"),
         (tr("image"), f"{c.camera.width}x{c.camera.height} px"),
-        (tr("camera response"), response_text(c.response)),
+        (tr("camera response"), response),
         (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
         *(_in_place_rows(c) if isinstance(c, InPlaceCalibration) else _open_rows(c)),
         *(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import refuse_overwriting
+from app.command_line.common import check_outputs, one_point
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import (
     add_despite_faults,
@@ -19,7 +19,7 @@ from app.command_line.reconstructing import (
 from app.command_line.terminal import say
 from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import refuse_unwritable, write_json
+from gelpolight_core.io.atomic import write_json
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES
@@ -32,7 +32,7 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("images", type=Path, nargs="+", metavar="IMAGE")
     what = parser.add_mutually_exclusive_group(required=True)
@@ -41,17 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--truth", type=Path, metavar="FILE", help=tr("truth.csv with these images; with --shape")
     )
-    parser.add_argument(
-        "--seed",
-        type=float,
-        nargs=2,
-        metavar=("X", "Y"),
-        help=tr("a point (mm) on the object to measure, where several are pressed; with --shape"),
-    )
     parser.add_argument("--json", type=Path, metavar="FILE")
     add_despite_faults(parser)
     add_model(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,11 +51,9 @@ def run(options: argparse.Namespace) -> int:
 
     An image that cannot be measured is reported, and the other images are measured.
     """
-    if options.json:
-        used = [options.calibration, *options.images, options.truth, options.tools]
-        refuse_overwriting([options.json], filter(None, used))
-        refuse_unwritable(options.json)
     tools = chosen_tools(options)
+    used = [options.calibration, *options.images, options.truth]
+    check_outputs([options.json], [*used, options.tool and Path(options.tool)])
     truths = _truths(options)
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     several = len(options.images) > 1
@@ -75,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
             if not several:
                 raise
             refused += 1
-            say(f"gelpolight: {_named(error, image)}", file=sys.stderr)
+            named = str(error) if str(image) in str(error) else f"{image}: {error}"
+            say(f"gelpolight: {named}", file=sys.stderr)
             entries.append({"image": image.name, "error": str(error)})
             continue
         entries.append({"image": image.name} | entry if several else entry)
@@ -113,18 +104,13 @@ def _measured(
             **faults,
         }
         return content, [line for result in results for line in tool_lines(result)]
-    seed = tuple(options.seed) if options.seed else None
+    seed = one_point(options.at, where="--at") if options.at else None
     measurement = judged(measure_heightmap(heightmap, shape=options.shape, seed_mm=seed), heightmap)
     comparison = None if truth is None else compare(measurement, truth)
     lines = measurement_lines(measurement, comparison)
     if options.shape == AUTO:
         lines = [f"{tr('shape'):<12} {measurement.shape}", *lines]
     return measurement.as_json(comparison) | faults, lines
-
-
-def _named(error: InputError, image: Path) -> str:
-    """Return the text of an error; the name of the image is added if it is missing."""
-    return str(error) if str(image) in str(error) else f"{image}: {error}"
 
 
 def _truths(options: argparse.Namespace) -> dict[str, Truth]:
@@ -178,15 +164,9 @@ def measurement_lines(measurement: Measurement, comparison: Comparison | None) -
         line = f"{label:<12} {_numbers(values[key])} {unit}"
         if sd is not None:
             line += f"  (sd {_numbers(sd)})"
-            parts = [
-                f"{name} {_numbers(values[part][key])}"
-                for part, name in (
-                    ("noise_sd", tr("noise")),
-                    ("calibration_sd", tr("calibration")),
-                )
-                if values[part] is not None
-            ]
-            line = line[:-1] + "".join(f", {part}" for part in parts) + ")"
+            for part, name in (("noise_sd", tr("noise")), ("calibration_sd", tr("calibration"))):
+                if values[part] is not None:
+                    line = f"{line[:-1]}, {name} {_numbers(values[part][key])})"
         if key in errors:
             line += tr("  error {e:+.2f} %").format(e=errors[key])
         lines.append(line)

@@ -30,7 +30,7 @@ class CommandParser(Parser):
     Parameters
     ----------
     module : str
-        Module in this package with ``add_arguments(parser)``.
+        Module in this package with ``add_arguments(parser)`` and ``run(options)``.
     **options
         Passed on to :class:`argparse.ArgumentParser`.
     """
@@ -44,8 +44,10 @@ class CommandParser(Parser):
     ) -> tuple[argparse.Namespace, list[str]]:
         """Add the command's own arguments, then parse."""
         if self._module:
-            module, self._module = self._module, ""
-            import_module(f"app.command_line.{module}").add_arguments(self)
+            module = import_module(f"app.command_line.{self._module}")
+            self._module = ""
+            module.add_arguments(self)
+            self.set_defaults(run=module.run)
         return super().parse_known_args(args, namespace)
 
 
@@ -91,11 +93,7 @@ def _commands() -> tuple[tuple[str, str, str], ...]:
         ("profile", "profile", tr("write the depth along a line as CSV")),
         ("evaluate", "evaluate", tr("compare measured presses with their true values")),
         ("records", "records", tr("list earlier measurements, or write them as CSV")),
-        (
-            "refresh",
-            "refresh",
-            tr("a closed sensor's calibration after its gel was changed"),
-        ),
+        ("refresh", "refresh", tr("a closed sensor's calibration after its gel was changed")),
         (
             "drift",
             "drift",

@@ -5,18 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from app.command_line.common import numbers, points, refuse_overwriting
+from app.command_line.common import check_outputs, numbers, one_point
 from app.command_line.reconstructing import add_model, load_reconstructor, read_frame
 from app.command_line.terminal import say
-from gelpolight_core.errors import InputError
 from gelpolight_core.export.profile_file import write_profiles
-from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("image", type=Path, metavar="IMAGE")
     for name, key in (("from", "start"), ("to", "end")):
@@ -34,14 +32,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.csv")
     add_model(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Reconstruct the image and write its section along the line."""
-    refuse_overwriting([options.output], [options.calibration, options.image])
-    refuse_unwritable(options.output)
-    start, end = _one_point(options.start, "--from"), _one_point(options.end, "--to")
+    check_outputs([options.output], [options.calibration, options.image])
+    start = one_point(options.start, where="--from")
+    end = one_point(options.end, where="--to")
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     frame = read_frame(options.image, reconstructor)
     heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
@@ -53,14 +50,3 @@ def run(options: argparse.Namespace) -> int:
         )
     )
     return 0
-
-
-def _one_point(given: list[list[float]], where: str) -> tuple[float, float]:
-    found = points(given, where=where)
-    if len(found) != 1:
-        raise InputError(
-            tr("Number of points: {n}").format(n=len(found)),
-            where=where,
-            advice=tr("Give one point: X and Y in mm"),
-        )
-    return found[0]

@@ -12,6 +12,7 @@ from app.command_line.common import refuse_overwriting
 from app.command_line.inputs import Inputs
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import (
+    PREVIEW,
     add_despite_faults,
     add_effort,
     add_format,
@@ -28,16 +29,13 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument(
         "images", type=Path, nargs="+", metavar="IMAGE", help=tr("images and recordings")
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
-    add_format(parser)
-    parser.add_argument(
-        "--pictures", action="store_true", help=tr("also save an image of each depth map (PNG)")
-    )
+    add_format(parser, preview=True)
     parser.add_argument(
         "--uncertainty",
         action="store_true",
@@ -59,19 +57,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_despite_faults(parser)
     add_effort(parser)
     add_model(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Reconstruct every image and write its files."""
-    formats = options.format
+    formats = [name for name in options.format if name != PREVIEW]
     if options.uncertainty and "npz" not in formats:
         raise InputError(
             tr("Only npz can contain standard deviations"),
             where="--uncertainty",
             advice=tr("Add npz to --format, or remove this option"),
         )
-    endings = dict.fromkeys([*map(ending, formats), *(["png"] if options.pictures else [])])
+    endings = ["png" if name == PREVIEW else ending(name) for name in options.format]
     with Inputs(options.images, options.frames) as inputs:
         outputs = [options.output / f"{item.stem}.{e}" for item in inputs.items for e in endings]
         refuse_overwriting(outputs, [options.calibration, *options.images])
@@ -97,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
                 tqdm.write("\n".join([f"{item.where}:", *trace_lines(heightmap.trace)]))
             for note in heightmap.notes:
                 tqdm.write(f"{item.where}: {note}", file=sys.stderr)
-            if options.pictures:
+            if PREVIEW in options.format:
                 write_preview(heightmap, image.rgb, options.output / f"{item.stem}.png")
     saved = len(inputs.items) - refused
     say(tr("{n} depth maps saved to {folder}").format(n=saved, folder=options.output))

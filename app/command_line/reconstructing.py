@@ -49,27 +49,32 @@ def add_despite_faults(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_format(parser: argparse.ArgumentParser) -> None:
+PREVIEW = "preview"
+"""A format for people: an image of the depth map, named like the input with ``.png``."""
+
+
+def add_format(parser: argparse.ArgumentParser, *, preview: bool = False) -> None:
     """Add ``--format``, a list of formats."""
+    names = (*FORMATS, PREVIEW) if preview else FORMATS
+
+    def formats(text: str) -> tuple[str, ...]:
+        found = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+        unknown = sorted(set(found) - set(names))
+        if unknown or not found:
+            raise InputError(
+                tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
+                where="--format",
+                advice=tr("Use one or more of {formats}").format(formats=", ".join(names)),
+            )
+        return found
+
     parser.add_argument(
         "--format",
-        type=_formats,
+        type=formats,
         default="npz",
         metavar="LIST",
-        help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
+        help=tr("comma-separated list of {formats}").format(formats=", ".join(names)),
     )
-
-
-def _formats(text: str) -> tuple[str, ...]:
-    formats = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    unknown = sorted(set(formats) - set(FORMATS))
-    if unknown or not formats:
-        raise InputError(
-            tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
-            where="--format",
-            advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
-        )
-    return formats
 
 
 def add_effort(parser: argparse.ArgumentParser) -> None:

@@ -6,12 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from app.command_line.common import refuse_overwriting
+from app.command_line.common import check_outputs
 from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import refuse_unwritable
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.translation import tr
 
@@ -19,7 +18,7 @@ _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8} 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument(
         "--workspace",
         type=Path,
@@ -29,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--sensor", metavar="SERIAL", help=tr("only measurements of this sensor"))
     parser.add_argument("--csv", type=Path, metavar="FILE", help=tr("also write a table"))
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -41,9 +39,7 @@ def run(options: argparse.Namespace) -> int:
             where=str(path),
             advice=tr("Give the workspace folder with --workspace, or measure something first"),
         )
-    if options.csv is not None:
-        refuse_overwriting([options.csv], [path])
-        refuse_unwritable(options.csv)
+    check_outputs([options.csv], [path])
     with Records.open(path) as records:
         if records.notice:
             say(records.notice, file=sys.stderr)
@@ -62,24 +58,19 @@ def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
     )  # fmt: skip
     lines = [head]
     for record in records:
+        who = (record.id, f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
+        rest = record.verdict, record.note.replace("\n", " ")
         for quantity in record.quantities:
-            lines.append(_line(record, quantity))
+            numbers = (
+                "" if value is None else f"{value:{form}}"
+                for value, form in (
+                    (quantity.value, ".4f"),
+                    (quantity.sd, ".4f"),
+                    (quantity.truth, ".4f"),
+                    (quantity.error_percent, "+.2f"),
+                )
+            )
+            cells = (*who, quantity.name, *numbers, *rest)
+            lines.append(_LINE.format(*(harmless(str(cell)) for cell in cells)))
+            who, rest = ("",) * 4, ("",) * 2  # once for each record
     return [line.rstrip() for line in lines]
-
-
-def _line(record: MeasurementRecord, quantity: Quantity) -> str:
-    first = quantity is record.quantities[0]
-    error = quantity.error_percent
-    return _LINE.format(
-        record.id if first else "",
-        f"{record.time:%Y-%m-%d %H:%M}" if first else "",
-        harmless(record.serial) if first else "",
-        harmless(record.shape) if first else "",
-        harmless(quantity.name),
-        f"{quantity.value:.4f}",
-        "" if quantity.sd is None else f"{quantity.sd:.4f}",
-        "" if quantity.truth is None else f"{quantity.truth:.4f}",
-        "" if error is None else f"{error:+.2f}",
-        harmless(record.verdict) if first else "",
-        harmless(record.note.replace("\n", " ")) if first else "",
-    )

@@ -6,12 +6,11 @@ import argparse
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.command_line.common import quality_lines, refuse_overwriting
+from app.command_line.common import check_outputs, quality_lines
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place_refresh import repaired, with_background
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.session.closed import ClosedSession, read_any_session
@@ -20,7 +19,7 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command, and what runs it."""
+    """Add the arguments of the command."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="CALIBRATION")
     given = parser.add_mutually_exclusive_group(required=True)
@@ -37,13 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SESSION",
         help=tr("background and three or more ball presses of the new gel, which correct them"),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the refreshed calibration and print its quality."""
-    refuse_overwriting([options.output], [options.calibration, *(options.background or [])])
-    refuse_unwritable(options.output)
+    check_outputs([options.output], [options.calibration, *(options.background or [])])
     calibration = read_calibration(options.calibration)
     if not isinstance(calibration, InPlaceCalibration):
         raise InputError(

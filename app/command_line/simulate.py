@@ -13,7 +13,7 @@ from gelpolight_core.translation import tr
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
+    """Add the arguments of the command."""
     parser.add_argument("output", type=Path, metavar="OUT")
     parser.add_argument("--design", type=Path, metavar="FILE", help=tr("sensor design (TOML)"))
     parser.add_argument(
@@ -21,7 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help=tr("background, balls and scale only, as of a sensor that cannot be opened"),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,17 +6,15 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
-    QDialog,
-    QDialogButtonBox,
     QHeaderView,
-    QPushButton,
     QTableWidget,
     QTableWidgetItem,
     QWidget,
 )
 
 from app.measure.placing import INDENTERS, kind_label
-from app.theme.icons import icon
+from app.widgets.buttons import push_button
+from app.widgets.dialog import Dialog, Kinds
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
@@ -29,7 +27,7 @@ from gelpolight_core.translation import tr
 NAME, SHAPE, SIZE, SECOND, HEIGHT = range(5)
 
 
-class IndentersDialog(QDialog):
+class IndentersDialog(Dialog):
     """Edits the list. Errors are shown below it, and an invalid list is not accepted.
 
     Attributes
@@ -39,32 +37,29 @@ class IndentersDialog(QDialog):
     """
 
     def __init__(self, indenters: tuple[Indenter, ...], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        named(self, "measure.indenters", tr("Known indenters"))
-        self.setWindowTitle(tr("Known indenters"))
+        kinds = Kinds.Save | Kinds.Cancel
+        super().__init__(parent, "measure.indenters", tr("Known indenters"), kinds, once=True)
         self.resize(680, 480)
         self.indenters = indenters
         self.table = self._make_table()
-        self.problem = named(PlainLabel(), "measure.indenters.problem", tr("Errors in the list"))
-        self.problem.setWordWrap(True)
-        show_meaning(self.problem, "fail")
-        add = _button("add", tr("&Add"))
-        add.clicked.connect(lambda: self.add_row(Indenter(tr("New cylinder"), "cylinder", 5.0)))
-        remove = _button("remove", tr("&Remove"))
-        remove.clicked.connect(self.remove_rows)
-        kinds = QDialogButtonBox.StandardButton
-        buttons = QDialogButtonBox(kinds.Save | kinds.Cancel)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        row = hbox(add, remove, None, buttons)
-        words = PlainLabel(
-            tr(
-                "All lengths are in mm. Depth is the height of the indenter from its face to "
-                "its base, if it has one."
-            )
+        self.problem = named(
+            PlainLabel(wrap=True), "measure.indenters.problem", tr("Errors in the list")
         )
-        words.setWordWrap(True)
-        vbox(words, self.table, self.problem, row, of=self)
+        show_meaning(self.problem, "fail")
+        add = push_button(
+            "measure.indenters.add", tr("&Add"),
+            lambda: self.add_row(Indenter(tr("New cylinder"), "cylinder", 5.0)), icon_name="add",
+        )  # fmt: skip
+        remove = push_button(
+            "measure.indenters.remove", tr("&Remove"), self.remove_rows, icon_name="remove"
+        )
+        for button in (add, remove):
+            button.setAutoDefault(False)
+        text = tr(
+            "All lengths are in mm. Depth is the height of the indenter from its face to "
+            "its base, if it has one."
+        )
+        self.fill(PlainLabel(text, wrap=True), self.table, self.problem, add=(add, remove))
         for indenter in indenters:
             self.add_row(indenter)
         self.table.setCurrentCell(0, NAME)
@@ -150,10 +145,3 @@ class IndentersDialog(QDialog):
                 where=tr("Indenter {name}").format(name=self._text(row, NAME)),
                 advice=tr("Enter lengths in mm, such as 5 or 3.5"),
             ) from error
-
-
-def _button(name: str, text: str) -> QPushButton:
-    button = named(QPushButton(text), f"measure.indenters.{name}", text.replace("&", ""))
-    button.setIcon(icon(name))
-    button.setAutoDefault(False)
-    return button

@@ -123,11 +123,20 @@ def _judge_indenter(fit: Measurement, stated: Stated, limits: Limits) -> tuple[J
     return tuple(rows)
 
 
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """A result with its context.
+def record_of(
+    result: ToolResult,
+    judged: tuple[Judged, ...],
+    stated: Stated,
+    heightmap: HeightMap,
+    *,
+    limits: Limits,
+    serial: str,
+    operator: str,
+    note: str,
+) -> MeasurementRecord:
+    """Return the record to be saved.
 
-    Attributes
+    Parameters
     ----------
     result : ToolResult
         Result of a tool.
@@ -135,83 +144,57 @@ class Kept:
         Comparison with the true values. Empty if there are none.
     stated : Stated
         The true values as entered.
-    limits : Limits
-        Limits of the verdict.
     heightmap : HeightMap
         The height map that was measured.
+    limits : Limits
+        Limits of the verdict.
     serial : str
         The sensor.
     operator, note : str
         Operator, and their note.
     """
-
-    result: ToolResult
-    judged: tuple[Judged, ...]
-    stated: Stated
-    limits: Limits
-    heightmap: HeightMap
-    serial: str
-    operator: str
-    note: str
-
-
-def record_of(kept: Kept) -> MeasurementRecord:
-    """Return the record to be saved."""
-    fit = kept.result.measurement
-    record = _other_record(kept) if fit is None else _fit_record(kept, fit)
-    settings = {"model": kept.heightmap.model, "tool": tool_as_dict(kept.result.tool)}
-    if kept.stated.name:
-        settings["indenter"] = kept.stated.name
-    quantities = _with_truth(record.quantities, kept)
+    fit = result.measurement
+    context = {
+        "serial": serial,
+        "calibration_id": heightmap.calibration_id,
+        "operator": operator,
+        "picture": heightmap.source,
+        "note": note,
+    }
+    if fit is None:
+        record = MeasurementRecord(
+            shape=result.tool.name.replace("-", "_"),
+            quantities=tuple(
+                Quantity(f"{figure.name}_{figure.unit}", figure.value, figure.sd)
+                for figure in result.figures
+            ),
+            reason=result.reason,
+            details=result_as_dict(result),
+            **context,
+        )
+    else:
+        comparison = None
+        if stated.size_mm is not None and stated.height_mm is not None:
+            comparison = compare(fit, Truth(fit.shape, stated.size_mm, stated.height_mm))
+        record = indenter_record(
+            fit,
+            comparison,
+            size_limit_percent=limits.size_percent,
+            height_limit_percent=limits.height_percent,
+            **context,
+        )
+    quantities = list(record.quantities)
+    for row in judged:  # size first, then depth
+        index = 1 if row.quantity == "height" and fit is not None else 0
+        quantities[index] = replace(
+            quantities[index], value=row.measured, truth=row.true, limit_percent=row.limit_percent
+        )
+    settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
+    if stated.name:
+        settings["indenter"] = stated.name
     return replace(
         record,
-        quantities=quantities,
-        verdict=verdict_of(quantities, doubtful=kept.result.verdict != "ok"),
+        quantities=tuple(quantities),
+        verdict=verdict_of(tuple(quantities), doubtful=result.verdict != "ok"),
         settings=settings,
     )
-
-
-def _fit_record(kept: Kept, fit: Measurement) -> MeasurementRecord:
-    stated = kept.stated
-    comparison = None
-    if stated.size_mm is not None and stated.height_mm is not None:
-        comparison = compare(fit, Truth(fit.shape, stated.size_mm, stated.height_mm))
-    return indenter_record(
-        fit,
-        comparison,
-        serial=kept.serial,
-        calibration_id=kept.heightmap.calibration_id,
-        size_limit_percent=kept.limits.size_percent,
-        height_limit_percent=kept.limits.height_percent,
-        operator=kept.operator,
-        picture=kept.heightmap.source,
-        note=kept.note,
-    )
-
-
-def _other_record(kept: Kept) -> MeasurementRecord:
-    return MeasurementRecord(
-        serial=kept.serial,
-        calibration_id=kept.heightmap.calibration_id,
-        shape=kept.result.tool.name.replace("-", "_"),
-        quantities=tuple(
-            Quantity(f"{figure.name}_{figure.unit}", figure.value, figure.sd)
-            for figure in kept.result.figures
-        ),
-        reason=kept.result.reason,
-        details=result_as_dict(kept.result),
-        operator=kept.operator,
-        picture=kept.heightmap.source,
-        note=kept.note,
-    )
-
-
-def _with_truth(quantities: tuple[Quantity, ...], kept: Kept) -> tuple[Quantity, ...]:
-    """Put the true values next to the measured ones: size first, then depth."""
-    found = list(quantities)
-    for row in kept.judged:
-        index = 1 if row.quantity == "height" and kept.result.measurement is not None else 0
-        found[index] = replace(
-            found[index], value=row.measured, truth=row.true, limit_percent=row.limit_percent
-        )
-    return tuple(found)

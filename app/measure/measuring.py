@@ -19,7 +19,7 @@ from app.sources.source import Frame
 from app.view2d.display import Display
 from app.view2d.map_image import MapImage, map_image
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.proposal import Proposal, propose
@@ -32,9 +32,6 @@ from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
-
-Sheet = Mapping[int, Tool]
-"""The tools on an image by their keys, in the order of their placement. Never changed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,18 +67,9 @@ class MeasuredImage:
             image = read_image(self.path, response=response)
         else:
             assert self.frame is not None
-            image = LinearImage(self.name, _linear(self.frame.rgb, response))
+            image = linear_image(self.frame.rgb, self.name, response=response)
         require_colour(image, where=self.name)
         return image
-
-
-def _linear(
-    rgb: NDArray[np.uint8] | NDArray[np.uint16], response: CameraResponse | None
-) -> NDArray[np.float32]:
-    """Return a frame as linear light, with the same operations as for a file."""
-    if response is not None:
-        return response.linearise(rgb)
-    return np.asarray(rgb, np.float32) / np.float32(np.iinfo(rgb.dtype).max)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,8 +84,8 @@ class MeasureRequest:
         The calibration's, or ``paper``.
     image : MeasuredImage
         The image.
-    sheet : Sheet
-        The tools on it.
+    sheet : mapping of int to Tool
+        The tools on it by their keys.
     propose : bool
         Whether to detect the object.
     """
@@ -105,7 +93,7 @@ class MeasureRequest:
     calibration: Calibration
     model: str
     image: MeasuredImage
-    sheet: Sheet
+    sheet: Mapping[int, Tool]
     propose: bool = False
 
 
@@ -175,8 +163,7 @@ class Measuring:
             self._image = None
             _require_sensor(request.image, request.calibration)
             image = request.image.image(request.calibration.response)
-            name = request.image.name
-            heightmap = measurable_depth(reconstructor, image.rgb, name=name)
+            heightmap = measurable_depth(reconstructor, image.rgb, name=request.image.name)
             self._shown = heightmap, map_image(heightmap, Display()), image.rgb
             self._image, self._results = request.image, {}
         return self._shown

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.context.context import AppContext
 from app.measure.indenters_dialog import IndentersDialog
-from app.measure.judging import Kept, record_of
 from app.measure.limits_dialog import LimitsDialog
 from app.measure.press_view import IMAGES, RECORDING, PressView
 from app.measure.protocol_view import ProtocolView
@@ -59,12 +57,11 @@ class MeasurePage(QWidget):
         vbox(self.tabs, of=self, margins=0)
         self._shown = False
         self.tabs.currentChanged.connect(lambda _index: self._on_tab())
-        self.press_view.indenters_wanted.connect(self.edit_indenters)
-        self.press_view.limits_wanted.connect(self.edit_limits)
+        panel = self.press_view.panel
+        panel.truth.edit.clicked.connect(self.edit_indenters)
+        panel.truth.limits.clicked.connect(self.edit_limits)
+        panel.kept.linkActivated.connect(lambda _: self.tabs.setCurrentWidget(self.results))
         self.press_view.kept.connect(self.keep)
-        self.press_view.panel.records_wanted.connect(
-            lambda: self.tabs.setCurrentWidget(self.results)
-        )
         self.protocol.completed.connect(self._keep_evaluation)
         self.book.changed.connect(self._show_count)
         self.book.refused.connect(lambda text: context.toasts.show(text, "fail"))
@@ -148,9 +145,8 @@ class MeasurePage(QWidget):
 
     # The records
 
-    def keep(self, kept: Kept) -> None:
+    def keep(self, record: MeasurementRecord) -> None:
         """Write a result to the records at once."""
-        record = record_of(kept)
 
         def done(number: int) -> None:
             text = tr("Saved as number {n}: {what}, {value}.").format(
@@ -187,9 +183,8 @@ class MeasurePage(QWidget):
             known = read_indenters(self.context.workspace.folder)
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
-            self.press_view.panel.truth.show_indenters(())
-            return None
-        self.press_view.panel.truth.show_indenters(known)
+            known = None
+        self.press_view.panel.truth.show_indenters(known or ())
         return known
 
     def edit_indenters(self) -> None:
@@ -200,7 +195,6 @@ class MeasurePage(QWidget):
         if known is None:
             return  # a damaged list is not overwritten
         dialog = IndentersDialog(known, self)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.accepted.connect(lambda: self._keep_indenters(dialog.indenters, before, list_file))
         dialog.open()
 
@@ -218,7 +212,6 @@ class MeasurePage(QWidget):
     def edit_limits(self) -> None:
         """Edit the maximum errors to pass."""
         dialog = LimitsDialog(self.context.settings.limits, self)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.accepted.connect(lambda: self._keep_limits(dialog.form.value))
         dialog.open()
 

@@ -47,91 +47,43 @@ class Kind:
 
 def kinds() -> tuple[Kind, ...]:
     """Return the palette: the tools in its order."""
-    on_it = (tr("Click on the object"),)
-    return (
-        Kind(
-            "distance",
-            tr("Distance"),
-            "D",
-            (tr("Click the first point"), tr("Click the second point")),
-            "lines",
+    on_it = tr("Click on the object")
+    groups = {
+        "lines": (
+            ("distance", "D", tr("Distance"),
+             tr("Click the first point"), tr("Click the second point")),
+            ("step-height", "S", tr("Step height"),
+             tr("Click the lower area"), tr("Click the area to compare with it")),
+            ("profile-width", "W", tr("Profile width"),
+             tr("Click the start of the section"), tr("Click the end of the section")),
+            ("angle", "A", tr("Angle"), tr("Click the end of one arm"), tr("Click the apex"),
+             tr("Click the end of the other arm")),
         ),
-        Kind(
-            "step-height",
-            tr("Step height"),
-            "S",
-            (tr("Click the lower area"), tr("Click the area to compare with it")),
-            "lines",
+        "outlines": (
+            ("circle", "C", tr("Circle"), tr("Click a point on the edge"),
+             tr("Click a second point on the edge"), tr("Click a third point on the edge")),
+            ("rectangle", "R", tr("Rectangle"),
+             tr("Click one corner"), tr("Click the opposite corner")),
         ),
-        Kind(
-            "profile-width",
-            tr("Profile width"),
-            "W",
-            (tr("Click the start of the section"), tr("Click the end of the section")),
-            "lines",
+        "features": (
+            ("pit", "I", tr("Pit or bump"), tr("Click one corner, beside the pit or bump"),
+             tr("Click the opposite corner, on the other side")),
+            ("scratch", "X", tr("Scratch or ridge"),
+             tr("Click the surface on one side of the scratch"),
+             tr("Click the surface on the other side")),
+            ("edge-radius", "E", tr("Edge radius"), tr("Click where the rounding begins"),
+             tr("Click across the edge, where the rounding ends")),
         ),
-        Kind(
-            "angle",
-            tr("Angle"),
-            "A",
-            (
-                tr("Click the end of one arm"),
-                tr("Click the apex"),
-                tr("Click the end of the other arm"),
-            ),
-            "lines",
+        "objects": (
+            ("ball", "B", tr("Ball"), on_it),
+            ("cylinder", "Y", tr("Cylinder"), on_it),
+            ("cuboid", "U", tr("Cuboid"), on_it),
         ),
-        Kind(
-            "circle",
-            tr("Circle"),
-            "C",
-            (
-                tr("Click a point on the edge"),
-                tr("Click a second point on the edge"),
-                tr("Click a third point on the edge"),
-            ),
-            "outlines",
-        ),
-        Kind(
-            "rectangle",
-            tr("Rectangle"),
-            "R",
-            (tr("Click one corner"), tr("Click the opposite corner")),
-            "outlines",
-        ),
-        Kind(
-            "pit",
-            tr("Pit or bump"),
-            "I",
-            (
-                tr("Click one corner, beside the pit or bump"),
-                tr("Click the opposite corner, on the other side"),
-            ),
-            "features",
-        ),
-        Kind(
-            "scratch",
-            tr("Scratch or ridge"),
-            "X",
-            (
-                tr("Click the surface on one side of the scratch"),
-                tr("Click the surface on the other side"),
-            ),
-            "features",
-        ),
-        Kind(
-            "edge-radius",
-            tr("Edge radius"),
-            "E",
-            (
-                tr("Click where the rounding begins"),
-                tr("Click across the edge, where the rounding ends"),
-            ),
-            "features",
-        ),
-        Kind("ball", tr("Ball"), "B", on_it, "objects"),
-        Kind("cylinder", tr("Cylinder"), "Y", on_it, "objects"),
-        Kind("cuboid", tr("Cuboid"), "U", on_it, "objects"),
+    }  # fmt: skip
+    return tuple(
+        Kind(name, label, key, tuple(asks), group)
+        for group, rows in groups.items()
+        for name, key, label, *asks in rows
     )
 
 
@@ -153,15 +105,11 @@ def make_tool(name: str, points: Sequence[Point]) -> Tool:
     if types == [POINTS]:
         return cast(Tool, made(tuple(points)))
     sides = (STEP_SIDE_MM, STEP_SIDE_MM)
-    return cast(
-        Tool,
-        made(
-            *(
-                Rectangle(point, sides) if kind == "Rectangle" else point
-                for kind, point in zip(types, points, strict=True)
-            )
-        ),
+    given = (
+        Rectangle(point, sides) if kind == "Rectangle" else point
+        for kind, point in zip(types, points, strict=True)
     )
+    return cast(Tool, made(*given))
 
 
 def first_points(name: str, middle_mm: Point) -> tuple[Point, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.live.overlay import Line, Marker, Overlay, Role
+from app.measure.placing import kind_label
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.result import Truth
@@ -26,31 +27,21 @@ TOLERANCE_MM = 1.5
 OUTLINE_POINTS = 72
 
 
-class ImageMap:
-    """From points on the membrane to the image, through a calibration's optics or scale.
+def to_image(points_mm: Array, calibration: AnyCalibration) -> Array:
+    """Return the pixels (u, v) that see points (N, 2) of the flat membrane, (N, 2).
 
     Parameters
     ----------
+    points_mm : (N, 2)
+        Points in the sensor frame.
     calibration : Calibration or InPlaceCalibration
-        Of the sensor in use.
+        Its optics or scale.
     """
-
-    def __init__(self, calibration: AnyCalibration) -> None:
-        self._calibration = calibration
-
-    def to_image(self, points_mm: Array) -> Array:
-        """Return the pixels (u, v) that see points (N, 2) of the flat membrane, (N, 2)."""
-        c = self._calibration
-        if isinstance(c, InPlaceCalibration):
-            return c.in_place.grid.to_pixels(points_mm)
-        directions = membrane_to_camera(np.asarray(points_mm, np.float64), c.plane, c.stack)
-        return np.asarray(c.camera.project(directions))
-
-    def pixels_per_mm(self, position_mm: tuple[float, float]) -> float:
-        """Return the scale of the image at a point."""
-        x, y = position_mm
-        ends = self.to_image(np.array([[x - 0.5, y], [x + 0.5, y]]))
-        return float(np.linalg.norm(ends[1] - ends[0]))
+    if isinstance(calibration, InPlaceCalibration):
+        return calibration.in_place.grid.to_pixels(points_mm)
+    plane, stack = calibration.plane, calibration.stack
+    directions = membrane_to_camera(np.asarray(points_mm, np.float64), plane, stack)
+    return np.asarray(calibration.camera.project(directions))
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,32 +79,24 @@ class Target:
         return Overlay(markers=(marker,), lines=lines)
 
 
-def make_target(press: PressWanted, image_map: ImageMap) -> Target:
-    """Return a press in image coordinates.
-
-    Parameters
-    ----------
-    press : PressWanted
-        Object and position.
-    image_map : ImageMap
-        Of the sensor's calibration.
-    """
+def make_target(press: PressWanted, calibration: AnyCalibration) -> Target:
+    """Return a press in image coordinates, through the calibration of the sensor."""
     centre = np.array(press.position_mm)
-    u, v = image_map.to_image(centre[None])[0]
+    one_mm = to_image(centre + np.array([[-0.5, 0.0], [0.5, 0.0]]), calibration)
+    u, v = to_image(centre[None], calibration)[0]
     return Target(
         press,
-        image_map.to_image(centre + _face(press)),
-        image_map.to_image(centre + _circle(TOLERANCE_MM)),
+        to_image(centre + _face(press), calibration),
+        to_image(centre + _circle(TOLERANCE_MM), calibration),
         (float(u), float(v)),
-        image_map.pixels_per_mm(press.position_mm),
+        float(np.linalg.norm(one_mm[1] - one_mm[0])),
     )
 
 
 def object_name(truth: Truth) -> str:
     """Return the name of an object, such as "Cylinder 5 mm, height 1 mm"."""
-    shape = {"cylinder": tr("Cylinder"), "cuboid": tr("Cuboid")}[truth.shape]
     return tr("{shape} {size:g} mm, height {height:g} mm").format(
-        shape=shape, size=truth.size_mm, height=truth.height_mm
+        shape=kind_label(truth.shape), size=truth.size_mm, height=truth.height_mm
     )
 
 

@@ -6,15 +6,13 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import (
-    QFileDialog,
-)
+from PySide6.QtWidgets import QFileDialog
 
 from app.context.context import AppContext
 from app.live.frame_results import Shown, Wanted
 from app.live.zero import ZeroControl
 from app.measure.advice import measuring_advice
-from app.measure.judging import Judged, Kept, judge
+from app.measure.judging import Judged, judge, record_of
 from app.measure.measuring import MeasuredImage
 from app.measure.press_view_frame import PressViewFrame
 from app.measure.steady import SteadyPress
@@ -44,14 +42,10 @@ class PressView(PressViewFrame):
     Signals
     -------
     kept(object)
-        A result (Kept) to be saved to the records.
-    indenters_wanted(), limits_wanted()
-        The user wants to edit the indenters or the limits.
+        A MeasurementRecord to be saved.
     """
 
     kept = Signal(object)
-    indenters_wanted = Signal()
-    limits_wanted = Signal()
 
     def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
         super().__init__(jobs, context=context)
@@ -87,13 +81,11 @@ class PressView(PressViewFrame):
         self.map.freeze_wanted.connect(lambda: self.freeze(True))
         self.map.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         panel = self.panel
-        panel.propose_wanted.connect(self.propose)
+        panel.propose.clicked.connect(self.propose)
         panel.tool_chosen.connect(self.work.choose)
-        panel.remove_wanted.connect(lambda: self.work.remove(self.work.chosen))
-        panel.keep_wanted.connect(self.keep)
+        panel.remove.clicked.connect(lambda: self.work.remove(self.work.chosen))
+        panel.keep.clicked.connect(self.keep)
         panel.truth.changed.connect(self.judge_again)
-        panel.truth.indenters_wanted.connect(self.indenters_wanted)
-        panel.truth.limits_wanted.connect(self.limits_wanted)
 
     # Called by the page
 
@@ -159,29 +151,25 @@ class PressView(PressViewFrame):
             tr("Images and recordings ({endings})").format(endings=endings),
         )
         if chosen:
-            self._try_file(Path(chosen))
-
-    def _try_file(self, path: Path) -> None:
-        try:
-            self.open_file(path)
-        except InputError as error:
-            self.context.toasts.show(str(error), "fail")
+            try:
+                self.open_file(Path(chosen))
+            except InputError as error:
+                self.context.toasts.show(str(error), "fail")
 
     # Live and frozen
 
     def toggle_freeze(self) -> None:
         """Freeze the image, or continue."""
-        if self.work.image is None:
-            self.freeze()
-        else:
-            self.release()
+        (self.freeze if self.work.image is None else self.release)()
 
     def freeze(self, by_hand: bool = True) -> None:
         """Freeze the shown image to measure on it."""
         shown = self._shown
         if self.work.image is None and shown is not None:
             now = datetime.now().astimezone()
-            name = tr("{camera}, {time:%H:%M:%S}").format(camera=self._camera(), time=now)
+            info = self.context.source.info
+            camera = tr("image") if info is None else info.name
+            name = tr("{camera}, {time:%H:%M:%S}").format(camera=camera, time=now)
             image = MeasuredImage(name, frame=shown.frame, serial=self.live.serial)
             self._take(image, propose=not by_hand)
         self._follow_freeze()
@@ -225,8 +213,8 @@ class PressView(PressViewFrame):
         self.map.show_live(shown, Display())
         self.details.show_live(shown)
         heightmap = shown.heightmap
-        could, self._shown = self._can_freeze, None if heightmap is None else shown
-        if could != self._can_freeze:
+        before, self._shown = self._shown, None if heightmap is None else shown
+        if (before is None) != (heightmap is None):
             self._refresh()
         if heightmap is None:
             return
@@ -234,10 +222,6 @@ class PressView(PressViewFrame):
         steady = self._steady.update(heightmap.depth_mm, frame.time_s, settled=frame.settled)
         if steady and self.auto.isChecked():
             self.freeze(by_hand=False)
-
-    def _camera(self) -> str:
-        info = self.context.source.info
-        return tr("image") if info is None else info.name
 
     # Measuring
 
@@ -254,17 +238,17 @@ class PressView(PressViewFrame):
         best = self._best
         if result is None or heightmap is None or best is None:
             return
-        kept = Kept(
-            result=result,
-            judged=self.judged(),
-            stated=self.panel.truth.stated,
+        record = record_of(
+            result,
+            self.judged(),
+            self.panel.truth.stated,
+            heightmap,
             limits=self.context.settings.limits,
-            heightmap=heightmap,
             serial=best.calibration.sensor.serial,
             operator=self.panel.operator.text().strip(),
             note=self.panel.note.text().strip(),
         )
-        self.kept.emit(kept)
+        self.kept.emit(record)
 
     def judged(self) -> tuple[Judged, ...]:
         """Return the comparison of the chosen tool's result with the true values."""
@@ -283,17 +267,15 @@ class PressView(PressViewFrame):
         self.panel.truth.show_verdict(rows, self.work.result)
 
     def _refresh(self) -> None:
-        known = self.work.heightmap is not None or self._can_freeze
+        can_freeze = self._shown is not None
+        known = self.work.heightmap is not None or can_freeze
         self.panel.show_work(self.work, known=known)
-        self._show_details()
-        self.map.tools.allow(known)
-        self.freeze_action.setEnabled(self.work.image is not None or self._can_freeze)
-        self.judge_again()
-        self._advise()
-
-    def _show_details(self) -> None:
         self.details.show_results(self.work.image_results)
         self.details.show_result(self.work.tool, self.work.result)
+        self.map.tools.allow(known)
+        self.freeze_action.setEnabled(self.work.image is not None or can_freeze)
+        self.judge_again()
+        self._advise()
 
     def _on_switched(self) -> None:
         self.replay.follow(self.live.source)
@@ -303,10 +285,6 @@ class PressView(PressViewFrame):
         """Show another frame of the recording instead of the frozen one."""
         if self.work.image is not None:
             self.release()
-
-    @property
-    def _can_freeze(self) -> bool:
-        return self._shown is not None
 
     def _on_proposed(self, proposal: Proposal | None) -> None:
         if proposal is None:

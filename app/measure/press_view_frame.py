@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QCheckBox,
     QDockWidget,
@@ -87,13 +88,13 @@ class PressViewFrame(QMainWindow):
         self._build()
 
     def _build(self) -> None:
-        middle = QWidget()
         self._split = named(QSplitter(Qt.Orientation.Vertical), "measure.split", tr("Views"))
         self._split.addWidget(self.map)
         self._split.addWidget(self.details)
         self._split.setStretchFactor(0, 1)
         self._split.setCollapsible(0, False)
         self._split.setSizes(FIRST_SIZES)
+        middle = QWidget()
         across = hbox((self._split, 1), self.panel, spacing=0)
         vbox(self.banner, (across, 1), self.replay, of=middle, margins=0, spacing=0)
         self.setCentralWidget(middle)
@@ -131,20 +132,15 @@ class PressViewFrame(QMainWindow):
             can.connect(action.setEnabled)
         self.source = SourceButton(context=self.context, page="measure", none=tr("No camera"))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        bar.addWidget(self.source)
-        bar.addAction(open_action)
-        bar.addSeparator()
-        bar.addWidget(self.box)
-        bar.addWidget(self.validated)
-        bar.addSeparator()
-        bar.addAction(self.freeze_action)
-        bar.addWidget(self.auto)
-        bar.addSeparator()
-        bar.addActions([undo, redo])
+        for group in (
+            (self.source, open_action), (self.box, self.validated),
+            (self.freeze_action, self.auto), (undo, redo), (self._views_button(),),
+        ):  # fmt: skip
+            for part in group:
+                (bar.addAction if isinstance(part, QAction) else bar.addWidget)(part)
+            bar.addSeparator()
         for action in (undo, redo):
             bar.widgetForAction(action).setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
-        bar.addSeparator()
-        bar.addWidget(self._views_button())
         self.addToolBar(bar)
         make_action(
             self, "measure.propose", tr("Detect object"), self.propose_pressed.emit, keys=("Q",)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
     QHeaderView,
     QProgressBar,
-    QPushButton,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
+from app.measure.placing import kind_label
 from app.measure.press_check import object_name
 from app.theme import theme
+from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
@@ -35,131 +35,83 @@ MOST_ROWS = 200
 class RunPanel(QWidget):
     """Shows the next press and the last ones.
 
-    Signals
-    -------
-    bare_wanted()
-        The membrane is bare: capture it.
-    capture_wanted()
-        Capture this press now, steady or not.
-    take_back_wanted()
-        Repeat the last press.
-    bench_wanted(bool)
-        Start or stop presses by the virtual bench.
-    evaluate_wanted()
-        Show the result of the presses so far.
-    leave_wanted()
-        Leave the run. It can be continued later.
+    Parameters
+    ----------
+    on_bare, on_capture, on_take_back, on_leave, on_evaluate : callable
+        Called by the buttons.
     """
 
-    bare_wanted = Signal()
-    capture_wanted = Signal()
-    take_back_wanted = Signal()
-    bench_wanted = Signal(bool)
-    evaluate_wanted = Signal()
-    leave_wanted = Signal()
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(
+        self, *, on_bare: Slot, on_capture: Slot, on_take_back: Slot, on_leave: Slot,
+        on_evaluate: Slot,
+    ) -> None:  # fmt: skip
+        super().__init__()
         named(self, "protocol.panel", tr("Next press"))
         self.setFixedWidth(WIDTH)
-        column = vbox(of=self, margins=(12, 10, 12, 10), spacing=8)
-        self._build_task(column)
-        self._build_buttons(column)
-        self._build_progress(column)
-        self._build_last(column)
-        self._build_foot(column)
-
-    def _build_task(self, column: QVBoxLayout) -> None:
-        self.title = named(PlainLabel(), "protocol.title", tr("Next object"))
+        self.title = named(PlainLabel(wrap=True), "protocol.title", tr("Next object"))
         make_bold(self.title, size=1.35)
-        self.title.setWordWrap(True)
-        self.where = named(PlainLabel(), "protocol.where", tr("Position"))
-        self.where.setWordWrap(True)
-        self.live = named(PlainLabel(), "protocol.live", tr("State of the live image"))
+        self.where = named(PlainLabel(wrap=True), "protocol.where", tr("Position"))
+        self.live = named(PlainLabel(wrap=True), "protocol.live", tr("State of the live image"))
         font = self.live.font()
         font.setPixelSize(15)
         self.live.setFont(font)
-        self.live.setWordWrap(True)
-        self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
         # Reserved space, so that nothing below moves when a text changes.
         self.live.setMinimumHeight(LIVE_LINES * self.live.fontMetrics().lineSpacing() + 12)
         self.where.setMinimumHeight(2 * self.where.fontMetrics().lineSpacing() + 2)
-        self.where.setAlignment(Qt.AlignmentFlag.AlignTop)
-        for label in (self.title, self.where, self.live):
-            column.addWidget(label)
-
-    def _build_buttons(self, column: QVBoxLayout) -> None:
-        self.bare = named(
-            QPushButton(tr("Capture &bare membrane")),
-            "protocol.bare",
-            tr("Capture the bare membrane and start"),
-        )
+        for label in (self.where, self.live):
+            label.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.bare = push_button(
+            "protocol.bare", tr("Capture &bare membrane"), on_bare,
+            accessible=tr("Capture the bare membrane and start"),
+        )  # fmt: skip
         self.bare.setMinimumHeight(38)
-        self.bare.clicked.connect(self.bare_wanted)
-        self.capture = named(
-            QPushButton(tr("&Capture now")),
-            "protocol.capture",
-            tr("Capture this press now"),
-            tr("A steady press is captured automatically. A press that moves is refused"),
-        )
-        self.capture.clicked.connect(self.capture_wanted)
-        self.take_back = named(
-            QPushButton(tr("&Repeat last press")),
-            "protocol.take_back",
-            tr("Repeat the last press"),
-            tr('The old image is moved to the folder "discarded"'),
-        )
-        self.take_back.clicked.connect(self.take_back_wanted)
+        self.capture = push_button(
+            "protocol.capture", tr("&Capture now"), on_capture,
+            accessible=tr("Capture this press now"),
+            tip=tr("A steady press is captured automatically. A press that moves is refused"),
+        )  # fmt: skip
+        self.take_back = push_button(
+            "protocol.take_back", tr("&Repeat last press"), on_take_back,
+            tip=tr('The old image is moved to the folder "discarded"'),
+        )  # fmt: skip
         self.bench = named(
             QCheckBox(tr("&Use virtual bench")),
             "protocol.bench",
             tr("Let the virtual bench make the presses"),
         )
-        self.bench.toggled.connect(self.bench_wanted)
-        column.addWidget(self.bare)
-        row = hbox(self.capture, self.take_back)
-        column.addLayout(row)
-        column.addWidget(self.bench)
-
-    def _build_progress(self, column: QVBoxLayout) -> None:
         self.progress = named(QProgressBar(), "protocol.progress", tr("Progress of the run"))
         self.progress.setTextVisible(False)
         self.counts = named(
-            PlainLabel(), "protocol.counts", tr("Presses done, refused and measured")
+            PlainLabel(wrap=True), "protocol.counts", tr("Presses done, refused and measured")
         )
-        self.counts.setWordWrap(True)
-        column.addWidget(self.progress)
-        column.addWidget(self.counts)
+        self.last = self._make_table()
+        self.leave = push_button(
+            "protocol.leave", tr("Lea&ve"), on_leave, accessible=tr("Leave the run"),
+            tip=tr("Every press is saved. You can continue here later"),
+        )  # fmt: skip
+        self.evaluate = push_button(
+            "protocol.evaluate", tr("Show the &result"), on_evaluate,
+            accessible=tr("Evaluate the presses so far"),
+        )  # fmt: skip
+        vbox(
+            self.title, self.where, self.live, self.bare, hbox(self.capture, self.take_back),
+            self.bench, self.progress, self.counts, (self.last, 1),
+            hbox(self.leave, (self.evaluate, 1)), of=self, margins=(12, 10, 12, 10), spacing=8,
+        )  # fmt: skip
 
-    def _build_last(self, column: QVBoxLayout) -> None:
-        self.last = named(QTableWidget(0, 3), "protocol.last", tr("Presses measured, newest first"))
-        self.last.setHorizontalHeaderLabels([tr("Press"), tr("Size"), tr("Height")])
-        self.last.verticalHeader().hide()
-        self.last.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.last.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.last.setShowGrid(False)
-        self.last.setTabKeyNavigation(False)
-        header = self.last.horizontalHeader()
+    @staticmethod
+    def _make_table() -> QTableWidget:
+        table = named(QTableWidget(0, 3), "protocol.last", tr("Presses measured, newest first"))
+        table.setHorizontalHeaderLabels([tr("Press"), tr("Size"), tr("Height")])
+        table.verticalHeader().hide()
+        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        table.setShowGrid(False)
+        table.setTabKeyNavigation(False)
+        header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        column.addWidget(self.last, 1)
-
-    def _build_foot(self, column: QVBoxLayout) -> None:
-        self.leave = named(
-            QPushButton(tr("Lea&ve")),
-            "protocol.leave",
-            tr("Leave the run"),
-            tr("Every press is saved. You can continue here later"),
-        )
-        self.leave.clicked.connect(self.leave_wanted)
-        self.evaluate = named(
-            QPushButton(tr("Show the &result")),
-            "protocol.evaluate",
-            tr("Evaluate the presses so far"),
-        )
-        self.evaluate.clicked.connect(self.evaluate_wanted)
-        row = hbox(self.leave, (self.evaluate, 1))
-        column.addLayout(row)
+        return table
 
     def show_press(self, press: PressWanted | None, repeats: int) -> None:
         """Show the next press. None: all are done."""
@@ -227,11 +179,9 @@ class RunPanel(QWidget):
         """Apply the colours of a new theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "last"):
-            for row in range(self.last.rowCount()):
-                for column in range(self.last.columnCount()):
-                    item = self.last.item(row, column)
-                    if item is not None and item.data(DOUBTFUL):
-                        item.setForeground(theme.colour("warn"))
+            for item in self.last.findItems("", Qt.MatchFlag.MatchContains):
+                if item.data(DOUBTFUL):
+                    item.setForeground(theme.colour("warn"))
 
 
 def region_name(press: PressWanted) -> str:
@@ -243,7 +193,9 @@ def region_name(press: PressWanted) -> str:
 
 def _press_name(press: PressWanted) -> str:
     truth = press.truth
-    shape = {"cylinder": tr("Cylinder"), "cuboid": tr("Cuboid")}[truth.shape]
     return tr("{shape} {size:g} x {height:g}, {region}").format(
-        shape=shape, size=truth.size_mm, height=truth.height_mm, region=region_name(press).lower()
+        shape=kind_label(truth.shape),
+        size=truth.size_mm,
+        height=truth.height_mm,
+        region=region_name(press).lower(),
     )

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import pyqtgraph as pg
+from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
+from app.measure.placing import kind_label
 from app.theme import theme
 from app.widgets.label import MarkupLabel
 from app.widgets.layout import vbox
@@ -39,15 +41,13 @@ FILL_ALPHA = 110
 class Fig13(QWidget):
     """Bars are means, whiskers one standard deviation, symbols the presses, dashes the paper."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "protocol.figure", tr("Errors by size and height, as in the paper's Fig. 13"))
-        head = QHBoxLayout()
         self.legend = named(MarkupLabel(), "protocol.legend", tr("Legend"))
-        head.addWidget(self.legend, 1)
         self._grid = QGridLayout()
         self._grid.setSpacing(6)
-        vbox(head, (self._grid, 1), of=self, margins=0, spacing=4)
+        vbox(self.legend, (self._grid, 1), of=self, margins=0, spacing=4)
         self._plots: list[pg.PlotWidget] = []
         self._evaluation: Evaluation | None = None
         self._repaint = QTimer(self, interval=1, singleShot=True)
@@ -79,9 +79,8 @@ class Fig13(QWidget):
                 plot = self._panel(evaluation.series(direction, kinds[name]), direction, name)
                 self._grid.addWidget(plot, row, column)
                 self._plots.append(plot)
-        names = {"cylinder": tr("cylinder"), "cuboid": tr("cuboid")}
         parts = [
-            f"<span style='color:{_colour(shape).name()}'>{WORDS[shape]}</span> {names[shape]}"
+            f"<span style='color:{_colour(shape).name()}'>{WORDS[shape]}</span> {kind_label(shape)}"
             for shape in COLOURS
             if any(r.press.truth.shape == shape for r in evaluation.results)
         ]
@@ -108,9 +107,15 @@ class Fig13(QWidget):
         plot.setTitle(title if words is None else f"{title}, {words}", color=text.name())
         top = PAPER_PERCENT[direction]
         for k, (shape, sign) in enumerate(SIGNS.items()):
-            own = [r for r in results if r.press.truth.shape == shape]
             for centre, dimension in enumerate(dimensions):
-                errors = _errors(own, direction, dimension)
+                found = np.array(
+                    [
+                        abs(r.error_percent(direction))
+                        for r in results
+                        if r.press.truth.shape == shape and dimension_mm(r, direction) == dimension
+                    ]
+                )
+                errors = found[np.isfinite(found)]
                 if errors.size:
                     _bar(plot, centre + (k - 0.5) * BAR_WIDTH * 1.1, errors, _colour(shape), sign)
                     top = max(top, float(errors.max()))
@@ -127,31 +132,19 @@ def _colour(shape: str) -> QColor:
     return QColor(COLOURS[shape][theme.is_dark()])
 
 
-def _errors(
-    results: Sequence[PressResult], direction: str, dimension: float
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    found = [
-        abs(r.error_percent(direction)) for r in results if dimension_mm(r, direction) == dimension
-    ]
-    errors = np.array(found, np.float64)
-    return errors[np.isfinite(errors)]
-
-
 def _bar(
-    plot: pg.PlotWidget,
-    centre: float,
-    errors: np.ndarray[tuple[int], np.dtype[np.float64]],
-    colour: QColor,
-    sign: str,
+    plot: pg.PlotWidget, centre: float, errors: NDArray[np.float64], colour: QColor, sign: str
 ) -> None:
     fill = QColor(colour)
     fill.setAlpha(FILL_ALPHA)
-    mean = float(errors.mean())
+    mean, nothing = float(errors.mean()), pg.mkPen(None)
     plot.addItem(
-        pg.BarGraphItem(x=[centre], height=[mean], width=BAR_WIDTH, brush=fill, pen=pg.mkPen(None))
+        pg.BarGraphItem(x=[centre], height=[mean], width=BAR_WIDTH, brush=fill, pen=nothing)
     )
+    jitter = np.zeros(1)
     if errors.size > 1:
         spread = float(errors.std(ddof=1))
+        jitter = np.linspace(-0.3, 0.3, errors.size) * BAR_WIDTH
         plot.addItem(
             pg.ErrorBarItem(
                 x=np.array([centre]),
@@ -162,9 +155,6 @@ def _bar(
                 pen=pg.mkPen(theme.colour("text"), width=1.3),
             )
         )
-    jitter = np.linspace(-0.3, 0.3, errors.size) * BAR_WIDTH if errors.size > 1 else np.zeros(1)
     plot.addItem(
-        pg.ScatterPlotItem(
-            centre + jitter, errors, symbol=sign, size=5, brush=colour, pen=pg.mkPen(None)
-        )
+        pg.ScatterPlotItem(centre + jitter, errors, symbol=sign, size=5, brush=colour, pen=nothing)
     )

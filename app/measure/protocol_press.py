@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QTimer, Signal
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
@@ -25,6 +25,7 @@ from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_work import ProtocolWork
 from app.sources.bench import Bench
 from app.sources.processor import Failure
+from app.widgets.buttons import Slot
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.measurement.protocol import PressWanted
@@ -34,6 +35,7 @@ from gelpolight_core.translation import tr
 FRAMES = 4
 HAND_MS = 100
 """Interval at which the virtual bench checks for its next action."""
+
 HAND_MM, HAND_DEG = 0.1, 1.0
 """Repeatability of placing by hand, one standard deviation."""
 
@@ -78,21 +80,22 @@ class BenchHand:
 class PressingView(QWidget):
     """Guides the user through the presses of one run.
 
-    Signals
-    -------
-    left()
-        The user leaves the run.
-    result_wanted()
-        The user wants to see the result.
+    Parameters
+    ----------
+    work : ProtocolWork
+        The run.
+    context : AppContext
+        Shared by all pages.
+    on_leave, on_result : callable
+        Leave the run, and show its result.
     """
 
-    left = Signal()
-    result_wanted = Signal()
-
-    def __init__(self, work: ProtocolWork, *, context: AppContext) -> None:
+    def __init__(
+        self, work: ProtocolWork, *, context: AppContext, on_leave: Slot, on_result: Slot
+    ) -> None:
         super().__init__()
         named(self, "protocol.pressing", tr("Make the presses"))
-        self._work, self._context = work, context
+        self._work, self._context, self._on_result = work, context, on_result
         self._bare: NDArray[Any] | None = None
         self._target: Target | None = None
         self._check: PressCheck | None = None
@@ -101,29 +104,22 @@ class PressingView(QWidget):
         self.live = LiveSession(context=context, name="protocol", parent=self)
         self._detection = LiveDetection(self.live)
         self.image = LiveView()
-        self.panel = RunPanel()
+        self.panel = RunPanel(
+            on_bare=self.take_bare, on_capture=self.capture, on_take_back=self._take_back,
+            on_leave=on_leave, on_evaluate=on_result,
+        )  # fmt: skip
         hbox((self.image, 1), self.panel, of=self, margins=0, spacing=0)
-        self._tick = QTimer(self)
-        self._tick.setInterval(HAND_MS)
+        self._tick = QTimer(self, interval=HAND_MS)
         self._tick.timeout.connect(self._move_hand)
-        self._connect()
-        self._follow_source()
-        self._show_next()
-
-    def _connect(self) -> None:
-        panel, work = self.panel, self._work
-        panel.bare_wanted.connect(self.take_bare)
-        panel.capture_wanted.connect(self.capture)
-        panel.take_back_wanted.connect(self._take_back)
-        panel.bench_wanted.connect(self._on_bench)
-        panel.evaluate_wanted.connect(self.result_wanted)
-        panel.leave_wanted.connect(self.left)
+        self.panel.bench.toggled.connect(lambda on: self._tick.start() if on else self._tick.stop())
         self.live.processed.connect(self._on_detected)
         self.live.switched.connect(self._on_switched)
         self.live.lost.connect(self._on_lost)
         self.live.source_changed.connect(self._on_source)
-        work.measured.connect(panel.show_measured)
+        work.measured.connect(self.panel.show_measured)
         work.changed.connect(self._show_progress)
+        self._follow_source()
+        self._show_next()
 
     # Called by the parent view
 
@@ -193,7 +189,7 @@ class PressingView(QWidget):
         if self._work.accept(target.press, frames):
             self._aim()
             if self._work.run.next() is None:
-                self.result_wanted.emit()
+                self._on_result()
 
     def _take_back(self) -> None:
         self._work.take_back()
@@ -211,7 +207,7 @@ class PressingView(QWidget):
             self._detection.set_detector(None)
             self.image.set_overlay(Overlay())
             return
-        self._target = make_target(press, self._work.image_map)
+        self._target = make_target(press, self._work.calibration)
         self._check = PressCheck(self._target, self._bare)
         self._detection.set_detector(self._check)
 
@@ -295,12 +291,6 @@ class PressingView(QWidget):
         if why:
             self.panel.show_live(why)
 
-    def _on_bench(self, on: bool) -> None:
-        if on:
-            self._tick.start()
-        else:
-            self._tick.stop()
-
     def _move_hand(self) -> None:
         """Let the virtual bench do the next action of a technician."""
         press = self._work.run.next()
@@ -311,9 +301,7 @@ class PressingView(QWidget):
         if self._bare is None:
             self._hand.lift()
             self.take_bare()
-        elif self._check is not None and self._check.phase == "lift":
+        elif self._must_move or (self._check is not None and self._check.phase == "lift"):
             self._hand.lift()
-        elif not self._must_move:
-            self._hand.press(press)
         else:
-            self._hand.lift()
+            self._hand.press(press)

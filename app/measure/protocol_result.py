@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
-    QHBoxLayout,
     QHeaderView,
     QProgressBar,
-    QPushButton,
     QSplitter,
     QTableWidget,
     QTableWidgetItem,
@@ -23,6 +21,7 @@ from PySide6.QtWidgets import (
 from app.context.context import AppContext
 from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
+from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
@@ -31,7 +30,7 @@ from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.quality import verdict_word
 from gelpolight_core.report.document import Listing, Report
-from gelpolight_core.report.evaluation import evaluation_document, evaluation_sentence
+from gelpolight_core.report.evaluation_document import evaluation_document
 from gelpolight_core.translation import tr
 
 ROW_HEIGHT = 24
@@ -40,25 +39,42 @@ ROW_HEIGHT = 24
 class ResultView(QWidget):
     """Shows an evaluation and writes its report.
 
-    Signals
-    -------
-    back_wanted()
-        Return to the presses.
-    left()
-        Leave the run.
+    Parameters
+    ----------
+    work : ProtocolWork
+        The run.
+    context : AppContext
+        Shared by all pages.
+    on_back, on_leave : callable
+        Return to the presses, and leave the run.
     """
 
-    back_wanted = Signal()
-    left = Signal()
-
-    def __init__(self, work: ProtocolWork, *, context: AppContext) -> None:
+    def __init__(
+        self, work: ProtocolWork, *, context: AppContext, on_back: Slot, on_leave: Slot
+    ) -> None:
         super().__init__()
         named(self, "protocol.result", tr("Result of the evaluation"))
         self._work, self._context = work, context
         self._evaluation: Evaluation | None = None
         self._limits_percent = (0.0, 0.0)
-        self.sentence = named(PlainLabel(), "protocol.sentence", tr("Results"))
-        self.sentence.setWordWrap(True)
+        self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
+        make_bold(self.verdict, size=1.45)
+        self._back = push_button(
+            "protocol.back", tr("&Continue pressing"), on_back, tip=tr("Return to the presses")
+        )
+        save = push_button(
+            "protocol.save", tr("&Save the report"),
+            lambda: self.save(work.run.folder / REPORT), tip=tr("Write the report next to the run"),
+        )  # fmt: skip
+        save_as = push_button(
+            "protocol.save_as", tr("Save &as…"), self._save_as,
+            tip=tr("Write the report into another folder"),
+        )  # fmt: skip
+        leave = push_button(
+            "protocol.leave_result", tr("Lea&ve"), on_leave,
+            tip=tr("Leave the run. Everything is saved"),
+        )  # fmt: skip
+        self.sentence = named(PlainLabel(wrap=True), "protocol.sentence", tr("Results"))
         self.figure = Fig13()
         self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
         split = QSplitter(Qt.Orientation.Vertical)
@@ -72,34 +88,10 @@ class ResultView(QWidget):
         keep.setRetainSizeWhenHidden(True)
         self.progress.setSizePolicy(keep)
         vbox(
-            self._build_head(),
-            self.sentence,
-            (split, 1),
-            self.progress,
-            of=self,
-            margins=(12, 10, 12, 10),
-            spacing=8,
-        )
+            hbox((self.verdict, 1), self._back, save, save_as, leave),
+            self.sentence, (split, 1), self.progress, of=self, margins=(12, 10, 12, 10), spacing=8,
+        )  # fmt: skip
         self.show_work("", 0.0)
-
-    def _build_head(self) -> QHBoxLayout:
-        self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
-        make_bold(self.verdict, size=1.45)
-        self.buttons = {
-            name: named(QPushButton(text), f"protocol.{name}", tip)
-            for name, text, tip in (
-                ("back", tr("&Continue pressing"), tr("Return to the presses")),
-                ("save", tr("&Save the report"), tr("Write CSV and PDF next to the run")),
-                ("save_as", tr("Save &as…"), tr("Write CSV and PDF into another folder")),
-                ("leave_result", tr("Lea&ve"), tr("Leave the run. Everything is saved")),
-            )
-        }
-        row = hbox((self.verdict, 1), *self.buttons.values())
-        self.buttons["back"].clicked.connect(self.back_wanted)
-        self.buttons["save"].clicked.connect(lambda: self.save(self._work.run.folder / REPORT))
-        self.buttons["save_as"].clicked.connect(self._save_as)
-        self.buttons["leave_result"].clicked.connect(self.left)
-        return row
 
     def wait(self) -> None:
         """Show that the evaluation is running."""
@@ -122,10 +114,10 @@ class ResultView(QWidget):
         serial = self._work.run.content.serial
         self.verdict.setText(f"{serial}: {word} ({state})")
         show_meaning(self.verdict, document.verdict.value)
-        self.sentence.setText(evaluation_sentence(evaluation) + ".")
+        self.sentence.setText(document.validation.sentence + ".")
         self.figure.show_evaluation(evaluation)
         self._show_tables(document)
-        self.buttons["back"].setEnabled(self._work.run.next() is not None)
+        self._back.setEnabled(self._work.run.next() is not None)
 
     def _show_tables(self, document: Report) -> None:
         chosen = self._tabs.currentIndex()
@@ -142,16 +134,16 @@ class ResultView(QWidget):
         self._tabs.addTab(listing_table("protocol.groups", groups), tr("By size and height"))
         if len(document.sections) > 1:
             gauge = document.sections[1]
-            table = listing_table("protocol.gauge", gauge.listings[0])
+            text = "      ".join(f"{label}: {value}" for label, value in gauge.facts)
+            pooled = named(
+                PlainLabel(text, wrap=True),
+                "protocol.pooled",
+                tr("Repeatability over all objects"),
+            )
             holder = QWidget()
-            pooled = PlainLabel("      ".join(f"{label}: {value}" for label, value in gauge.facts))
-            named(pooled, "protocol.pooled", tr("Repeatability over all objects"))
-            pooled.setWordWrap(True)
-            vbox(pooled, (table, 1), of=holder)
+            vbox(pooled, (listing_table("protocol.gauge", gauge.listings[0]), 1), of=holder)
             self._tabs.addTab(holder, tr("Repeatability"))
-        self._tabs.addTab(
-            listing_table("protocol.presses", document.listings[0]), tr("Every press")
-        )
+        self._tabs.addTab(listing_table("protocol.presses", document.sources), tr("Every press"))
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))
 
     def show_work(self, title: str, share: float) -> None:

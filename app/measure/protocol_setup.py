@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
-    QPushButton,
     QScrollArea,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
+from app.measure.placing import kind_label
+from app.widgets.buttons import push_button
 from app.widgets.inputs import ComboBox, SpinBox
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
@@ -39,64 +37,45 @@ SECONDS_A_PRESS = 20
 PAPER = Protocol()
 
 
-@dataclass(frozen=True, slots=True)
-class KnownRun:
-    """A run that can be continued.
-
-    Attributes
-    ----------
-    folder : Path
-        Its folder.
-    text : str
-        Text for the user: sensor, date, progress.
-    """
-
-    folder: Path
-    text: str
-
-
 class ProtocolSetup(QScrollArea):
     """Asks which objects to press, and offers unfinished runs.
 
-    Signals
-    -------
-    begin_wanted(str)
-        Start a new run with the calibration in this file.
-    run_wanted(str)
-        Continue the run in this folder.
+    Parameters
+    ----------
+    on_begin, on_run : callable
+        Called with the file of the calibration for a new run, and with the folder of a run to
+        continue.
     """
 
-    begin_wanted = Signal(str)
-    run_wanted = Signal(str)
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(
+        self, *, on_begin: Callable[[Path], object], on_run: Callable[[Path], object]
+    ) -> None:
+        super().__init__()
         named(self, "protocol.setup", tr("Set up the evaluation protocol"))
         self.setWidgetResizable(True)
         self.setFrameShape(QScrollArea.Shape.NoFrame)
+        self._on_begin, self._on_run = on_begin, on_run
+        self._no_runs = PlainLabel(
+            tr("None yet. You can leave a run at any press and continue it later."), wrap=True
+        )
+        self._no_runs.setFixedWidth(320)
+        self._runs = vbox()
+        runs = vbox(_heading(tr("Runs so far")), self._no_runs, self._runs, None)
         inside = QWidget()
+        hbox(None, self._build_form(), runs, None, of=inside, margins=(24, 20, 24, 20), spacing=36)
         self.setWidget(inside)
-        form, runs = QVBoxLayout(), QVBoxLayout()
-        hbox(None, form, runs, None, of=inside, margins=(24, 20, 24, 20), spacing=36)
-        self._build_form(form)
-        self._build_runs(runs)
         self._count()
 
-    def _build_form(self, column: QVBoxLayout) -> None:
-        column.setSpacing(10)
-        column.addWidget(_heading(tr("Evaluate a sensor")))
+    def _build_form(self) -> QVBoxLayout:
         explanation = PlainLabel(
             tr(
                 "Press cylinders and cuboids of known size, in one region and in random "
                 "regions. The program shows the position, captures each press "
                 "automatically when it is steady, and compares the measured values with "
                 "the true ones."
-            )
+            ),
+            wrap=True,
         )
-        explanation.setWordWrap(True)
-        explanation.setFixedWidth(WIDTH)
-        column.addWidget(explanation)
-        top = QFormLayout()
         self.calibration = named(
             ComboBox(), "protocol.calibration", tr("Sensor and calibration to evaluate")
         )
@@ -104,66 +83,71 @@ class ProtocolSetup(QScrollArea):
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self.calibration.setMinimumContentsLength(36)
+        top = QFormLayout()
         top.addRow(tr("Sensor, calibration"), self.calibration)
-        column.addLayout(top)
-        self.shapes = _choices(
-            "shape",
-            tr("Shapes"),
-            {"cylinder": tr("Cylinder"), "cuboid": tr("Cuboid")},
-            column,
-            self._count,
+        shapes, self.shapes = self._choices(
+            "shape", tr("Shapes"), {name: kind_label(name) for name in PAPER.shapes}
         )
-        self.sizes = _choices(
+        sizes, self.sizes = self._choices(
             "size",
             tr("Diameters or sides, at a height of {h:g} mm").format(h=PAPER.at_height_mm),
             {size: tr("{x:g} mm").format(x=size) for size in PAPER.sizes_mm},
-            column,
-            self._count,
         )
-        self.heights = _choices(
+        heights, self.heights = self._choices(
             "height",
             tr("Heights, at a diameter or side of {s:g} mm").format(s=PAPER.at_size_mm),
             {height: tr("{x:g} mm").format(x=height) for height in PAPER.heights_mm},
-            column,
-            self._count,
         )
         counts = QFormLayout()
-        self.repeats = _number("repeats", tr("Presses in the same region"), PAPER.repeats)
-        self.regions = _number("regions", tr("Random regions, one press each"), PAPER.regions)
-        for label, box in (
-            (tr("Presses in the same region"), self.repeats),
-            (tr("Random regions, one press each"), self.regions),
-        ):
-            box.valueChanged.connect(self._count)
-            counts.addRow(label, box)
-        column.addLayout(counts)
+        self.repeats, self.regions = (
+            self._number(counts, name, label, value)
+            for name, label, value in (
+                ("repeats", tr("Presses in the same region"), PAPER.repeats),
+                ("regions", tr("Random regions, one press each"), PAPER.regions),
+            )
+        )
         self.summary = named(
-            PlainLabel(), "protocol.summary", tr("Number of objects and presses, and time")
+            PlainLabel(wrap=True), "protocol.summary", tr("Number of objects and presses, and time")
         )
-        self.summary.setWordWrap(True)
-        column.addWidget(self.summary)
-        self.begin = named(QPushButton(tr("&Start")), "protocol.begin", tr("Start the run"))
+        self.begin = push_button(
+            "protocol.begin", tr("&Start"),
+            lambda: self._on_begin(Path(self.calibration.currentData())),
+            accessible=tr("Start the run"),
+        )  # fmt: skip
         self.begin.setMinimumHeight(40)
-        self.begin.clicked.connect(lambda: self.begin_wanted.emit(self.calibration.currentData()))
-        column.addWidget(self.begin)
-        self.problem = named(PlainLabel(), "protocol.problem", tr("Why the run was not started"))
-        self.problem.setWordWrap(True)
-        show_meaning(self.problem, "fail")
-        self.problem.setFixedWidth(WIDTH)
-        column.addWidget(self.problem)
-        column.addStretch(1)
-
-    def _build_runs(self, column: QVBoxLayout) -> None:
-        column.addWidget(_heading(tr("Runs so far")))
-        self._no_runs = PlainLabel(
-            tr("None yet. You can leave a run at any press and continue it later.")
+        self.problem = named(
+            PlainLabel(wrap=True), "protocol.problem", tr("Why the run was not started")
         )
-        self._no_runs.setWordWrap(True)
-        self._no_runs.setFixedWidth(320)
-        column.addWidget(self._no_runs)
-        self._runs = QVBoxLayout()
-        column.addLayout(self._runs)
-        column.addStretch(1)
+        show_meaning(self.problem, "fail")
+        for label in (explanation, self.problem):
+            label.setFixedWidth(WIDTH)
+        return vbox(
+            _heading(tr("Evaluate a sensor")), explanation, top, shapes, sizes, heights, counts,
+            self.summary, self.begin, self.problem, None, spacing=10,
+        )  # fmt: skip
+
+    def _choices(
+        self, kind: str, title: str, choices: Mapping[T, str]
+    ) -> tuple[QGroupBox, dict[T, QCheckBox]]:
+        """Return a group of check boxes, one for each choice."""
+        boxes = {
+            value: named(QCheckBox(text), f"protocol.{kind}.{value}", f"{title}: {text}")
+            for value, text in choices.items()
+        }
+        for box in boxes.values():
+            box.setChecked(True)
+            box.toggled.connect(self._count)
+        group = named(QGroupBox(title), f"protocol.{kind}s", title)
+        hbox(*boxes.values(), None, of=group)
+        return group, boxes
+
+    def _number(self, form: QFormLayout, name: str, label: str, value: int) -> SpinBox:
+        box = named(SpinBox(maximum=99, value=value), f"protocol.{name}", label)
+        box.setAlignment(Qt.AlignmentFlag.AlignRight)
+        box.setFixedWidth(90)
+        box.valueChanged.connect(self._count)
+        form.addRow(label, box)
+        return box
 
     def protocol(self) -> Protocol:
         """Return the chosen settings."""
@@ -186,24 +170,22 @@ class ProtocolSetup(QScrollArea):
         self.calibration.setCurrentIndex(max(self.calibration.findData(before), 0) if good else -1)
         self._count()
 
-    def show_runs(self, runs: Sequence[KnownRun]) -> None:
-        """Offer these runs."""
+    def show_runs(self, runs: Mapping[Path, str]) -> None:
+        """Offer these runs: their folders, and what they are."""
         while self._runs.count():
             old = self._runs.takeAt(0).widget()
             if old is not None:
                 old.setObjectName("")
                 old.deleteLater()
         self._no_runs.setVisible(not runs)
-        for number, run in enumerate(runs[:MOST_RUNS]):
-            button = named(
-                QPushButton(run.text),
-                f"protocol.run.{number}",
-                tr("Continue {run}").format(run=run.text.replace("\n", ", ")),
-                str(run.folder),
-            )
+        for number, (folder, text) in enumerate(list(runs.items())[:MOST_RUNS]):
+            button = push_button(
+                f"protocol.run.{number}", text, lambda folder=folder: self._on_run(folder),
+                accessible=tr("Continue {run}").format(run=text.replace("\n", ", ")),
+                tip=str(folder),
+            )  # fmt: skip
             button.setFixedWidth(320)
             button.setStyleSheet("text-align: left; padding: 6px;")
-            button.clicked.connect(lambda _=False, f=run.folder: self.run_wanted.emit(str(f)))
             self._runs.addWidget(button)
 
     def show_problem(self, sentence: str) -> None:
@@ -238,36 +220,5 @@ def _heading(text: str) -> PlainLabel:
     return label
 
 
-def _choices(
-    kind: str,
-    title: str,
-    choices: Mapping[T, str],
-    column: QVBoxLayout,
-    changed: Callable[[], None],
-) -> dict[T, QCheckBox]:
-    """Return check boxes, one for each choice, in their own group box."""
-    group = named(QGroupBox(title), f"protocol.{kind}s", title)
-    row = QHBoxLayout(group)
-    boxes = {}
-    for value, text in choices.items():
-        box = named(QCheckBox(text), f"protocol.{kind}.{value}", f"{title}: {text}")
-        box.setChecked(True)
-        box.toggled.connect(changed)
-        row.addWidget(box)
-        boxes[value] = box
-    row.addStretch(1)
-    column.addWidget(group)
-    return boxes
-
-
 def _chosen(boxes: Mapping[T, QCheckBox]) -> tuple[T, ...]:
     return tuple(value for value, box in boxes.items() if box.isChecked())
-
-
-def _number(name: str, accessible: str, value: int) -> QSpinBox:
-    box = named(SpinBox(), f"protocol.{name}", accessible)
-    box.setRange(0, 99)
-    box.setValue(value)
-    box.setAlignment(Qt.AlignmentFlag.AlignRight)
-    box.setFixedWidth(90)
-    return box

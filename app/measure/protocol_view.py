@@ -9,13 +9,13 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
 from app.measure.protocol_press import PressingView
 from app.measure.protocol_result import ResultView
-from app.measure.protocol_setup import KnownRun, ProtocolSetup
+from app.measure.protocol_setup import ProtocolSetup
 from app.measure.protocol_work import Equipped, ProtocolWork, equip
 from app.services.jobs import Job, Jobs
 from app.widgets.label import PlainLabel
@@ -60,22 +60,14 @@ class ProtocolView(QWidget):
         self._retiring: list[ProtocolWork] = []
         self._jobs = Jobs("protocol set-up", self)
         self._jobs.refused.connect(self._on_refused)
-        self._stack = QStackedWidget()
-        vbox(self._build_bar(), (self._stack, 1), of=self, margins=0, spacing=0)
-        self.setup = ProtocolSetup()
-        self._stack.addWidget(self.setup)
-        self.setup.begin_wanted.connect(lambda path: self.begin(Path(path)))
-        self.setup.run_wanted.connect(lambda folder: self.open_run(Path(folder)))
-        context.requests.calibrations_changed.connect(self._refresh)
-
-    def _build_bar(self) -> QHBoxLayout:
         self.heading = named(PlainLabel(), "protocol.heading", tr("Current run"))
-        row = hbox(
-            (self.heading, 1),
-            SourceButton(context=self.context, page="protocol", none=tr("No camera")),
-            margins=(12, 6, 12, 6),
-        )
-        return row
+        source = SourceButton(context=context, page="protocol", none=tr("No camera"))
+        self.setup = ProtocolSetup(on_begin=self.begin, on_run=self.open_run)
+        self._stack = QStackedWidget()
+        self._stack.addWidget(self.setup)
+        bar = hbox((self.heading, 1), source, margins=(12, 6, 12, 6))
+        vbox(bar, (self._stack, 1), of=self, margins=0, spacing=0)
+        context.requests.calibrations_changed.connect(self._refresh)
 
     # Called by the parent page
 
@@ -105,27 +97,21 @@ class ProtocolView(QWidget):
     def begin(self, calibration: Path) -> None:
         """Start a new run with the chosen settings."""
         wanted = self.setup.protocol()
-
-        def work(progress: Callable[[float], None]) -> Equipped:
-            progress(0.0)
-            return self._new_run(calibration, wanted)
-
-        self._start(tr("Reading the calibration"), work)
+        self._start(tr("Reading the calibration"), lambda: self._new_run(calibration, wanted))
 
     def open_run(self, folder: Path) -> None:
         """Continue a run."""
 
-        def work(progress: Callable[[float], None]) -> Equipped:
-            progress(0.0)
+        def work() -> Equipped:
             run = open_run(folder)
             return equip(run, self._calibration_of(run.content.calibration))
 
         self._start(tr("Opening the run"), work)
 
-    def _start(self, title: str, work: Callable[[Callable[[float], None]], Equipped]) -> None:
+    def _start(self, title: str, work: Callable[[], Equipped]) -> None:
         self.setup.show_problem("")
         self.setup.begin.setEnabled(False)
-        self._jobs.submit(Job(title, work, self._show_run, self._on_refused))
+        self._jobs.submit(Job(title, lambda _progress: work(), self._show_run))
 
     def _new_run(self, path: Path, wanted: Protocol) -> Equipped:
         calibration = read_calibration(path)
@@ -160,12 +146,18 @@ class ProtocolView(QWidget):
         self.work = ProtocolWork(equipped, self)
         self.work.refused.connect(lambda text: self.context.toasts.show(text, "fail"))
         self.work.evaluated.connect(self._show_result)
-        self.pressing = PressingView(self.work, context=self.context)
-        self.pressing.left.connect(self._leave_run)
-        self.pressing.result_wanted.connect(self._want_result)
-        self.result = ResultView(self.work, context=self.context)
-        self.result.back_wanted.connect(self._show_pressing)
-        self.result.left.connect(self._leave_run)
+        self.pressing = PressingView(
+            self.work,
+            context=self.context,
+            on_leave=self._leave_run,
+            on_result=self._want_result,
+        )
+        self.result = ResultView(
+            self.work,
+            context=self.context,
+            on_back=self._show_pressing,
+            on_leave=self._leave_run,
+        )
         self.work.busy.connect(self.result.show_work)
         self._stack.addWidget(self.pressing)
         self._stack.addWidget(self.result)
@@ -237,7 +229,8 @@ class ProtocolView(QWidget):
         """Show the present calibrations and runs."""
         try:
             self.setup.show_entries(self.context.workspace.entries())
-            self.setup.show_runs([_known(folder) for folder in self.context.workspace.protocols()])
+            folders = self.context.workspace.protocols()
+            self.setup.show_runs({folder: _known(folder) for folder in folders})
         except InputError as refusal:
             self.setup.show_problem(str(refusal))
 
@@ -246,15 +239,15 @@ class ProtocolView(QWidget):
         self._refresh()
 
 
-def _known(folder: Path) -> KnownRun:
-    """Return the list entry of a run. A damaged one is reported when it is opened."""
+def _known(folder: Path) -> str:
+    """Return the text of a run in the list. A damaged one is reported when it is opened."""
     name = f"{folder.parent.parent.name}, {folder.name}"
     try:
         progress = open_run(folder).progress
     except InputError:
-        return KnownRun(folder, tr("{name}\ndamaged: open it to see the reason").format(name=name))
+        return tr("{name}\ndamaged: open it to see the reason").format(name=name)
     if progress.done == progress.total:
         state = tr("complete, {n} presses").format(n=progress.total)
     else:
         state = tr("{done} of {n} presses").format(done=progress.done, n=progress.total)
-    return KnownRun(folder, f"{name}\n{state}")
+    return f"{name}\n{state}"

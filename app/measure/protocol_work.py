@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from app.measure.press_check import ImageMap
 from app.services.jobs import Job, Jobs
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
@@ -28,7 +26,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.evaluation import write_evaluation_files
 from gelpolight_core.translation import tr
 
-_LOG = logging.getLogger(__name__)
+T = TypeVar("T")
 REPORT, LEDGER = "report", "measurements.jsonl"
 
 
@@ -112,7 +110,6 @@ class ProtocolWork(QObject):
         super().__init__(parent)
         self._equipped = equipped
         self.run = equipped.run
-        self.image_map = ImageMap(equipped.reconstructor.calibration)
         self._measure_press = press_measurement(equipped.reconstructor)
         self._outcomes: dict[str, Measurement | str] = {}
         self._jobs = Jobs("protocol", self)
@@ -137,10 +134,7 @@ class ProtocolWork(QObject):
 
     def accept(self, press: PressWanted, frames: Sequence[NDArray[Any]]) -> bool:
         """Save a press and measure it. Return whether it was written to disk."""
-        try:
-            self.run.accept(press, frames)
-        except InputError as refusal:
-            self.refused.emit(str(refusal))
+        if not self._on_disk(lambda: self.run.accept(press, frames)):
             return False
         self._measure(press)
         self.changed.emit()
@@ -161,18 +155,20 @@ class ProtocolWork(QObject):
 
     def evaluate(self) -> None:
         """Compare all presses with their true values, after the running measurements."""
-        ledger = self._equipped.ledger
-
-        def work(progress: Callable[[float], None]) -> Evaluation:
-            progress(0.0)
-            return evaluate_presses(
+        self._do(
+            tr("Evaluating"),
+            lambda: evaluate_presses(
                 self.run.presses,
                 self._measure_press,
                 crossing=self.run.protocol.crossing,
-                ledger=ledger,
-            )
+                ledger=self._equipped.ledger,
+            ),
+            self.evaluated.emit,
+        )
 
-        self._jobs.submit(Job(tr("Evaluating"), work, self.evaluated.emit, self.refused.emit))
+    def _do(self, title: str, work: Callable[[], T], done: Callable[[T], object]) -> None:
+        """Work in the background."""
+        self._jobs.submit(Job(title, lambda _progress: work(), done))
 
     def write_report(
         self,
@@ -196,14 +192,13 @@ class ProtocolWork(QObject):
             Maximum mean absolute errors, planar and in depth, for a pass.
         """
 
-        def work(progress: Callable[[float], None]) -> tuple[Path, ...]:
-            progress(0.1)
+        def write() -> tuple[Path, ...]:
             make_folder(folder)
             return write_evaluation_files(
                 evaluation, folder, calibration=self.calibration, limits_percent=limits_percent
             )
 
-        self._jobs.submit(Job(tr("Writing the report"), work, done, self.refused.emit))
+        self._do(tr("Writing the report"), write, done)
 
     def retire(self) -> None:
         """Stop measuring after the current press, and close. The run can be continued."""
@@ -227,10 +222,6 @@ class ProtocolWork(QObject):
     def _measure(self, press: PressWanted) -> None:
         image, shape, ledger = self.run.image(press), press.truth.shape, self._equipped.ledger
 
-        def work(progress: Callable[[float], None]) -> Measurement | str:
-            progress(0.0)
-            return measure_press(image, shape, self._measure_press, ledger)
-
         def done(outcome: Measurement | str) -> None:
             # It may have been discarded meanwhile.
             if press in self.run.done:
@@ -238,10 +229,14 @@ class ProtocolWork(QObject):
                 self.measured.emit(press, outcome)
                 self.changed.emit()
 
-        self._jobs.submit(Job(tr("Measuring"), work, done, self.refused.emit))
+        measure = self._measure_press
+        self._do(tr("Measuring"), lambda: measure_press(image, shape, measure, ledger), done)
 
-    def _on_disk(self, change: Callable[[], object]) -> None:
+    def _on_disk(self, change: Callable[[], object]) -> bool:
+        """Change the run. Return whether it was written to disk."""
         try:
             change()
         except InputError as refusal:
             self.refused.emit(str(refusal))
+            return False
+        return True

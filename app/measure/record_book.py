@@ -68,7 +68,7 @@ class RecordBook(QObject):
             self.undo.clear()
             self._take(())  # record numbers of the other workspace have another meaning here
         if (folder / NAME).exists():
-            self._do(tr("Reading the records"), _nothing)
+            self.change(tr("Reading the records"), _nothing)
         else:
             self._take(())
 
@@ -100,11 +100,11 @@ class RecordBook(QObject):
                 )
             return number
 
-        self._do(tr("Saving the measurement"), keep, done)
+        self.change(tr("Saving the measurement"), keep, done)
 
     def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
         """Save an evaluation unless it is already there. `done` is called with its number, or 0."""
-        self._do(tr("Saving the evaluation"), lambda records: add_once(records, record), done)
+        self.change(tr("Saving the evaluation"), lambda records: add_once(records, record), done)
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""
@@ -112,33 +112,34 @@ class RecordBook(QObject):
         def each(change: Callable[[Records, int], None]) -> Change:
             return lambda records: [change(records, number) for number in numbers]
 
-        text = tr("remove {n} measurements").format(n=len(numbers))
-        removal = tr("Removing"), each(Records.remove)
-        self.undo.push(_Change(self, text, removal, (tr("Restoring"), each(Records.restore))))
+        if numbers:
+            text = tr("remove {n} measurements").format(n=len(numbers))
+            self.undo.push(_Step(self, text, each(Records.remove), each(Records.restore)))
 
     def write_note(self, number: int, note: str) -> None:
         """Change the note of a measurement. This can be undone."""
         before = next((r.note for r in self.records if r.id == number), "")
-
-        def writing(text: str) -> tuple[str, Change]:
-            return tr("Writing the note"), lambda records: records.update_note(number, text)
-
         if note != before:
-            self.undo.push(_Change(self, tr("edit a note"), writing(note), writing(before)))
+            step = _Step(
+                self,
+                tr("edit a note"),
+                lambda records: records.update_note(number, note),
+                lambda records: records.update_note(number, before),
+            )
+            self.undo.push(step)
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
         """Write a table of all measurements, or of those of one sensor."""
-        self._do(tr("Writing the table"), lambda records: records.export_csv(path, serial), done)
-
-    def change(self, title: str, change: Change) -> None:
-        """Change the records in the background."""
-        self._do(title, change)
+        self.change(tr("Writing the table"), lambda records: records.export_csv(path, serial), done)
 
     def close(self) -> None:
         """Finish the work in progress."""
         self._jobs.close()
 
-    def _do(self, title: str, change: Change, done: Callable[[int], object] | None = None) -> None:
+    def change(
+        self, title: str, change: Change, done: Callable[[int], object] | None = None
+    ) -> None:
+        """Change the records in the background. `done` is called with what `change` returns."""
         workspace = self._context.workspace
         folder = workspace.folder
 
@@ -177,23 +178,17 @@ def _nothing(_records: Records) -> None:
     """Change nothing. The records are read."""
 
 
-class _Change(QUndoCommand):
-    """A change of the records, and the opposite change, each with its title."""
+class _Step(QUndoCommand):
+    """A change of the records that can be undone."""
 
-    def __init__(
-        self,
-        book: RecordBook,
-        text: str,
-        change: tuple[str, Change],
-        opposite: tuple[str, Change],
-    ) -> None:
+    def __init__(self, book: RecordBook, text: str, change: Change, undo: Change) -> None:
         super().__init__(text)
-        self._book, self._change, self._opposite = book, change, opposite
+        self._book, self._change, self._undo = book, change, undo
 
     def redo(self) -> None:
-        """Make the change."""
-        self._book.change(*self._change)
+        """Change the records."""
+        self._book.change(tr("Changing the records"), self._change)
 
     def undo(self) -> None:
-        """Make the opposite change."""
-        self._book.change(*self._opposite)
+        """Undo the change."""
+        self._book.change(tr("Changing the records"), self._undo)

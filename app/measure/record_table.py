@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import (
@@ -32,14 +33,6 @@ _RIGHT = (FIRST, FIRST_ERROR, DEPTH, DEPTH_ERROR)
 _VERDICTS = {PASSED: ("pass", "pass"), FAILED: ("fail", "fail"), DOUBTFUL: ("warn", "warn")}
 
 
-def headers() -> tuple[str, ...]:
-    """Return the column headers."""
-    return (
-        tr("Date"), tr("Sensor"), tr("Object"), tr("Size or figure"), tr("Error"),
-        tr("Depth"), tr("Error"), tr("Verdict"), tr("Operator"), tr("Note"), tr("Image"),
-    )  # fmt: skip
-
-
 def verdict_word(verdict: str) -> str:
     """Return the text of a verdict."""
     words = {PASSED: tr("within limit"), FAILED: tr("outside limit"), DOUBTFUL: tr("doubtful")}
@@ -53,8 +46,10 @@ def shape_label(shape: str) -> str:
     return kind_label(shape.replace("_", "-"))
 
 
-def quantity_text(quantity: Quantity) -> str:
-    """Return a value as text."""
+def quantity_text(quantity: Quantity | None) -> str:
+    """Return a value as text. Empty if there is none."""
+    if quantity is None:
+        return ""
     return value_text(quantity.value, quantity.sd, unit_of(quantity.name))
 
 
@@ -91,13 +86,13 @@ class RecordModel(QAbstractTableModel):
         return 0 if parent.isValid() else len(self.records)
 
     def columnCount(self, parent: Index = NOWHERE) -> int:  # noqa: D102
-        return 0 if parent.isValid() else len(headers())
+        return 0 if parent.isValid() else len(_COLUMNS)
 
     def headerData(  # noqa: D102
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> Any:
         if role == Qt.ItemDataRole.DisplayRole and orientation == Qt.Orientation.Horizontal:
-            return headers()[section]
+            return _COLUMNS[section][0]
         return None
 
     def flags(self, index: Index) -> Qt.ItemFlag:  # noqa: D102
@@ -116,7 +111,7 @@ class RecordModel(QAbstractTableModel):
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:  # noqa: D102
         record, column = self.records[index.row()], index.column()
         if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.EditRole):
-            return _text(record, column)
+            return _COLUMNS[column][1](record)
         if role == SORT:
             return _sort_value(record, column)
         if role == Qt.ItemDataRole.TextAlignmentRole and column in _RIGHT:
@@ -174,38 +169,32 @@ def _quantity(record: MeasurementRecord, column: int) -> Quantity | None:
     return record.quantities[0] if column in (FIRST, FIRST_ERROR) else _depth(record)
 
 
-def _text(record: MeasurementRecord, column: int) -> str:
-    quantity = _quantity(record, column) if column in _RIGHT else None
-    match column:
-        case 0:
-            return record.time.astimezone().strftime("%Y-%m-%d %H:%M")
-        case 1:
-            return record.serial
-        case 2:
-            return shape_label(record.shape)
-        case 3 | 5:
-            return "" if quantity is None else quantity_text(quantity)
-        case 4 | 6:
-            return error_text(quantity)
-        case 7:
-            return verdict_word(record.verdict)
-        case 8:
-            return record.operator
-        case 9:
-            return record.note
-    return record.picture
+_COLUMNS: tuple[tuple[str, Callable[[MeasurementRecord], str]], ...] = (
+    (tr("Date"), lambda record: record.time.astimezone().strftime("%Y-%m-%d %H:%M")),
+    (tr("Sensor"), lambda record: record.serial),
+    (tr("Object"), lambda record: shape_label(record.shape)),
+    (tr("Size or figure"), lambda record: quantity_text(record.quantities[0])),
+    (tr("Error"), lambda record: error_text(record.quantities[0])),
+    (tr("Depth"), lambda record: quantity_text(_depth(record))),
+    (tr("Error"), lambda record: error_text(_depth(record))),
+    (tr("Verdict"), lambda record: verdict_word(record.verdict)),
+    (tr("Operator"), lambda record: record.operator),
+    (tr("Note"), lambda record: record.note),
+    (tr("Image"), lambda record: record.picture),
+)
+"""Header of each column, and its text."""
 
 
 def _sort_value(record: MeasurementRecord, column: int) -> Any:
-    quantity = _quantity(record, column) if column in _RIGHT else None
     if column == TIME:
         return record.time.timestamp()
-    if column in (FIRST, DEPTH):
-        return -1e9 if quantity is None else quantity.value
-    if column in (FIRST_ERROR, DEPTH_ERROR):
-        error = None if quantity is None else quantity.error_percent
-        return -1e9 if error is None else error
-    return _text(record, column)
+    if column not in _RIGHT:
+        return _COLUMNS[column][1](record)
+    quantity = _quantity(record, column)
+    value = None
+    if quantity is not None:
+        value = quantity.value if column in (FIRST, DEPTH) else quantity.error_percent
+    return -1e9 if value is None else value
 
 
 def _tip(record: MeasurementRecord) -> str:

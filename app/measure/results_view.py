@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -10,13 +11,10 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
     QFileDialog,
-    QHBoxLayout,
     QHeaderView,
-    QPushButton,
     QSplitter,
     QStackedWidget,
     QTableView,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -32,11 +30,11 @@ from app.measure.record_table import (
     RecordModel,
     shape_label,
 )
-from app.theme.icons import icon
 from app.widgets.actions import make_action
+from app.widgets.buttons import push_button
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
-from app.widgets.layout import vbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.statistics import Statistics, statistics_of
@@ -61,21 +59,40 @@ class ResultsView(QWidget):
         named(self, "measure.results", tr("Records"))
         self._book, self._context = book, context
         self.model = RecordModel()
+        self.model.note_written.connect(book.write_note)
         self.filter = RecordFilter(self.model)
         self.sensor = named(ComboBox(), "measure.results.sensor", tr("Sensor"))
         self.shape = named(ComboBox(), "measure.results.shape", tr("Object"))
-        self.export = _button("export", tr("&Export as CSV…"), "copy")
-        self.remove = _button("remove", tr("&Delete"), "remove")
+        for box in (self.sensor, self.shape):
+            box.activated.connect(self._on_filter)
+        self.export_action = make_action(
+            self, "records.export", tr("Records as CSV…"), self.choose_export
+        )
+        self.export = push_button(
+            "measure.results.export", tr("&Export as CSV…"), self.choose_export, icon_name="copy"
+        )
+        self.remove = push_button(
+            "measure.results.remove", tr("&Delete"), self.remove_selected, icon_name="remove"
+        )
+        for button in (self.export, self.remove):
+            button.setAutoDefault(False)
+        for name, text, slot, keys in (
+            ("undo", tr("Undo in the records"), book.undo.undo, ("Ctrl+Z",)),
+            ("redo", tr("Redo in the records"), book.undo.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
+            ("delete", tr("Delete measurements"), self.remove_selected, ("Delete",)),
+        ):
+            make_action(self, f"records.{name}", text, slot, keys=keys)
         self.count = named(PlainLabel(), "measure.results.count", tr("Number of records shown"))
         self.table = self._make_table()
-        self.statistics = named(MarkupLabel(), "measure.results.statistics", tr("Statistics"))
-        self.statistics.setWordWrap(True)
+        self.statistics = named(
+            MarkupLabel(wrap=True), "measure.results.statistics", tr("Statistics")
+        )
         self.statistics.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         self.drift = ErrorPlot()
         self.drift_title = named(PlainLabel(), "measure.results.drift_title", tr("Error over time"))
         self._lay_out()
-        self._connect()
+        book.changed.connect(self.refresh)
         self.refresh()
 
     def _make_table(self) -> QTableView:
@@ -95,27 +112,18 @@ class ResultsView(QWidget):
         header.setSectionResizeMode(IMAGE, QHeaderView.ResizeMode.Interactive)
         header.resizeSection(IMAGE, IMAGE_WIDTH)
         table.setTabKeyNavigation(False)
+        table.selectionModel().selectionChanged.connect(lambda *_: self._describe())
         return table
 
     def _lay_out(self) -> None:
-        self.setLayout(QVBoxLayout())
-        bar = QHBoxLayout()
-        bar.setContentsMargins(8, 6, 8, 6)
-        bar.setSpacing(8)
-        for text, box in ((tr("Sensor"), self.sensor), (tr("Object"), self.shape)):
-            bar.addWidget(PlainLabel(text))
-            bar.addWidget(box)
-        bar.addWidget(self.count)
-        bar.addStretch(1)
-        for widget in (self.remove, self.export):
-            bar.addWidget(widget)
-        left = QWidget()
-        vbox((self.statistics, 1), of=left, margins=(10, 4, 10, 4))
-        right = QWidget()
-        vbox(self.drift_title, (self.drift, 1), of=right, margins=(0, 0, 8, 4))
         below = QSplitter(Qt.Orientation.Horizontal)
-        below.addWidget(left)
-        below.addWidget(right)
+        for parts, margins in (
+            (((self.statistics, 1),), (10, 4, 10, 4)),
+            ((self.drift_title, (self.drift, 1)), (0, 0, 8, 4)),
+        ):
+            side = QWidget()
+            vbox(*parts, of=side, margins=margins)
+            below.addWidget(side)
         below.setSizes([470, 700])
         self.split = QSplitter(Qt.Orientation.Vertical)
         self.split.addWidget(self.table)
@@ -131,31 +139,11 @@ class ResultsView(QWidget):
         self.stack = QStackedWidget()
         self.stack.addWidget(empty)
         self.stack.addWidget(self.split)
-        column = self.layout()
-        assert isinstance(column, QVBoxLayout)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(bar)
-        column.addWidget(self.stack, 1)
-
-    def _connect(self) -> None:
-        self._book.changed.connect(self.refresh)
-        self.model.note_written.connect(self._book.write_note)
-        for box in (self.sensor, self.shape):
-            box.activated.connect(self._on_filter)
-        self.table.selectionModel().selectionChanged.connect(lambda *_: self._describe())
-        self.remove.clicked.connect(self.remove_selected)
-        self.export_action = make_action(
-            self, "records.export", tr("Records as CSV…"), self.choose_export
-        )
-        self.export.clicked.connect(self.export_action.trigger)
-        stack = self._book.undo
-        for name, text, slot, keys in (
-            ("undo", tr("Undo in the records"), stack.undo, ("Ctrl+Z",)),
-            ("redo", tr("Redo in the records"), stack.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
-            ("delete", tr("Delete measurements"), self.remove_selected, ("Delete",)),
-        ):
-            make_action(self, f"records.{name}", text, slot, keys=keys)
+        bar = hbox(
+            PlainLabel(tr("Sensor")), self.sensor, PlainLabel(tr("Object")), self.shape,
+            self.count, None, self.remove, self.export, margins=(8, 6, 8, 6), spacing=8,
+        )  # fmt: skip
+        vbox(bar, (self.stack, 1), of=self, margins=0, spacing=0)
 
     # What is shown
 
@@ -275,11 +263,8 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
         found = [record.quantity(quantity.name) for record in group]
         values = [q.value for q in found if q is not None]
         errors = [q.error_percent for q in found if q is not None and q.error_percent is not None]
-        rows.append(_row(quantity.name, statistics_of(values), errors))
-    head = "".join(
-        f"<th align='right' style='padding-left: 12px'>{text}</th>"
-        for text in (tr("mean"), tr("sd"), tr("spread"), tr("repeatability"), tr("mean error"))
-    )
+        rows.append(_row("td", *_cells(quantity.name, statistics_of(values), errors)))
+    heads = tr("mean"), tr("sd"), tr("spread"), tr("repeatability"), tr("mean error")
     note = tr(
         "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
     )
@@ -288,29 +273,22 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
             "Statistics need at least two measurements. Press the object again and save the "
             "result, too."
         )
-    table = f"<table><tr><th></th>{head}</tr>{''.join(rows)}</table>"
+    table = f"<table>{_row('th', '', heads)}{''.join(rows)}</table>"
     return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
 
 
-def _row(name: str, found: Statistics, errors: list[float]) -> str:
+def _cells(name: str, found: Statistics, errors: list[float]) -> tuple[str, list[str]]:
+    """Return label and figures of a quantity."""
     label, _, unit = name.rpartition("_")
-    error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
     cells = [
         f"{value:.4f}" if math.isfinite(value) else "-"
         for value in (found.mean, found.sd, found.spread, found.repeatability)
     ]
-    label = f"{label.replace('_', ' ')} ({unit})"
-    return (
-        f"<tr><td>{escaped(label)}</td>"
-        + "".join(
-            f"<td align='right' style='padding-left: 12px'>{cell}</td>" for cell in (*cells, error)
-        )
-        + "</tr>"
-    )
+    error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
+    return f"{label.replace('_', ' ')} ({unit})", [*cells, error]
 
 
-def _button(name: str, text: str, icon_name: str) -> QPushButton:
-    button = named(QPushButton(text), f"measure.results.{name}", text.replace("&", ""))
-    button.setIcon(icon(icon_name))
-    button.setAutoDefault(False)
-    return button
+def _row(tag: str, label: str, cells: Sequence[str]) -> str:
+    start = f"<{tag} align='right' style='padding-left: 12px'>"
+    row = "".join(f"{start}{cell}</{tag}>" for cell in cells)
+    return f"<tr><{tag} align='left'>{escaped(label)}</{tag}>{row}</tr>"

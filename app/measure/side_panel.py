@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QScrollArea,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,6 +24,7 @@ from app.measure.truth_form import TruthForm
 from app.measure.work import Work
 from app.theme.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.layout import vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.tools import ToolResult
@@ -38,27 +38,15 @@ KEY = Qt.ItemDataRole.UserRole
 
 
 class SidePanel(QScrollArea):
-    """Shows the results of the tools.
+    """Shows the results of the tools. Its buttons are connected by its owner.
 
     Signals
     -------
-    propose_wanted()
-        The user wants to detect the object.
     tool_chosen(int)
         A tool was chosen in the list: its key.
-    remove_wanted()
-        The user wants to remove the chosen tool.
-    keep_wanted()
-        The user wants to save the chosen tool's result to the records.
-    records_wanted()
-        The user wants to see the records.
     """
 
-    propose_wanted = Signal()
     tool_chosen = Signal(int)
-    remove_wanted = Signal()
-    keep_wanted = Signal()
-    records_wanted = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -68,48 +56,30 @@ class SidePanel(QScrollArea):
         self.setFixedWidth(WIDTH)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.propose = _button("propose", tr("&Detect object"), "propose", "Q")
-        self.propose.clicked.connect(self.propose_wanted)
         self.tools = named(QListWidget(), "measure.tools", tr("Tools on the image"))
         self.tools.setMinimumHeight(LIST_HEIGHT)
         self.tools.setMaximumHeight(TALL_LIST)
         self.tools.currentItemChanged.connect(self._on_tool)
         self.remove = _button("remove", tr("Remove the tool"), "remove", "Del")
-        self.remove.clicked.connect(self.remove_wanted)
         self.figures = _figures_table()
-        self.reason = named(PlainLabel(), "measure.reason", tr("Why the result is doubtful"))
-        self.reason.setWordWrap(True)
+        self.reason = named(
+            PlainLabel(wrap=True), "measure.reason", tr("Why the result is doubtful")
+        )
         self.truth = TruthForm()
         self.operator = named(QLineEdit(), "measure.operator", tr("Operator"))
         self.note = named(QLineEdit(), "measure.note", tr("Note"))
         self.note.setPlaceholderText(tr("Any remark"))
         self.keep = _button("keep", tr("Sa&ve to records"), "keep", "Ctrl+Return")
         self.keep.setMinimumHeight(36)
-        self.keep.clicked.connect(self.keep_wanted)
-        self.kept = named(MarkupLabel(), "measure.kept", tr("Last saved result"))
-        self.kept.setWordWrap(True)
-        self.kept.linkActivated.connect(lambda _link: self.records_wanted.emit())
-        self._lay_out()
-
-    def _lay_out(self) -> None:
-        inside = QWidget()
-        column = QVBoxLayout(inside)
-        column.setContentsMargins(10, 8, 10, 8)
+        self.kept = named(MarkupLabel(wrap=True), "measure.kept", tr("Last saved result"))
         form = QFormLayout()
         form.addRow(tr("Operator"), self.operator)
         form.addRow(tr("Note"), self.note)
-        for widget in (
-            self.propose,
-            self.tools,
-            self.remove,
-            self.figures,
-            self.reason,
-            self.truth,
-        ):
-            column.addWidget(widget, 1 if widget is self.tools else 0)
-        column.addLayout(form)
-        column.addWidget(self.keep)
-        column.addWidget(self.kept)
-        column.addStretch(1)
+        inside = QWidget()
+        vbox(
+            self.propose, (self.tools, 1), self.remove, self.figures, self.reason, self.truth,
+            form, self.keep, self.kept, None, of=inside, margins=(10, 8, 10, 8),
+        )  # fmt: skip
         self.setWidget(inside)
 
     def show_work(self, work: Work, *, known: bool) -> None:
@@ -164,13 +134,12 @@ class SidePanel(QScrollArea):
         figures = found.figures if isinstance(found, ToolResult) else ()
         self.figures.setRowCount(len(figures))
         for row, figure in enumerate(figures):
-            label, value = QTableWidgetItem(figure.label), QTableWidgetItem(figure_text(figure))
+            value = QTableWidgetItem(figure_text(figure))
             value.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            if row == 0:
-                font = value.font()
-                font.setBold(True)
-                value.setFont(font)
-            self.figures.setItem(row, 0, label)
+            font = value.font()
+            font.setBold(row == 0)
+            value.setFont(font)
+            self.figures.setItem(row, 0, QTableWidgetItem(figure.label))
             self.figures.setItem(row, 1, value)
         height = self.figures.verticalHeader().length() + 2 * self.figures.frameWidth()
         self.figures.setFixedHeight(

@@ -74,16 +74,10 @@ class ToolMap(QWidget):
         self.tools = Palette(self)
         self.hint = named(PlainLabel(), "measure.hint", tr("What to do next on the map"))
         self.readout = named(PlainLabel(), "measure.readout", tr("Values under the pointer"))
-        self._lay_out()
-        self._connect()
-
-    def _lay_out(self) -> None:
         foot = hbox((self.hint, 1), self.readout, margins=(8, 2, 8, 2))
         right = vbox((self.panel, 1), foot, spacing=0)
         hbox(self.tools, (right, 1), of=self, margins=0, spacing=0)
-
-    def _connect(self) -> None:
-        self.tools.chosen.connect(self._on_kind)
+        self.tools.chosen.connect(self._place)
         self.layer.clicked.connect(self._on_point)
         self.layer.chosen.connect(self._work.choose)
         self.layer.grip_chosen.connect(self._on_grip)
@@ -123,13 +117,11 @@ class ToolMap(QWidget):
 
     def cancel_placing(self) -> None:
         """Stop placing a tool."""
-        self._kind, self._points = "", []
-        self.layer.placing = False
-        self.layer.show_begun(())
+        self._place("")
         self.tools.deselect()
-        self._report()
 
-    def _on_kind(self, name: str) -> None:
+    def _place(self, name: str) -> None:
+        """Begin to place a tool. Empty: none."""
         self._kind, self._points = name, []
         self.layer.placing = bool(name)
         self.layer.show_begun(())
@@ -176,7 +168,7 @@ class ToolMap(QWidget):
 
     def _draw(self) -> None:
         work = self._work
-        drawn = tuple(_drawn(*item, work.results.get(item[0])) for item in work.sheet.items())
+        drawn = tuple(_drawn(k, tool, work.results.get(k)) for k, tool in work.sheet.items())
         grips = () if work.tool is None else grips_of(work.tool)
         self.layer.show_tools(drawn, work.chosen, grips, work.grip)
         self.drawn.emit(drawn, work.chosen)
@@ -235,7 +227,5 @@ def _drawn(key: int, tool: Tool, found: ToolResult | str | None) -> DrawnTool:
         lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
         state = "ok" if found.verdict == "ok" else "doubtful"
         return DrawnTool(key, lines, state, figure_text(found.figures[0]))
-    lines = outline_of(tool)
-    if not lines:
-        lines = (tuple(grip.at_mm for grip in grips_of(tool)),)
+    lines = outline_of(tool) or (tuple(grip.at_mm for grip in grips_of(tool)),)
     return DrawnTool(key, lines, "refused" if isinstance(found, str) else "ok", "")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QFormLayout,
     QGroupBox,
     QPushButton,
@@ -27,19 +26,18 @@ from gelpolight_core.translation import tr
 class TruthForm(QGroupBox):
     """The true values: typed, or those of a known indenter.
 
+    Attributes
+    ----------
+    edit, limits : QPushButton
+        To edit the list of indenters, and the limits. Connected by the page.
+
     Signals
     -------
     changed()
         The true values changed.
-    indenters_wanted()
-        The user wants to edit the list of indenters.
-    limits_wanted()
-        The user wants to edit the limits.
     """
 
     changed = Signal()
-    indenters_wanted = Signal()
-    limits_wanted = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr("True size"), parent)
@@ -49,49 +47,49 @@ class TruthForm(QGroupBox):
         self._before: dict[str, Stated] = {}
         self._indenters: tuple[Indenter, ...] = ()
         self.known = named(ComboBox(), "measure.truth.known", tr("Known indenter"))
-        self.size_on = named(
-            QCheckBox(tr("Diameter")), "measure.truth.size_on", tr("Use the true size")
-        )
-        self.size = _spin("measure.truth.size", tr("True size"), 5.0)
-        self.height_on = named(
-            QCheckBox(tr("Depth")), "measure.truth.height_on", tr("Use the true depth")
-        )
-        self.height = _spin("measure.truth.height", tr("True depth"), 1.0)
-        self.again = named(
-            QPushButton(tr("Same object as before")),
-            "measure.truth.again",
-            tr("Use the true values of the previous press"),
-            tr("True values are not copied to the next press automatically"),
-        )
-        self.again.setAutoDefault(False)
-        self.again.clicked.connect(self._use_again)
-        self.verdict = named(MarkupLabel(), "measure.truth.verdict", tr("Error and verdict"))
-        self.verdict.setWordWrap(True)
-        self._lay_out()
-        for box, spin in ((self.size_on, self.size), (self.height_on, self.height)):
-            spin.setEnabled(False)
-            box.toggled.connect(spin.setEnabled)
-            box.toggled.connect(self._on_typed)
-            spin.valueChanged.connect(self._on_typed)
         self.known.activated.connect(self._on_known)
-        self.show_kind("", "", "mm")
-
-    def _lay_out(self) -> None:
-        edit = named(
-            QPushButton(tr("Edit list…")), "measure.truth.edit", tr("Edit the known indenters")
-        )
-        edit.clicked.connect(self.indenters_wanted)
-        limits = named(QPushButton(tr("Limits…")), "measure.truth.limits", tr("Edit the limits"))
-        limits.clicked.connect(self.limits_wanted)
-        for button in (edit, limits):
-            button.setAutoDefault(False)
         self._form = QFormLayout()
         self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         self._form.addRow(self.known)
-        self._form.addRow(self.size_on, self.size)
-        self._form.addRow(self.height_on, self.height)
-        row = hbox(edit, limits, None)
-        vbox(self._form, self.again, row, self.verdict, of=self)
+        self.size_on, self.size = self._add_length(
+            "size", tr("Diameter"), tr("Use the true size"), tr("True size"), 5.0
+        )
+        self.height_on, self.height = self._add_length(
+            "height", tr("Depth"), tr("Use the true depth"), tr("True depth"), 1.0
+        )
+        self.again = _button(
+            "again",
+            tr("Same object as before"),
+            tr("Use the true values of the previous press"),
+            tr("True values are not copied to the next press automatically"),
+        )
+        self.again.clicked.connect(self._use_again)
+        self.edit = _button("edit", tr("Edit list…"), tr("Edit the known indenters"))
+        self.limits = _button("limits", tr("Limits…"), tr("Edit the limits"))
+        self.verdict = named(
+            MarkupLabel(wrap=True), "measure.truth.verdict", tr("Error and verdict")
+        )
+        buttons = hbox(self.edit, self.limits, None)
+        vbox(self._form, self.again, buttons, self.verdict, of=self)
+        self.show_kind("", "", "mm")
+
+    def _add_length(
+        self, name: str, text: str, use: str, accessible: str, value: float
+    ) -> tuple[QCheckBox, DoubleSpinBox]:
+        """Add the row of a length, which is used if its box is checked."""
+        box = named(QCheckBox(text), f"measure.truth.{name}_on", use)
+        spin = named(
+            DoubleSpinBox(decimals=3, minimum=0.001, maximum=500.0, singleStep=0.1, value=value),
+            f"measure.truth.{name}",
+            accessible,
+        )
+        spin.setSuffix(UNITS["mm"])
+        spin.setEnabled(False)
+        box.toggled.connect(spin.setEnabled)
+        box.toggled.connect(self._on_typed)
+        spin.valueChanged.connect(self._on_typed)
+        self._form.addRow(box, spin)
+        return box, spin
 
     # True values
 
@@ -201,11 +199,7 @@ class TruthForm(QGroupBox):
         return None
 
     def _on_known(self) -> None:
-        found = self._listed(self._kind, self.known.currentData())
-        if found is not None:
-            self._show(found)
-        self._offer_again()
-        self.changed.emit()
+        self.state(self._listed(self._kind, self.known.currentData()) or self.stated)
 
     def _on_typed(self) -> None:
         # The typed values no longer match the list.
@@ -248,11 +242,7 @@ def _sentence(row: Judged) -> str:
     )
 
 
-def _spin(name: str, accessible: str, value: float) -> QDoubleSpinBox:
-    box = named(DoubleSpinBox(), name, accessible)
-    box.setDecimals(3)
-    box.setRange(0.001, 500.0)
-    box.setSingleStep(0.1)
-    box.setSuffix(UNITS["mm"])
-    box.setValue(value)
-    return box
+def _button(name: str, text: str, accessible: str, tip: str = "") -> QPushButton:
+    button = named(QPushButton(text), f"measure.truth.{name}", accessible, tip)
+    button.setAutoDefault(False)
+    return button

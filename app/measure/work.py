@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.measure.grips import grips_of, moved
-from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring, Sheet
+from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.placing import kind_label
 from app.services.newest_wins import NewestWins
 from gelpolight_core.errors import InputError
@@ -20,6 +20,8 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
+Sheet = Mapping[int, Tool]
+"""The tools on the image by their keys, in the order of their placement. It is never changed."""
 _LOG = logging.getLogger(__name__)
 POLL_MS = 30
 STOP_S = 30.0
@@ -39,6 +41,8 @@ class Work(QObject):
         Key of the chosen tool. 0 for none.
     grip : str
         Its grip that the keys move. Empty for none.
+    busy : bool
+        Whether a measurement is running.
 
     Signals
     -------
@@ -72,17 +76,16 @@ class Work(QObject):
         self._reconstructor: Reconstructor | None = None
         self._propose = False
         self._detected = 0
-        self._busy = False
+        self.busy = False
         self._worker: NewestWins[MeasureRequest | None, ImageResults | None] | None = None
-        self._timer = QTimer(self)
-        self._timer.setInterval(POLL_MS)
+        self._timer = QTimer(self, interval=POLL_MS)
         self._timer.timeout.connect(self._poll)
 
     # State
 
     @property
     def sheet(self) -> Sheet:
-        """The tools by their keys, including a drag in progress."""
+        """The tools, including a drag in progress."""
         return self._sheet if self._preview is None else self._preview
 
     @property
@@ -105,11 +108,6 @@ class Work(QObject):
         """Current result of the chosen tool."""
         found = self.results.get(self.chosen)
         return found if isinstance(found, ToolResult) and found.tool == self.tool else None
-
-    @property
-    def busy(self) -> bool:
-        """Whether a measurement is running."""
-        return self._busy
 
     # The image
 
@@ -136,7 +134,7 @@ class Work(QObject):
     @property
     def detecting(self) -> bool:
         """Whether the pressed object is being detected."""
-        return self._propose and self._busy
+        return self._propose and self.busy
 
     def propose(self) -> None:
         """Detect the pressed object. While this runs, a further request changes nothing."""
@@ -149,25 +147,25 @@ class Work(QObject):
 
     def add(self, tool: Tool) -> int:
         """Add a tool to the image and choose it. Return its key."""
-        self._preview = None
         key = max(self._sheet, default=0) + 1
-        text = tr("add {tool}").format(tool=kind_label(tool.name))
-        self.undo.push(_Edit(self, {**self._sheet, key: tool}, key, text))
+        self._edit(tr("add {tool}"), tool, {**self._sheet, key: tool}, key)
         return key
 
     def change(self, key: int, tool: Tool, *, nudge: bool = False) -> None:
         """Replace a tool. Successive key moves of one grip are one undo step."""
-        self._preview = None
-        text = tr("move {tool}").format(tool=kind_label(tool.name))
-        self.undo.push(_Edit(self, {**self._sheet, key: tool}, key, text, nudge=nudge))
+        self._edit(tr("move {tool}"), tool, {**self._sheet, key: tool}, key, nudge=nudge)
 
     def remove(self, key: int) -> None:
         """Remove a tool from the image."""
+        rest = dict(self._sheet)
+        tool = rest.pop(key, None)
+        if tool is not None:
+            self._edit(tr("remove {tool}"), tool, rest, 0)
+
+    def _edit(self, text: str, tool: Tool, after: Sheet, key: int, *, nudge: bool = False) -> None:
         self._preview = None
-        if key in self._sheet:
-            text = tr("remove {tool}").format(tool=kind_label(self._sheet[key].name))
-            left = {other: tool for other, tool in self._sheet.items() if other != key}
-            self.undo.push(_Edit(self, left, 0, text))
+        text = text.format(tool=kind_label(tool.name))
+        self.undo.push(_Edit(self, after, key, text, nudge=nudge))
 
     def drag(self, grip: str, to_mm: tuple[float, float]) -> None:
         """Show the chosen tool with a grip moved, during a drag."""
@@ -238,10 +236,12 @@ class Work(QObject):
         if self._worker.idle:
             self._timer.stop()
             self._say_busy(False)
-        if finished is None or finished.request is None:
+        request, maker = None if finished is None else finished.request, self._reconstructor
+        if finished is None or request is None or maker is None:
             return
-        if not self._is_of_now(finished.request):
-            return
+        made = request.calibration is maker.calibration and request.model == maker.model
+        if not made or request.image is not self.image:
+            return  # about an earlier image or calibration
         if isinstance(finished.error, InputError):
             self.refused.emit(str(finished.error))
         elif finished.error is not None:
@@ -249,17 +249,7 @@ class Work(QObject):
             kind = type(finished.error).__name__
             self.refused.emit(tr("Internal error: {k}. See the log for details.").format(k=kind))
         elif finished.result is not None:
-            self._show(finished.request, finished.result)
-
-    def _is_of_now(self, request: MeasureRequest) -> bool:
-        """Return whether a request is about the current image and calibration."""
-        maker = self._reconstructor
-        return (
-            maker is not None
-            and request.calibration is maker.calibration
-            and request.model == maker.model
-            and request.image is self.image
-        )
+            self._show(request, finished.result)
 
     def _show(self, request: MeasureRequest, image_results: ImageResults) -> None:
         before, self.image_results = self.image_results, image_results
@@ -275,7 +265,7 @@ class Work(QObject):
         if proposal is not None:
             kind = {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}
             tool = kind[proposal.candidates[0]](proposal.at_mm)
-            if self._detected not in self._sheet:
+            if self._sheet.get(self._detected) is None:
                 self._detected = self.add(tool)
             else:
                 # The same image has the same object: its tool remains, even if it was moved.
@@ -283,8 +273,8 @@ class Work(QObject):
         self.proposed.emit(proposal)
 
     def _say_busy(self, busy: bool) -> None:
-        if busy != self._busy:
-            self._busy = busy
+        if busy != self.busy:
+            self.busy = busy
             self.busy_changed.emit(busy)
 
 

@@ -29,14 +29,13 @@ class PlainLabel(QLabel):
     parent : QWidget, optional
         Parent of the label.
     wrap : bool, optional
-        Whether long lines are wrapped.
+        Whether long lines are wrapped at words.
     """
 
     def __init__(
         self, text: str = "", parent: QWidget | None = None, *, wrap: bool = False
     ) -> None:
-        super().__init__(parent)
-        self.setWordWrap(wrap)
+        super().__init__(parent, wordWrap=wrap)
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setText(text)
 
@@ -54,14 +53,13 @@ class MarkupLabel(QLabel):
     parent : QWidget, optional
         Parent of the label.
     wrap : bool, optional
-        Whether long lines are wrapped.
+        Whether long lines are wrapped at words.
     """
 
     def __init__(
         self, markup: str = "", parent: QWidget | None = None, *, wrap: bool = False
     ) -> None:
-        super().__init__(parent)
-        self.setWordWrap(wrap)
+        super().__init__(parent, wordWrap=wrap)
         self._markup = ""
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setText(markup)

@@ -59,8 +59,8 @@ def test_a_press_becomes_a_depth_map_in_every_format(
     calibration: Path, press: Path, tmp_path: Path
 ) -> None:
     arguments = ["reconstruct", str(calibration), str(press), "-o", str(tmp_path / "out")]
-    formats = "npz,tif,vtp,ply,stl,gsf,png"
-    assert main([*arguments, "--format", formats, "--model", "paper", "--pictures"]) == 0
+    formats = "npz,tif,vtp,ply,stl,gsf,png,preview"
+    assert main([*arguments, "--format", formats, "--model", "paper"]) == 0
     names = sorted(p.name for p in (tmp_path / "out").iterdir())
     endings = ("depth.png", "gsf", "npz", "ply", "png", "stl", "tif", "vtp")
     assert names == [f"{press.stem}.{e}" for e in endings]

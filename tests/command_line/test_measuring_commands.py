@@ -22,7 +22,7 @@ def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
 ) -> None:
     file, again = tmp_path / "step.json", tmp_path / "again.json"
     arguments = ["measure", str(calibration), str(press)]
-    places = ["--at", "-6", "-6", "0,0", "--size", "1", "1", "--yaw", "10"]
+    places = ["--at", "-6", "-6", "0,0", "--size", "1", "1", "10"]
     assert main([*arguments, "--tool", "step-height", *places, "--json", str(file)]) == 0
     assert "step height" in capsys.readouterr().out
     content = json.loads(file.read_text())
@@ -33,7 +33,7 @@ def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
     plain = {k: v for k, v in stored.items() if k not in ("figures", "verdict", "reason")}
     assert result_as_dict(tool_from_dict(plain).apply(heightmap)) == stored
     assert (content["image"], content["calibration_id"]) == (press.name, made.identity)
-    assert main([*arguments, "--tools", str(file), "--json", str(again)]) == 0
+    assert main([*arguments, "--tool", str(file), "--json", str(again)]) == 0
     assert json.loads(again.read_text()) == content
 
 
@@ -110,7 +110,8 @@ def test_the_object_is_selected_by_a_point_in_both_notations(
     seed: list[str],
     place: str,
 ) -> None:
-    arguments = ("measure", "--shape", "cylinder", "--seed", *seed, str(calibration), str(press))
+    arguments = ("measure", "--shape", "cylinder", str(calibration), str(press))
+    arguments = (*arguments, "--at", *seed)
     assert f"no object lies at the seed point {place} mm" in refusal(capsys, *arguments)
 
 
@@ -141,18 +142,18 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
 @pytest.mark.parametrize(
     ("arguments", "output"),
     [
-        (["--tool", "distance", "--at", "1", "2"], "points: 1"),
+        (["--tool", "distance", "--at", "1", "2"], "b_mm is missing"),
         (["--tool", "distance", "--at", "1", "2", "3"], "Number of values: 3"),
+        (["--tool", "distance", "--at", "1", "2", "3", "4", "5", "6"], "points: 3"),
         (["--tool", "rectangle", "--at", "1", "2"], "--size"),
         (["--tool", "pit", "--at", "1", "2"], "--size"),
-        (["--tool", "scratch", "--at", "1", "2"], "points: 1"),
-        (["--tool", "edge-radius", "--at", "1", "2", "3", "4", "--level", "1"], "--level"),
-        (["--tool", "circle", "--at", "1", "2", "3", "4", "5", "7", "--yaw", "3"], "--yaw"),
-        (["--tool", "profile-step", "--at", "1", "2", "3", "4", "--range", "1", "2"], "needs 4"),
-        (["--tools", "nowhere.json"], "cannot be read as JSON"),
-        (["--shape", "ball", "--at", "1", "2"], "cannot be used with --shape"),
+        (["--tool", "edge-radius", "--at", "1,2", "3,4", "--set", "level_mm=1"], "level_mm"),
+        (["--tool", "edge-radius", "--at", "1,2", "3,4", "--set", "width_mm=wide"], "is 'wide'"),
+        (["--tool", "circle", "--at", "1", "2", "3", "4", "5", "7", "--size", "3"], "--size"),
+        (["--tool", "profile-step", "--at", "1,2", "3,4", "--set", "first_mm=1,2"], "second_mm"),
+        (["--tool", "nowhere.json"], "nor a JSON file"),
+        (["--shape", "ball", "--size", "1", "2"], "cannot be used with --shape"),
         (["--tool", "ball", "--truth", "truth.csv"], "--truth"),
-        (["--tool", "ball", "--seed", "1", "2"], "--seed: "),
     ],
 )
 def test_a_tool_that_is_not_described_is_refused_in_one_line(

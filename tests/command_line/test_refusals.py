@@ -159,7 +159,7 @@ def test_no_result_overwrites_its_input(
     measure = ("measure", str(cal), str(image), "--shape", "ball", "--json")
     both = ("-o", str(tmp_path / "x"), "--json", str(tmp_path / "x"))
     for arguments in (
-        ("reconstruct", str(cal), str(image), "-o", str(tmp_path), "--pictures"),
+        ("reconstruct", str(cal), str(image), "-o", str(tmp_path), "--format", "preview"),
         (*measure, str(cal)),
         (*measure, str(image)),
         (*measure, str(tmp_path / "link.gplcal")),

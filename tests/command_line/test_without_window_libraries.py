@@ -69,7 +69,7 @@ def test_images_become_depth_maps_and_sizes(blocked: dict[str, str], tmp_path: P
         assert cv2.imwrite(str(tmp_path / "press.png"), opened.frame(1).rgb[..., ::-1])
     (tmp_path / "commands.py").write_text(COMMANDS)
     lines = f"""inspect {sensor / "first.gplcal"}
-reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif --pictures
+reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif,preview
 measure {sensor / "first.gplcal"} press.png --shape cylinder --json measured.json
 batch {sensor / "first.gplcal"} press.png {recording} -o batch
 benchmark {sensor / "first.gplcal"} press.png --json times.json --model paper

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.measure.judging import Kept, Stated, judge, record_of
+from app.measure.judging import Stated, judge, record_of
 from app.services.preferences import Limits
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED
+from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED, MeasurementRecord
 
 LENGTHS = st.floats(0.01, 50.0)
 FIT = Measurement(
@@ -42,7 +42,7 @@ PRESSED = ToolResult(
 APART = ToolResult(Distance((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", "distance"),), ())
 
 
-def _kept(result: ToolResult, stated: Stated, limits: Limits | None = None) -> Kept:
+def _record(result: ToolResult, stated: Stated, limits: Limits | None = None) -> MeasurementRecord:
     limits = limits or Limits()
     flat = np.zeros((2, 2), np.float32)
     heightmap = HeightMap(
@@ -57,7 +57,9 @@ def _kept(result: ToolResult, stated: Stated, limits: Limits | None = None) -> K
         "p.png",
     )
     judged = judge(result, stated, limits)
-    return Kept(result, judged, stated, limits, heightmap, "A", "Ada", "by hand")
+    return record_of(
+        result, judged, stated, heightmap, limits=limits, serial="A", operator="Ada", note="by hand"
+    )
 
 
 @given(size=LENGTHS, height=LENGTHS)
@@ -68,7 +70,7 @@ def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, hei
         found.size_error_percent,
         found.height_error_percent,
     ]
-    record = record_of(_kept(PRESSED, Stated(size, height)))
+    record = _record(PRESSED, Stated(size, height))
     assert [q.error_percent for q in record.quantities] == [row.error_percent for row in rows]
     assert record.details["error_percent"] == found.error_percent
 
@@ -86,16 +88,16 @@ def test_only_what_is_known_is_judged() -> None:
 
 def test_the_verdict_follows_the_limits() -> None:
     stated = Stated(5.0, 1.0)
-    assert record_of(_kept(PRESSED, stated)).verdict == PASSED
+    assert _record(PRESSED, stated).verdict == PASSED
     strict = Limits(size_percent=1.0)
-    assert record_of(_kept(PRESSED, stated, strict)).verdict == FAILED
+    assert _record(PRESSED, stated, strict).verdict == FAILED
     doubtful = replace(PRESSED, verdict="doubtful", reason="cut")
-    assert record_of(_kept(doubtful, stated)).verdict == DOUBTFUL
-    assert record_of(_kept(PRESSED, Stated())).verdict == UNJUDGED
+    assert _record(doubtful, stated).verdict == DOUBTFUL
+    assert _record(PRESSED, Stated()).verdict == UNJUDGED
 
 
 def test_a_record_contains_object_calibration_and_operator() -> None:
-    record = record_of(_kept(APART, Stated(size_mm=3.01, name="Gauge")))
+    record = _record(APART, Stated(size_mm=3.01, name="Gauge"))
     assert (record.serial, record.calibration_id, record.picture) == ("A", "A-1", "p.png")
     assert (record.operator, record.note) == ("Ada", "by hand")
     assert record.settings["tool"] == {"tool": "distance", "a_mm": [0.0, 0.0], "b_mm": [3.0, 0.0]}

@@ -141,7 +141,7 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     result = tmp_path / "result.json"
     arguments = ["measure", str(calibration_file), str(press), "--shape", "cylinder"]
     arguments += ["--truth", str(press.parent / "truth.csv"), "--json", str(result)]
-    assert main([*arguments, "--seed", repr(at[0]), repr(at[1])]) == 0
+    assert main([*arguments, "--at", repr(at[0]), repr(at[1])]) == 0
     reported = json.loads(result.read_text())
     assert reported.pop("faults") == []
     (record,) = page.book.records

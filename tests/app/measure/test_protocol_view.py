@@ -16,7 +16,7 @@ from report_pdf import report_data
 
 from app.command_line.main import main
 from app.context.context import AppContext
-from app.measure.press_check import TOLERANCE_MM, ImageMap, PressCheck, make_target
+from app.measure.press_check import TOLERANCE_MM, PressCheck, make_target
 from app.measure.protocol_press import BenchHand
 from app.measure.protocol_view import ProtocolView
 from app.services.preferences import Limits
@@ -43,7 +43,7 @@ def frame(position_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
 def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
     calibration = scene.calibration()
     press = PressWanted(Truth(shape, 4.0, 1.0), (3.0, -2.0), 30.0, "r01", 1)
-    target = make_target(press, ImageMap(calibration))
+    target = make_target(press, calibration)
     seen = np.vstack([target.outline_px, [target.centre_px]])
     back, _ = camera_to_membrane(
         calibration.camera.directions(seen), calibration.plane, calibration.stack
@@ -58,7 +58,7 @@ def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
 
 def test_the_live_image_is_followed_from_lifting_to_holding() -> None:
     press = PressWanted(Truth("cylinder", 5.0, 0.5), (2.0, 1.0), 0.0, "r01", 1)
-    target = make_target(press, ImageMap(scene.calibration()))
+    target = make_target(press, scene.calibration())
     check = PressCheck(target, frame(None, 0))
     assert check(frame(press.position_mm, 1)).sentence == "Lift everything off the sensor."
     assert check.phase == "lift"
