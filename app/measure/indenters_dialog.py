@@ -17,7 +17,7 @@ from app.widgets.buttons import push_button
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
@@ -59,7 +59,8 @@ class IndentersDialog(Dialog):
             "All lengths are in mm. Depth is the height of the indenter from its face to "
             "its base, if it has one."
         )
-        self.fill(PlainLabel(text, wrap=True), self.table, self.problem, add=(add, remove))
+        row = hbox(add, remove, None)
+        self.fill(PlainLabel(text, wrap=True), self.table, row, self.problem)
         for indenter in indenters:
             self.add_row(indenter)
         self.table.setCurrentCell(0, NAME)

@@ -22,7 +22,6 @@ from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.workspace.indenters import FILE as INDENTERS
 from app.workspace.indenters import Indenter, read_indenters, write_indenters
-from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.session.known_files import KnownFiles
 from gelpolight_core.translation import tr
@@ -137,10 +136,8 @@ class MeasurePage(QWidget):
         """Open the first of them."""
         paths = dropped_paths(event.mimeData())
         wanted = [path for path in paths if path.suffix.lower() in (*IMAGES, RECORDING)]
-        try:
+        with self.context.toasts.errors():
             self.open_path(wanted[0])
-        except InputError as error:
-            self.context.toasts.show(str(error), "fail")
         event.acceptProposedAction()
 
     # The records
@@ -179,11 +176,9 @@ class MeasurePage(QWidget):
 
     def _read_indenters(self) -> tuple[Indenter, ...] | None:
         """Read the known indenters, show and return them. None if they cannot be read."""
-        try:
+        known = None
+        with self.context.toasts.errors():
             known = read_indenters(self.context.workspace.folder)
-        except InputError as error:
-            self.context.toasts.show(str(error), "fail")
-            known = None
         self.press_view.panel.truth.show_indenters(known or ())
         return known
 
@@ -201,12 +196,10 @@ class MeasurePage(QWidget):
     def _keep_indenters(
         self, indenters: tuple[Indenter, ...], before: KnownFiles, list_file: Path
     ) -> None:
-        try:
+        with self.context.toasts.errors():
             again = tr("Open the list again, and repeat your change")
             before.refuse_changed(list_file, advice=again)
             write_indenters(indenters, self.context.workspace.folder)
-        except InputError as error:
-            self.context.toasts.show(str(error), "fail")
         self._read_indenters()
 
     def edit_limits(self) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from itertools import groupby
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QToolButton, QWidget
 
 from app.measure.placing import Kind, kinds
 from app.theme.icons import icon
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.tool_key import add_tool_key
 from gelpolight_core.translation import tr
@@ -31,9 +32,7 @@ class Palette(QWidget):
         super().__init__()
         named(self, "measure.palette", tr("Measuring tools"))
         self.buttons: dict[str, QToolButton] = {}
-        column = QVBoxLayout(self)
-        column.setContentsMargins(4, 6, 4, 6)
-        column.setSpacing(3)
+        column = vbox(of=self, margins=(4, 6, 4, 6), spacing=3)
         for number, (_, group) in enumerate(groupby(kinds(), key=lambda kind: kind.group)):
             column.addSpacing(8 if number else 0)
             for kind in group:
@@ -59,11 +58,6 @@ class Palette(QWidget):
         """Choose none."""
         for button in self.buttons.values():
             button.setChecked(False)
-
-    def allow(self, on: bool) -> None:
-        """Enable or disable the tools."""
-        for button in self.buttons.values():
-            button.setEnabled(on)
 
     def _on_clicked(self, name: str, on: bool) -> None:
         for other, button in self.buttons.items():

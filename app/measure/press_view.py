@@ -151,10 +151,8 @@ class PressView(PressViewFrame):
             tr("Images and recordings ({endings})").format(endings=endings),
         )
         if chosen:
-            try:
+            with self.context.toasts.errors():
                 self.open_file(Path(chosen))
-            except InputError as error:
-                self.context.toasts.show(str(error), "fail")
 
     # Live and frozen
 
@@ -272,7 +270,7 @@ class PressView(PressViewFrame):
         self.panel.show_work(self.work, known=known)
         self.details.show_results(self.work.image_results)
         self.details.show_result(self.work.tool, self.work.result)
-        self.map.tools.allow(known)
+        self.map.tools.setEnabled(known)
         self.freeze_action.setEnabled(self.work.image is not None or can_freeze)
         self.judge_again()
         self._advise()

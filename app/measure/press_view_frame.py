@@ -132,13 +132,15 @@ class PressViewFrame(QMainWindow):
             can.connect(action.setEnabled)
         self.source = SourceButton(context=self.context, page="measure", none=tr("No camera"))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        for group in (
+        groups = (
             (self.source, open_action), (self.box, self.validated),
             (self.freeze_action, self.auto), (undo, redo), (self._views_button(),),
-        ):  # fmt: skip
+        )  # fmt: skip
+        for number, group in enumerate(groups):
+            if number:
+                bar.addSeparator()
             for part in group:
                 (bar.addAction if isinstance(part, QAction) else bar.addWidget)(part)
-            bar.addSeparator()
         for action in (undo, redo):
             bar.widgetForAction(action).setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
         self.addToolBar(bar)
