@@ -6,7 +6,6 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog
 
 from app.context.context import AppContext
 from app.live.frame_results import Shown, Wanted
@@ -16,6 +15,7 @@ from app.measure.judging import Judged, judge, record_of
 from app.measure.measuring import MeasuredImage
 from app.measure.press_view_frame import PressViewFrame
 from app.measure.steady import SteadyPress
+from app.services.file_dialogs import ask_open
 from app.services.jobs import Jobs
 from app.view2d.display import Display
 from app.view3d.saving import ViewSaving
@@ -144,15 +144,16 @@ class PressView(PressViewFrame):
     def choose_file(self) -> None:
         """Let the user choose an image or a recording."""
         endings = " ".join(f"*{ending}" for ending in (*IMAGES, RECORDING))
-        chosen, _ = QFileDialog.getOpenFileName(
+        chosen = ask_open(
             self,
+            self.context.settings,
+            "press",
             tr("Open an image or a recording"),
-            str(self.context.settings.folder("press")),
             tr("Images and recordings ({endings})").format(endings=endings),
         )
-        if chosen:
+        if chosen is not None:
             with self.context.toasts.errors():
-                self.open_file(Path(chosen))
+                self.open_file(chosen)
 
     # Live and frozen
 

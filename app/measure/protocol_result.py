@@ -8,10 +8,8 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QFileDialog,
     QHeaderView,
     QProgressBar,
-    QSplitter,
     QTableWidget,
     QTableWidgetItem,
     QTabWidget,
@@ -21,9 +19,10 @@ from PySide6.QtWidgets import (
 from app.context.context import AppContext
 from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
+from app.services.file_dialogs import ask_folder
 from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel, plain_tip
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -77,12 +76,7 @@ class ResultView(QWidget):
         self.sentence = named(PlainLabel(wrap=True), "protocol.sentence", tr("Results"))
         self.figure = Fig13()
         self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
-        split = QSplitter(Qt.Orientation.Vertical)
-        split.addWidget(self.figure)
-        split.addWidget(self._tabs)
-        split.setStretchFactor(0, 3)
-        split.setStretchFactor(1, 2)
-        split.setChildrenCollapsible(False)
+        split = splitter(Qt.Orientation.Vertical, (self.figure, 3), (self._tabs, 2))
         self.progress = named(QProgressBar(), "protocol.result.progress", tr("Running work"))
         keep = self.progress.sizePolicy()
         keep.setRetainSizeWhenHidden(True)
@@ -170,12 +164,10 @@ class ResultView(QWidget):
         self._work.write_report(self._evaluation, folder, done, limits_percent=self._limits_percent)
 
     def _save_as(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(
-            self, tr("Folder for the report"), str(self._context.settings.folder("report"))
-        )
-        if chosen:
-            self._context.settings.keep_folder("report", Path(chosen))
-            self.save(Path(chosen))
+        settings = self._context.settings
+        chosen = ask_folder(self, settings, "report", tr("Folder for the report"))
+        if chosen is not None:
+            self.save(chosen)
 
 
 def listing_table(name: str, listing: Listing) -> QTableWidget:

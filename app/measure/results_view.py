@@ -10,9 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
-    QFileDialog,
     QHeaderView,
-    QSplitter,
     QStackedWidget,
     QTableView,
     QWidget,
@@ -30,11 +28,12 @@ from app.measure.record_table import (
     RecordModel,
     shape_label,
 )
+from app.services.file_dialogs import ask_save
 from app.widgets.actions import make_action
 from app.widgets.buttons import push_button
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.statistics import Statistics, statistics_of
@@ -116,20 +115,12 @@ class ResultsView(QWidget):
         return table
 
     def _lay_out(self) -> None:
-        below = QSplitter(Qt.Orientation.Horizontal)
-        for parts, margins in (
-            (((self.statistics, 1),), (10, 4, 10, 4)),
-            ((self.drift_title, (self.drift, 1)), (0, 0, 8, 4)),
-        ):
-            side = QWidget()
-            vbox(*parts, of=side, margins=margins)
-            below.addWidget(side)
-        below.setSizes([470, 700])
-        self.split = QSplitter(Qt.Orientation.Vertical)
-        self.split.addWidget(self.table)
-        self.split.addWidget(below)
-        self.split.setSizes([420, 260])
-        self.split.setChildrenCollapsible(False)
+        left, right = QWidget(), QWidget()
+        vbox((self.statistics, 1), of=left, margins=(10, 4, 10, 4))
+        vbox(self.drift_title, (self.drift, 1), of=right, margins=(0, 0, 8, 4))
+        across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
+        below = splitter(across, (left, 0), (right, 0), sizes=(470, 700))
+        self.split = splitter(down, (self.table, 0), (below, 0), sizes=(420, 260))
         empty = named(
             PlainLabel(tr("No records yet. Measure a press and save it to the records.")),
             "measure.results.empty",
@@ -225,12 +216,10 @@ class ResultsView(QWidget):
 
     def choose_export(self) -> None:
         """Let the user choose the file of the table."""
-        folder = self._context.settings.folder("table")
-        chosen, _ = QFileDialog.getSaveFileName(
-            self, tr("Export as CSV"), str(folder / "measurements.csv"), tr("Tables (*.csv)")
-        )
-        if chosen:
-            self.export_to(Path(chosen))
+        settings, title = self._context.settings, tr("Export as CSV")
+        chosen = ask_save(self, settings, "table", title, "measurements.csv", tr("Tables (*.csv)"))
+        if chosen is not None:
+            self.export_to(chosen)
 
     def export_to(self, path: Path) -> None:
         """Write the table: all measurements, or those of the selected sensor."""
@@ -239,7 +228,6 @@ class ResultsView(QWidget):
             text = tr("{n} measurements saved to {path}").format(n=count, path=path)
             self._context.toasts.show(text, "pass")
 
-        self._context.settings.keep_folder("table", path.parent)
         self._book.export(path, self.sensor.currentData() or None, done)
 
 

@@ -29,13 +29,14 @@ class PlainLabel(QLabel):
     parent : QWidget, optional
         Parent of the label.
     wrap : bool, optional
-        Whether long lines are wrapped at words.
+        Whether long lines are wrapped.
     """
 
     def __init__(
         self, text: str = "", parent: QWidget | None = None, *, wrap: bool = False
     ) -> None:
-        super().__init__(parent, wordWrap=wrap)
+        super().__init__(parent)
+        self.setWordWrap(wrap)
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setText(text)
 
@@ -53,13 +54,14 @@ class MarkupLabel(QLabel):
     parent : QWidget, optional
         Parent of the label.
     wrap : bool, optional
-        Whether long lines are wrapped at words.
+        Whether long lines are wrapped.
     """
 
     def __init__(
         self, markup: str = "", parent: QWidget | None = None, *, wrap: bool = False
     ) -> None:
-        super().__init__(parent, wordWrap=wrap)
+        super().__init__(parent)
+        self.setWordWrap(wrap)
         self._markup = ""
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setText(markup)

@@ -18,6 +18,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED, MeasurementRecord
 
 LENGTHS = st.floats(0.01, 50.0)
+DEFAULT_LIMITS = Limits()
 FIT = Measurement(
     shape="cylinder",
     diameter_mm=5.1,
@@ -42,20 +43,12 @@ PRESSED = ToolResult(
 APART = ToolResult(Distance((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", "distance"),), ())
 
 
-def _record(result: ToolResult, stated: Stated, limits: Limits | None = None) -> MeasurementRecord:
-    limits = limits or Limits()
+def _record(
+    result: ToolResult, stated: Stated, limits: Limits = DEFAULT_LIMITS
+) -> MeasurementRecord:
     flat = np.zeros((2, 2), np.float32)
-    heightmap = HeightMap(
-        flat,
-        np.arange(2.0),
-        np.arange(2.0),
-        1.0,
-        None,
-        flat.astype(np.uint8),
-        "A-1",
-        "full",
-        "p.png",
-    )
+    axis, flags = np.arange(2.0), flat.astype(np.uint8)
+    heightmap = HeightMap(flat, axis, axis, 1.0, None, flags, "A-1", "full", "p.png")
     judged = judge(result, stated, limits)
     return record_of(
         result, judged, stated, heightmap, limits=limits, serial="A", operator="Ada", note="by hand"
