@@ -29,7 +29,7 @@ from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.quality import verdict_word
 from gelpolight_core.report.document import Listing, Report
-from gelpolight_core.report.evaluation_document import evaluation_document
+from gelpolight_core.report.evaluation import evaluation_document, evaluation_sentence
 from gelpolight_core.translation import tr
 
 ROW_HEIGHT = 24
@@ -63,11 +63,12 @@ class ResultView(QWidget):
         )
         save = push_button(
             "protocol.save", tr("&Save the report"),
-            lambda: self.save(work.run.folder / REPORT), tip=tr("Write the report next to the run"),
+            lambda: self.save(work.run.folder / REPORT),
+            tip=tr("Write CSV and PDF next to the run"),
         )  # fmt: skip
         save_as = push_button(
             "protocol.save_as", tr("Save &as…"), self._save_as,
-            tip=tr("Write the report into another folder"),
+            tip=tr("Write CSV and PDF into another folder"),
         )  # fmt: skip
         leave = push_button(
             "protocol.leave_result", tr("Lea&ve"), on_leave,
@@ -108,7 +109,7 @@ class ResultView(QWidget):
         serial = self._work.run.content.serial
         self.verdict.setText(f"{serial}: {word} ({state})")
         show_meaning(self.verdict, document.verdict.value)
-        self.sentence.setText(document.validation.sentence + ".")
+        self.sentence.setText(evaluation_sentence(evaluation) + ".")
         self.figure.show_evaluation(evaluation)
         self._show_tables(document)
         self._back.setEnabled(self._work.run.next() is not None)
@@ -137,7 +138,9 @@ class ResultView(QWidget):
             holder = QWidget()
             vbox(pooled, (listing_table("protocol.gauge", gauge.listings[0]), 1), of=holder)
             self._tabs.addTab(holder, tr("Repeatability"))
-        self._tabs.addTab(listing_table("protocol.presses", document.sources), tr("Every press"))
+        self._tabs.addTab(
+            listing_table("protocol.presses", document.listings[0]), tr("Every press")
+        )
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))
 
     def show_work(self, title: str, share: float) -> None:
