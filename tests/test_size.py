@@ -33,7 +33,7 @@ MOST = {
     "app/context": 423,
     "app/inspect": 1933,
     "app/live": 2542,
-    "app/measure": 4279,
+    "app/measure": 4278,
     "app/sensors": 856,
     "app/services": 922,
     "app/shell": 1208,
