@@ -3,15 +3,12 @@
     xvfb-run -a -s "-screen 0 1920x1200x24" python tests/long/soak.py --minutes 60 --seed 1
     ... --calibration sensor.gplcal    of the virtual sensor; without it there is no live depth
 
-The real program runs on the virtual sensor, whose camera makes 15 frames a second. What is compiled
-when it is used first is used once; then a random person comes. Every half minute the program is
-brought to the same state, and when nothing is computed any more it is left in peace for some
-seconds, in which it is measured: memory, threads, open files, objects and timers, frames shown in a
-second, how late the user interface is, what the log says, and the room on disk. Every fourth time
-the session, the protocol's run and the image that is measured are put away: these times say whether
-memory grows, apart from what the C library keeps of what was given back to it. Every action is
-written to actions.log in the scratch folder. The exit status is 1 where memory grows, the rate
-drifts, or the log holds an error; the files are kept then.
+The real program runs on the virtual sensor. Every half minute everything that is open is closed,
+and the Inspect page is left in peace for a while, in which it is measured: memory, threads, open
+files, objects and timers, frames shown in a second, how late the user interface is, what the log
+says, and the room on disk. Every action is written to actions.log in the scratch folder. The exit
+status is 1 where memory grows, the rate falls, the program hangs or the log holds an error; the
+files are kept then.
 """
 
 from __future__ import annotations
@@ -28,21 +25,19 @@ from pathlib import Path
 
 from probes import Lateness, Spent
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog
 
-EVERY_S = 30.0
-RESTS_S = 3.0
-MEASURED_S = 6.0
-# A rest that is not reached by then is a fault; a computation may take longer.
-LONGEST_UNREST_S = 40.0
-LONGEST_COMPUTING_S = 240.0
+WORKS_S, MEASURED_S = 20.0, 6.0
+# A rest that is not reached by then is measured as it is.
+LONGEST_UNREST_S = 240.0
 HUNG_S = 60.0
-LOOK_MS = 100
-FIRST_USE_S = 4.0
-# Every so many rests all that is open is put away.
-EMPTIED_EVERY = 4
+LOOK_MS = 200
+SETTLES_S = 5.0
+RATE_HZ = 15.0
+SIZE = 1400, 900
 KEPT_RECORDINGS = 4
-DONE = object()
+LEFT = ("calibrate.leave", "protocol.leave", "protocol.leave_result", "inspect.stop")
 
 
 class Soak:
@@ -64,8 +59,8 @@ class Soak:
 
         self.options, self.scratch, self._hung = options, scratch, hung
         self.rows: list = []
-        self.troubles: list[str] = []
         self.spent = Spent()
+        self._shown = 0
         self._began_s = time.monotonic()
         print(HEAD, flush=True)
 
@@ -73,34 +68,29 @@ class Soak:
         """Take the window, and let a person come."""
         from soak_figures import LogWatch
         from soak_person import Person
-        from soak_rest import RATE_HZ, Rest
 
         from app.shell.main_window import MainWindow
         from app.sources.bench import Bench
 
         windows = QApplication.topLevelWidgets()
         self.window = next(w for w in windows if isinstance(w, MainWindow))
-        context = self.window.context
-        self.log = LogWatch(context.log)
+        self.context = self.window.context
+        self.log = LogWatch(self.context.log)
         (self.scratch / "saved").mkdir()
         self._actions = (self.scratch / "actions.log").open("w", encoding="utf-8")
         self.person = Person(self.window, self.scratch, self._actions, self.options.seed)
-        context.source.bench = Bench()
-        context.source.bench.adjust(rate_hz=RATE_HZ)
-        self.rest = Rest(self.window, self.person, self.options.calibration)
-        self.rest.use_calibration()
-        self.lateness = Lateness()
+        self.context.source.bench = Bench()
+        self.context.source.bench.adjust(rate_hz=RATE_HZ)
+        self._calibration: Path | None = None
+        self._lateness = Lateness()
         self._look_after = QTimer(self.window)
         self._look_after.timeout.connect(self._still_alive)
         self._look_after.start(1000)
-        self._first_uses = self.rest.first_uses()
-        self._use_first()
+        self.window.page("inspect").depth.shown.connect(self._count)
+        self._rest()
 
-    def _use_first(self) -> None:
-        if self.rest.computes or next(self._first_uses, DONE) is not DONE:
-            self._later(FIRST_USE_S, self._use_first)
-        else:
-            self._rest()
+    def _count(self, _shown: object) -> None:
+        self._shown += 1
 
     def _still_alive(self) -> None:
         faulthandler.dump_traceback_later(HUNG_S, file=self._hung)
@@ -108,66 +98,105 @@ class Soak:
     def _later(self, seconds: float, what: object) -> None:
         QTimer.singleShot(int(1e3 * seconds), self.window, what)
 
-    def _work(self) -> None:
-        self.person.begin()
-        self._later(EVERY_S - RESTS_S - MEASURED_S, self._rest)
-
-    # Rest
-
     def _rest(self) -> None:
         self.person.rest()
         self.person.note("rest")
         self._rests_by_s = time.monotonic() + LONGEST_UNREST_S
-        self._computed_by_s = time.monotonic() + LONGEST_COMPUTING_S
-        self._emptied = len(self.rows) % EMPTIED_EVERY == EMPTIED_EVERY - 1
-        self.rest.begin(emptied=self._emptied)
-        self._settle()
+        self._close_next()
 
-    def _settle(self) -> None:
-        """Close what is open, one thing at a time, until the program looks as at every rest."""
-        from soak_rest import COMPUTES, UNSETTLED
+    def _close_next(self) -> None:
+        """Close what is open, one thing at a time, until nothing is, and nothing is computed."""
+        if (self._closed() and not self._computes()) or time.monotonic() > self._rests_by_s:
+            self._arrange()
+            self._later(SETTLES_S, self._begin_to_measure)
+        else:
+            self._later(1e-3 * LOOK_MS, self._close_next)
 
-        undone, now_s = self.rest.undone(), time.monotonic()
-        if undone == COMPUTES and now_s < self._computed_by_s:
-            self._rests_by_s = now_s + LONGEST_UNREST_S
-        if undone and now_s < self._rests_by_s:
-            self._later(1e-3 * LOOK_MS, self._settle)
+    def _closed(self) -> bool:
+        """Close the uppermost menu or dialog, or show Inspect; whether there was nothing to do."""
+        dialogs = [w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog)]
+        popup = QApplication.activePopupWidget()
+        upper = (
+            popup
+            or QApplication.activeModalWidget()
+            or next((dialog for dialog in dialogs if dialog.isVisible()), None)
+        )
+        if upper is not None:
+            upper.close()
+        elif self.window.page_name != "inspect":
+            self.person.press("navigation.button.inspect")
+        else:
+            return True
+        return False
+
+    def _computes(self) -> bool:
+        from app.measure.work import Work
+        from app.services.jobs import Jobs
+        from app.widgets.qt_tree import below
+
+        parts = [*below(self.window, Jobs), *below(self.window, Work)]
+        return any(part.busy for part in parts)
+
+    def _arrange(self) -> None:
+        """Put away sessions, runs and images, and show the same scene as at every rest."""
+        from app.measure.press_view import PressView
+        from app.widgets.qt_tree import below
+
+        for kind in (QAction, QAbstractButton):
+            for name in LEFT:
+                for part in list(below(self.window, kind, name)):
+                    part.trigger() if kind is QAction else part.click()
+        for press_view in list(below(self.window, PressView)):
+            press_view.release()
+        page, source = self.window.page("inspect"), self.context.source
+        page.recorder.stop()
+        if page.live.paused:
+            page.pause_action.trigger()
+        self.window.showNormal()
+        self.window.resize(*SIZE)
+        page.findChild(QAction, "inspect.layout").trigger()
+        self._use_calibration()
+        source.choose_virtual_sensor()
+        for fault in tuple(source.bench.conditions.faults):
+            source.bench.switch(fault, False)
+        source.bench.lay("ball")
+        source.bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
+
+    def _use_calibration(self) -> None:
+        """Put the calibration into use: most of what a frame costs is its own."""
+        wanted, workspace = self.options.calibration, self.context.workspace
+        if wanted is None:
             return
-        if undone == UNSETTLED:
-            self.person.note(undone)  # a busy machine renders for long
-        elif undone:
-            self._trouble(f"it does not come to rest: {undone}")
-        self._later(RESTS_S, self._measure)
+        if self._calibration is None or not self._calibration.is_file():
+            self._calibration = workspace.import_calibration(wanted)
+        if workspace.in_use != self._calibration:
+            workspace.use(self._calibration)
+            self.context.requests.calibrations_changed.emit()
 
-    def _trouble(self, sentence: str) -> None:
-        where = f"after {(time.monotonic() - self._began_s) / 60.0:.1f} minutes"
-        self.troubles.append(f"{where}: {sentence}")
-        print(self.troubles[-1], flush=True)
+    def _begin_to_measure(self) -> None:
+        self._shown = 0
+        self._lateness.late_ms.clear()
+        self._later(MEASURED_S, self._measure)
 
     def _measure(self) -> None:
-        from soak_figures import Look
+        from soak_figures import measured
 
-        self._looked = Look(lambda: self.rest.shown, self.lateness)
-        self._later(MEASURED_S, self._measured)
-
-    def _measured(self) -> None:
-        row = self._looked.row(self._began_s, self.log, self.scratch, emptied=self._emptied)
+        late = self._lateness.late_ms
+        row = measured(self._began_s, self._shown / MEASURED_S, late, self.log, self.scratch)
         self.rows.append(row)
         print(row.reported(), flush=True)
-        self._forget_recordings()
-        if row.minutes >= self.options.minutes:
-            self.lateness.timer.stop()
-            self._look_after.stop()
-            self.log.look()
-            self.person.note("close")
-            self.window.close()
-            return
-        self._work()
-
-    def _forget_recordings(self) -> None:
         found = sorted(self.scratch.rglob("*.gplrec"), key=lambda path: path.stat().st_mtime)
         for path in found[:-KEPT_RECORDINGS]:
             path.unlink()
+        if row.minutes < self.options.minutes:
+            self.person.begin()
+            self._later(WORKS_S, self._rest)
+            return
+        self._lateness.timer.stop()
+        self._look_after.stop()
+        self.log.look()
+        self.person.note("close")
+        self.window.close()
 
 
 def conclude(soak: Soak, status: int, hung: Path) -> bool:
@@ -175,7 +204,6 @@ def conclude(soak: Soak, status: int, hung: Path) -> bool:
     from soak_figures import conclude as conclude_figures
 
     output, wrong = conclude_figures(soak.rows)
-    wrong += soak.troubles
     wrong += [f"in the log: {text}" for text in soak.log.errors]
     if status != 0:
         wrong.append(f"the program's exit status is {status}")
@@ -184,10 +212,8 @@ def conclude(soak: Soak, status: int, hung: Path) -> bool:
     left = [t.name for t in threading.enumerate() if t is not threading.main_thread()]
     print(f"{soak.person.actions} actions in {len(soak.rows)} rounds; {soak.spent.reported()}")
     print(f"threads at the end: {', '.join(left) or 'none but the first'}")
-    for text, count in soak.log.warnings.most_common():
-        print(f"warning, {count} times: {text}")
-    for text, count in soak.log.reported.most_common():
-        print(f"refused {count} times: {text}")
+    for text, count in soak.log.others.most_common():
+        print(f"warned or refused {count} times: {text}")
     print("\n".join(output))
     print("\n".join(f"WRONG: {sentence}" for sentence in wrong) or "Nothing is wrong.")
     return not wrong
@@ -203,16 +229,10 @@ def main() -> None:
     options = parser.parse_args()
     scratch = options.scratch or Path(tempfile.mkdtemp(prefix="gelpolight-soak-"))
     scratch.mkdir(parents=True, exist_ok=True)
-    for variable, folder in (
-        ("HOME", "."),
-        ("XDG_CONFIG_HOME", "config"),
-        ("XDG_DATA_HOME", "data"),
-        ("XDG_STATE_HOME", "state"),
-        ("XDG_CACHE_HOME", "cache"),
-        ("XDG_DOCUMENTS_DIR", "documents"),
-    ):
-        (scratch / folder).mkdir(exist_ok=True)
-        os.environ[variable] = str(scratch / folder)
+    for name in ("CONFIG_HOME", "DATA_HOME", "STATE_HOME", "CACHE_HOME", "DOCUMENTS_DIR"):
+        (scratch / name.lower()).mkdir(exist_ok=True)
+        os.environ[f"XDG_{name}"] = str(scratch / name.lower())
+    os.environ["HOME"] = str(scratch)
     # With threads, Mesa's renderer in software keeps the room of its largest drawings, the more of
     # it the busier the machine: tens of megabytes an hour that are not the program's.
     os.environ.setdefault("LP_NUM_THREADS", "0")
