@@ -12,8 +12,6 @@ from typing import Any
 
 import pytest
 import scene
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import (
@@ -77,18 +75,6 @@ def test_a_list_of_calibrations_loads_no_numerical_library() -> None:
         check=True,
     )
     assert done.stdout.strip() == "[]"
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.data())
-def test_a_truncated_file_is_refused(
-    whole: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
-    content = whole.read_bytes()
-    path = tmp_path_factory.mktemp("cut") / "c.gplcal"
-    path.write_bytes(content[: data.draw(st.integers(0, len(content) - 1))])
-    with pytest.raises(InputError):
-        read_summary(path)
 
 
 def test_a_damaged_array_is_found_before_it_is_copied(whole: Path, tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration import project as project_module
 from gelpolight_core.calibration import stages
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject, Cancelled
@@ -203,21 +202,6 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
     assert read_session(path.parent).sensor.led_height_mm == 13.9
 
 
-def test_a_session_damaged_by_another_program_can_be_overwritten(
-    project: CalibrationProject,
-) -> None:
-    before = project.session
-    path = before.folder / "session.toml"
-    path.write_text("broken = ")
-    with pytest.raises(InputError):
-        project.reload()
-    assert project.session is before
-    assert project.changed_outside() == (path,)
-    project.overwrite()
-    assert project.changed_outside() == ()
-    assert read_session(before.folder) == before
-
-
 def test_a_single_view_that_cannot_replace_the_former_is_not_stored(
     project: CalibrationProject,
 ) -> None:
@@ -277,27 +261,3 @@ def test_a_press_captured_during_a_computation_belongs_to_the_next_one(
     assert captured
     assert project.statuses()[Stage.BALLS].state is StageState.STALE
     assert project.compute(Stage.BALLS).state in (StageState.PASS, StageState.WARN)
-
-
-def test_an_image_added_and_removed_during_a_computation_is_in_no_result(
-    project: CalibrationProject, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    project.exclude(Stage.RADIANCE, "none.png")
-    run_stage = project_module.run_stage
-
-    def meanwhile(*arguments: object, **options: object) -> object:
-        decisions = project.session.folder / "decisions.toml"
-        text = decisions.read_text()
-        decisions.write_text(text + "# by another program\n")
-        with pytest.raises(InputError, match="nothing was written"):
-            project.add_capture(Stage.RADIANCE, [np.full((240, 320, 3), 90, np.uint8)])
-        decisions.write_text(text)
-        return run_stage(*arguments, **options)
-
-    monkeypatch.setattr(project_module, "run_stage", meanwhile)
-    before = project.results
-    project.compute(Stage.RADIANCE)
-    assert project.results is before
-    monkeypatch.undo()
-    project.compute(Stage.RADIANCE)
-    assert project.results is not before

@@ -122,18 +122,3 @@ def test_a_wrong_line_is_named(
     table.write_text(table.read_text() + line + "\n")
     message = refusal(catalog, tmp_path / "s", capsys, "--preset", "gelsight-mini")
     assert output in message and "line 4" in message
-
-
-def test_what_is_no_calibration_folder_is_refused(
-    catalog: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    scale = ("--mm-per-px", "0.06")
-    (catalog / "6.000mm" / "1" / "label.npz").write_bytes(b"not an archive")
-    assert "label" in refusal(catalog, tmp_path / "s", capsys, *scale)
-    (catalog / "6.000mm" / "1" / "label.npz").unlink()
-    (catalog / "6.000mm" / "1" / "gelsight.png").write_bytes(b"not an image")
-    assert "not a complete" in refusal(catalog, tmp_path / "s", capsys, *scale)
-    (catalog / "catalog.csv").write_text("experiment_reldir,indenter_width(mm)\n")
-    assert "diameter(mm)" in refusal(catalog, tmp_path / "s", capsys, *scale)
-    (catalog / "catalog.csv").unlink()
-    assert "known tables" in refusal(catalog, tmp_path / "s", capsys, *scale)

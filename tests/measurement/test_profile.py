@@ -116,12 +116,3 @@ def test_the_calibrations_share_goes_to_depths_and_to_lengths() -> None:
     share = math.degrees(0.5 * math.hypot(0.01, 0.002) / 1.25)
     assert leaning.sd == pytest.approx(share, rel=0.02)
     assert profile.depth_sd_mm == pytest.approx(0.01 * profile.depth_mm, abs=1e-9)
-
-
-def test_what_the_model_leaves_open_is_larger_between_far_places_than_near_ones() -> None:
-    flat = made(lambda x, y: 0.0 * x, **stated(64, 0.0, model_mm=0.01))
-    profile = take_profile(flat, (-4.0, 0.0), (4.0, 0.0))
-    near = step_height(profile, first_mm=(3.9, 4.0), second_mm=(4.0, 4.1)).sd
-    far = step_height(profile, first_mm=(0.0, 0.1), second_mm=(7.9, 8.0)).sd
-    assert near < 0.2 * far
-    assert far == pytest.approx(math.sqrt(2.0) * 0.01, rel=0.3)

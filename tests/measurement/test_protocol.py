@@ -192,25 +192,3 @@ def test_a_mistake_in_the_protocol_is_named(
     path.write_text(text.replace(key, other))
     with pytest.raises(InputError, match=message):
         read_protocol_file(run.folder)
-
-
-def test_a_truth_of_another_protocol_is_refused(tmp_path: Path) -> None:
-    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    run.accept(run.wanted[0], frames(10))
-    truth = run.presses / "truth.csv"
-    truth.write_text(truth.read_text().replace(",3.0,", ",3.5,"))
-    with pytest.raises(
-        InputError, match=r"the row of cylinder_s300.* does not belong to this protocol"
-    ):
-        open_run(run.folder)
-    truth.write_text("file,shape\n")
-    with pytest.raises(InputError, match="first line"):
-        open_run(run.folder)
-
-
-def test_a_new_run_does_not_take_the_place_of_another(tmp_path: Path) -> None:
-    begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    with pytest.raises(InputError, match=r"contains protocol\.toml"):
-        begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    with pytest.raises(InputError, match=r"there is no protocol\.toml"):
-        open_run(tmp_path)

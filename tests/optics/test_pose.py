@@ -118,21 +118,6 @@ def test_two_poses_that_fit_equally_well_are_reported() -> None:
     assert nearest < 2.0
 
 
-def test_several_views_are_averaged() -> None:
-    """Rotating the board on the surface and capturing again makes the result more certain."""
-    laid = [
-        lying_board(roll_deg=roll, centre_mm=(0.0, 0.0), name=f"top_{roll:.0f}.png")
-        for roll in (-60.0, 5.0, 95.0)
-    ]
-    truth = laid[0][1]
-    one = estimate_top_pose([laid[0][0]], BOARD, CAMERA)
-    all_three = estimate_top_pose([image for image, _ in laid], BOARD, CAMERA)
-    assert all(view.used for view in all_three.views)
-    assert all_three.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
-    assert angle_deg(all_three.plane, truth) < 0.1
-    assert all_three.distance_sd_mm < one.distance_sd_mm
-
-
 def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
     """A particle under one of three boards does not tilt the result."""
     flat = [lying_board(roll_deg=roll, name=f"flat_{roll:.0f}.png") for roll in (-40.0, 10.0, 70.0)]

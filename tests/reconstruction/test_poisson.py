@@ -170,28 +170,6 @@ def test_an_absurd_slope_is_clipped_and_counted(dtype: type) -> None:
     assert np.abs(found.depth_mm).max() < 2 * SLOPE_LIMIT * 0.02
 
 
-def test_single_precision_is_enough() -> None:
-    depth, slope_x, slope_y = uneven_scene(600, 800, 0.02)
-    exact = integrate_slopes(slope_x, slope_y, pitch_mm=0.02).depth_mm
-    single = integrate_slopes(slope_x.astype("f4"), slope_y.astype("f4"), pitch_mm=0.02).depth_mm
-    assert single.dtype == np.float32
-    assert exact.dtype == np.float64
-    # Eight roundings of 2^-24 (1 in 17 million): what transforms of this length may cost.
-    assert np.abs(single - exact).max() < 8 * 2**-24 * depth.max()
-
-
-@pytest.mark.parametrize(("rows", "columns"), [(1, 50), (50, 1), (1, 47)])
-def test_a_single_line_is_integrated_along_itself(rows: int, columns: int) -> None:
-    place = (np.arange(50 if 50 in (rows, columns) else 47) - 20.3) / 4
-    bump = np.exp(-(place**2) / 2)
-    slopes = {"slope_x": np.zeros((rows, columns)), "slope_y": np.zeros((rows, columns))}
-    along, across = ("slope_x", "slope_y") if rows == 1 else ("slope_y", "slope_x")
-    slopes[along] = (-place * bump / 4).reshape(rows, columns)
-    slopes[across] = np.ones((rows, columns))  # says nothing: there is no neighbour across
-    found = integrate_slopes(**slopes, pitch_mm=1.0).depth_mm
-    assert found.ravel() == pytest.approx(bump, abs=2e-4)
-
-
 @pytest.mark.parametrize(
     "wrong",
     [

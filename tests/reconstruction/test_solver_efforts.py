@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.near_light import denoise
 from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
@@ -119,23 +118,6 @@ def test_one_round_is_enough_for_a_shallow_press(
     assert np.abs(once.depth_mm - twice.depth_mm).max() < 1e-3
 
 
-def test_an_image_without_noise_is_not_denoised(virtual_calibration: Calibration) -> None:
-    """Linear light without a camera's noise: denoising would change next to nothing."""
-    sensor = VirtualSensor(SensorDesign().scaled(0.5), 0)
-    surface = pressed(Cylinder(3.0, 0.8), x_mm=1.0, y_mm=-2.0)
-    light = sensor.brightness(PressedMembrane(surface)).astype(np.float32)
-    best = Reconstructor(virtual_calibration)
-    silent = best.depth(light)
-    assert silent.trace is not None
-    assert "denoising" in silent.trace.left_out
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(denoise, "SILENT", 0.0)
-        quieted = best.depth(light)
-    assert quieted.trace is not None
-    assert "denoising" not in quieted.trace.left_out
-    assert np.sqrt(np.mean((silent.depth_mm - quieted.depth_mm) ** 2)) < 1e-3
-
-
 @pytest.mark.parametrize("name", [PRESS, "cuboid_s4_d100"])
 def test_half_scale_is_near_to_the_best(
     name: str,
@@ -173,14 +155,6 @@ def test_walls_that_light_does_not_decide_are_reported_at_every_effort(
     image = shown(PressedMembrane(surface))
     notes = Reconstructor(virtual_calibration, effort=effort).depth(image).notes
     assert any("steep walls" in note for note in notes) is output
-
-
-def test_the_papers_model_leaves_nothing_of_itself_out(
-    frame: Frame, virtual_calibration: Calibration
-) -> None:
-    trace = Reconstructor(virtual_calibration, model="paper").depth(frame, normals=False).trace
-    assert trace is not None
-    assert trace.left_out == ("light of the image", "normals", "standard deviations")
 
 
 @pytest.mark.parametrize("effort", EFFORTS)

@@ -104,14 +104,6 @@ def test_ball_cut_by_the_border_is_described_and_named() -> None:
         find_indentation(image, background)
 
 
-def test_only_a_second_ball_makes_several() -> None:
-    two = detect_ball(*scene((90.0, 100.0, 30.0), (220.0, 140.0, 30.0)))
-    assert two.reason is Reason.SEVERAL
-    image, background = scene((90.0, 120.0, 30.0))
-    cv2.line(image, (200, 60), (260, 180), (0.1, 0.1, 0.1), 8)
-    assert detect_ball(image, background).reason is Reason.OK
-
-
 def test_contact_much_larger_than_the_stated_ball_is_refused() -> None:
     image, background = scene((150.0, 120.0, 45.0))
     assert detect_ball(image, background, ball_radius_px=82.0).reason is Reason.OK

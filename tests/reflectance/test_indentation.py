@@ -155,13 +155,6 @@ def test_heavy_noise_still_gives_the_place_and_admits_doubt(seed: int) -> None:
     assert noisy.signal_to_noise < clear.signal_to_noise
 
 
-def test_dust_that_came_with_the_press_does_not_move_the_circle() -> None:
-    press, background = scene((130.0, 120.0, 40.0))
-    for x, y in np.random.default_rng(4).integers(5, 235, (60, 2)):
-        cv2.circle(press, (int(x), int(y)), 1, (0.0, 0.0, 0.0), -1)
-    assert off_by(find_indentation(press, background), 130.0, 120.0) < 1.0
-
-
 @settings(max_examples=5, deadline=None)
 @given(gains=st.tuples(*[st.floats(0.9, 1.1)] * 3))
 def test_small_changes_of_the_light_are_measured_and_taken_out(
@@ -208,18 +201,6 @@ def test_colours_in_another_order_are_refused() -> None:
     press, background = scene((150.0, 120.0, 35.0))
     error = refusal(np.ascontiguousarray(press[..., ::-1]), background)
     assert "bright" in error.found or "light changed" in error.found
-
-
-def test_different_sizes_are_refused_with_both_sizes() -> None:
-    press, background = scene((150.0, 120.0, 35.0))
-    error = refusal(press, background[:, :300])
-    assert "320x240" in error.found
-    assert "300x240" in error.found
-    assert "shape" in refusal(press[..., 0], background).found
-    with pytest.raises(InputError, match="working area"):
-        find_indentation(press, background, valid=np.ones((5, 5), dtype=np.bool_))
-    with pytest.raises(InputError, match="empty"):
-        find_indentation(press, background, valid=np.zeros((HEIGHT, WIDTH), dtype=np.bool_))
 
 
 def stretched(images: Images, factor: float) -> Images:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.design.parts import CameraDesign, LayerDesign, LedDesign, MembraneDesign
+from gelpolight_core.design.parts import CameraDesign, LayerDesign, MembraneDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder, press
@@ -210,14 +210,3 @@ def test_one_seed_gives_one_sequence_of_bytes() -> None:
     assert np.array_equal(frames[1], second.frame(BareMembrane()))
     assert not np.array_equal(frames[0], frames[1])
     assert not np.array_equal(frames[0], VirtualSensor(design, 6).frame(BareMembrane()))
-
-
-def test_crosstalk_mixes_the_lamps_as_the_matrix_says() -> None:
-    design = small_design(
-        leds=tuple(
-            LedDesign(led.x_mm, led.y_mm, led.height_mm, power)
-            for led, power in zip(SensorDesign().leds, (1.0, 0.0, 0.0), strict=True)
-        )
-    )
-    seen = VirtualSensor(design).brightness(Whiteboard()).sum(axis=(0, 1))
-    assert np.allclose(seen / seen[0], np.array(design.photometry.crosstalk)[:, 0])

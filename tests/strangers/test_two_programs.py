@@ -13,8 +13,6 @@ import pytest
 from app.services.settings import Settings
 from app.workspace.workspace import Workspace
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.lock import RunLock
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
@@ -133,25 +131,3 @@ def test_settings_of_both_are_kept(tmp_path: Path) -> None:
     two.save()
     again = Settings(tmp_path / "desktop.ini")
     assert (again.theme, again.last_page) == ("dark", "measure")
-
-
-def test_the_folder_of_a_run_is_written_by_one_program(tmp_path: Path) -> None:
-    script = (
-        "import sys; from pathlib import Path;"
-        "from gelpolight_core.io.lock import RunLock;"
-        "held = RunLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.readline()"
-    )
-    program = subprocess.Popen(
-        [sys.executable, "-c", script, str(tmp_path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(HERE.parents[1])},
-        text=True,
-    )
-    assert program.stdout is not None
-    assert program.stdout.readline() == "held\n"
-    with pytest.raises(InputError, match=rf"is being written by .*process {program.pid}"):
-        RunLock(tmp_path)
-    program.kill()
-    program.communicate()
-    RunLock(tmp_path).release()

@@ -16,7 +16,6 @@ from technician import ScriptedCamera, Technician, read_rgb
 from app.context.context import AppContext
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
-from gelpolight_core.session.session import read_session
 
 Made = Callable[[], CalibrationProject]
 
@@ -220,27 +219,6 @@ def test_an_unsaved_image_is_reported_after_the_session_is_closed(
     assert "disk is full" in caplog.text
     monkeypatch.undo()
     technician.begin(project, "balls")
-
-
-def test_a_ball_that_could_not_be_written_leaves_no_radius_behind(
-    computed_project: Made, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    project = computed_project()
-    radii = dict(project.session.ball_radii_mm)
-    monkeypatch.setattr(
-        "gelpolight_core.calibration.editable_session.write_image",
-        lambda *_, **__: raise_disk_full(),
-    )
-    with pytest.raises(Exception, match="disk is full"):
-        project.add_capture(Stage.BALLS, [np.zeros((240, 320, 3), np.uint8)], radius_mm=2.0)
-    assert read_session(project.session.folder).ball_radii_mm == radii
-
-
-def raise_disk_full() -> None:
-    """Fail to write."""
-    from gelpolight_core.errors import InputError
-
-    raise InputError("the disk is full", where="ball", advice="Free some space")
 
 
 @pytest.mark.parametrize("name", ["session.toml", "decisions.toml"])

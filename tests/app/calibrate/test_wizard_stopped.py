@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from technician import Technician
@@ -36,17 +35,3 @@ def test_the_curves_appear_after_earlier_work_was_stopped(
     hold.set()
     technician.until(lambda: curves.editor is not None)
     technician.rest()
-
-
-def test_a_waiting_report_that_was_stopped_is_reported(
-    technician: Technician, computed_project: Made, hold: threading.Event, tmp_path: Path
-) -> None:
-    technician.begin(computed_project(), "result")
-    wizard = technician.wizard
-    wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait(60.0)))
-    wizard.at("result").saving.write_report(tmp_path / "report.pdf")
-    wizard.panel.cancel_wanted.emit()
-    hold.set()
-    technician.rest()
-    assert wizard.at("result").view.saved.text() == "Writing the report: stopped"
-    assert not (tmp_path / "report.pdf").exists()

@@ -61,19 +61,6 @@ def test_uncertainty_is_computed_for_frozen_images_only(
     assert reconstruction.asked[0]["uncertainty"] is expected
 
 
-def test_new_display_settings_do_not_reconstruct_a_frozen_image(
-    dome: HeightMap, frame: Frame
-) -> None:
-    reconstruction = Reconstruction(dome)
-    maker = Maker(reconstruction)  # type: ignore[arg-type]
-    maker.wanted = Wanted(height=True, still=True)
-    before = maker(frame)
-    maker.wanted = Wanted(height=True, still=True, display=Display(colours="inferno"))
-    after = maker(frame)
-    assert len(reconstruction.asked) == 1
-    assert not np.array_equal(before.height, after.height)
-
-
 def test_the_profile_on_screen_equals_that_of_the_core(dome: HeightMap, frame: Frame) -> None:
     from gelpolight_core.measurement.profile import take_profile, width_at
 

@@ -11,7 +11,6 @@ from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.live.session import LiveSession
-from app.sources.processor import Outcome
 from app.sources.source import Frame, Setting, SourceInfo, SourceLost
 
 WAIT_MS = 5000
@@ -65,21 +64,6 @@ def live(context: AppContext, camera: Camera) -> Iterator[LiveSession]:
     context.source.choose(camera.info)
     yield session
     session.finish()
-
-
-def test_results_of_a_replaced_function_are_dropped(live: LiveSession) -> None:
-    reported = list[object]()
-    live.processed.connect(reported.append)
-    frame = Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)
-    before = Outcome(live._processor.generation, frame, "before")
-    live._outbox.put(before)
-    live.process(lambda _frame: "now")
-    live._poll()
-    assert reported == []
-    now = Outcome(live._processor.generation, frame, "now")
-    live._outbox.put(now)
-    live._poll()
-    assert reported == [now]
 
 
 def test_a_frozen_frame_is_not_replaced_by_one_that_was_in_progress(
@@ -149,18 +133,3 @@ def test_a_lost_camera_is_reported_until_it_is_opened_again(
     camera.lost.clear()
     live.open()
     assert reasons[-1] == ""
-
-
-def test_the_status_names_the_chosen_camera_whoever_closes_a_session(
-    live: LiveSession, camera: Camera, context: AppContext
-) -> None:
-    """A hidden page that hears of another source must not take its name off the status bar."""
-    live.enter(True)
-    hidden = LiveSession(context=context, name="hidden")
-    context.source.choose(camera.info)
-    assert context.status.value.camera == camera.name
-    hidden.finish()
-    assert context.status.value.camera == camera.name
-    live.enter(False)
-    assert context.status.value.camera == f"{camera.name}, idle"
-    assert context.status.value.rate_hz is None

@@ -122,19 +122,6 @@ def drag(view: LiveView, start: tuple[float, float], end: tuple[float, float]) -
     QApplication.processEvents()
 
 
-@pytest.mark.parametrize(("u", "v"), [(0, 0), (7, 5), (WIDTH - 1, HEIGHT - 1)])
-def test_whole_numbers_are_pixel_centres(view: LiveView, u: int, v: int) -> None:
-    """Not their corners: half a pixel would shift every mark that the user sets."""
-    rgb = black()
-    rgb[v, u] = 255
-    view.show_image(rgb)
-    image_view = child(view, "live.image")
-    x, y = image_view.view_position(u, v)
-    shown = middle(pixels(image_view).min(axis=2) > 128)
-    # An image pixel has ten screen pixels; smoothing and rounding leave one.
-    assert shown == pytest.approx((x, y), abs=1.0)
-
-
 @pytest.mark.parametrize("kind", ["cross", "plus", "ring", "dot"])
 def test_a_marker_sits_on_the_centre_of_its_pixel(view: LiveView, kind: Any) -> None:
     rgb = black()
@@ -215,20 +202,6 @@ def test_the_newest_frame_of_a_stream_is_shown(view: LiveView, qtbot: QtBot) -> 
     qtbot.waitUntil(lambda: bool((pixels(image_view)[300, 450] == (0, 90, 0)).all()))
     assert child(view, "live.rate").text() == "30 frames/s, 2 dropped"
     assert child(view, "live.focus").isVisible()
-
-
-def test_a_frozen_image_stays_while_the_stream_continues(view: LiveView, qtbot: QtBot) -> None:
-    stream = FakeStream()
-    view.set_stream(stream)
-    stream.put(np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
-    image_view = child(view, "live.image")
-    qtbot.waitUntil(lambda: bool((pixels(image_view)[300, 450] == 90).all()))
-    view.freeze(True)
-    stream.put(np.full((HEIGHT, WIDTH, 3), 30, np.uint8))
-    qtbot.wait(80)
-    assert (pixels(image_view)[300, 450] == 90).all()
-    view.freeze(False)
-    qtbot.waitUntil(lambda: bool((pixels(image_view)[300, 450] == 30).all()))
 
 
 def test_the_reason_for_a_lost_camera_is_shown(view: LiveView, qtbot: QtBot) -> None:

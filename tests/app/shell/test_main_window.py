@@ -20,7 +20,6 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
-    QDialog,
     QLabel,
     QPlainTextEdit,
     QPushButton,
@@ -357,16 +356,6 @@ def test_the_edit_menu_names_what_it_undoes(window: MainWindow) -> None:
 def dialog_of(window: MainWindow, kind: type) -> QWidget:
     (dialog,) = [w for w in window.findChildren(kind) if w.isVisible()]
     return dialog
-
-
-@pytest.mark.parametrize("name", ["precision", "design"])
-def test_a_tool_opens_once_and_closes_with_the_window(window: MainWindow, name: str) -> None:
-    for _ in range(2):
-        window.findChild(QAction, f"tools.{name}").trigger()
-    dialog = dialog_of(window, QDialog)
-    assert dialog.objectName() == name
-    window.close()
-    assert not dialog.isVisible()
 
 
 def test_the_shortcut_sheet_lists_every_shortcut_once(window: MainWindow, qtbot: QtBot) -> None:

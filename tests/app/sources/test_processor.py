@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
-import weakref
 from collections.abc import Iterator
 
 import numpy as np
@@ -48,14 +46,6 @@ def line() -> Iterator[Line]:
     line.processor.start()
     yield line
     line.processor.stop()
-
-
-def test_the_last_image_is_not_kept(line: Line) -> None:
-    kept = weakref.ref(line.result(1).frame.rgb)
-    end = time.monotonic() + WAIT_S
-    while kept() is not None and time.monotonic() < end:
-        time.sleep(0.005)
-    assert kept() is None
 
 
 def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line: Line) -> None:

@@ -12,7 +12,6 @@ from app.inspect.export import frame_name
 from app.sources.recording import RecordingSource
 from app.sources.source import Frame
 from app.sources.stream import Stream
-from gelpolight_core.errors import InputError
 from gelpolight_core.recording import layout
 
 WAIT_S = 60.0
@@ -168,17 +167,6 @@ def test_a_damaged_frame_is_skipped_and_counted(path: Path, clock: Clock) -> Non
     source.step(1)
     assert [k for _, k in watch(source, clock, 0.01)] == [3]
     source.close()
-
-
-def test_a_completely_damaged_recording_is_rejected(tmp_path: Path) -> None:
-    write_recording(tmp_path / "a.gplrec", frames=2)
-    for frame in range(2):
-        spoil(tmp_path / "a.gplrec", frame)
-    stream = Stream(RecordingSource(tmp_path / "a.gplrec"))
-    stream.start()
-    with pytest.raises(InputError, match="Frame 1 is damaged"):
-        stream.capture(1).result(WAIT_S)
-    stream.stop()
 
 
 def test_a_stream_receives_frames_of_a_paused_recording(path: Path) -> None:

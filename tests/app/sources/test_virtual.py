@@ -212,16 +212,6 @@ def test_closing_does_not_wait_for_a_slow_image() -> None:
     assert not any(thread.name == "virtual sensor" for thread in threading.enumerate())
 
 
-def test_opening_and_closing_twenty_times_leaves_nothing() -> None:
-    stream = Stream(VirtualSource(Bench(SensorDesign().scaled(0.1))))
-    before = threading.active_count()
-    for _ in range(20):
-        stream.start()
-        stream.capture(1).result(WAIT_S)
-        stream.stop()
-    assert threading.active_count() == before
-
-
 def test_an_error_while_rendering_is_reported_by_the_stream(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -13,9 +13,8 @@ from pytestqt.qtbot import QtBot
 from app.context.context import AppContext
 from app.start.card import Card
 from app.start.page import StartPage
-from app.workspace.sessions import STAGES, read_session_entry
+from app.workspace.sessions import read_session_entry
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.inputs import FOLDERS
 
 
 @pytest.fixture
@@ -41,11 +40,6 @@ def session_of(context: AppContext, serial: str, name: str, *folders: str) -> Pa
         image = QImage(grey.data, 16, 12, QImage.Format.Format_Grayscale8)
         assert image.save(str(folder / stage / "a.png"))
     return folder
-
-
-def test_a_first_start_offers_only_what_can_begin(page: StartPage) -> None:
-    shown = [card.objectName() for card in page.findChildren(Card) if card.isVisible()]
-    assert shown == ["home.new", "home.open", "home.demo"]
 
 
 def test_the_session_that_is_not_finished_is_continued_at_its_step(
@@ -84,10 +78,6 @@ def test_the_last_calibration_leads_straight_to_inspect(
         page.use.click()
     assert asked.args == ["inspect"]
     assert context.workspace.in_use == path
-
-
-def test_the_stages_of_a_session_are_those_of_the_calibration() -> None:
-    assert STAGES == {folder: stage.value for stage, folder in FOLDERS.items()}
 
 
 def test_a_closed_sensor_goes_on_with_its_own_stages(context: AppContext) -> None:

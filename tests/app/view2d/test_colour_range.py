@@ -59,14 +59,6 @@ def test_a_lighter_press_has_a_smaller_range_after_a_while_and_not_before() -> N
     assert shown[1] == pytest.approx(0.2)
 
 
-def test_a_recording_that_starts_again_does_not_disturb_the_range() -> None:
-    colours = ColourRange()
-    colours.update(_press(0.9), 1000.0)
-    assert colours.update(_press(0.15), 0.0)[1] == pytest.approx(1.0)
-    shown, _ = _run(colours, _press(0.15), 0.5 * SHRINK_AFTER_S, 0.0)
-    assert shown[1] == pytest.approx(1.0)
-
-
 def test_negative_depths_have_colours_where_they_matter() -> None:
     colours = ColourRange()
     assert colours.update(_press(0.9, -0.05), 0.0) == (0.0, pytest.approx(1.0))

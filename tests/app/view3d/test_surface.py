@@ -5,17 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.view3d.surface import LIVE_NODES, ColourScale, surface_of
+from app.view3d.surface import ColourScale, surface_of
 from gelpolight_core.reconstruction.height_map import HeightMap
 from tests.app.view3d.conftest import BUMP, SMALL, Made
-
-
-def test_the_live_mesh_is_coarse_and_the_frozen_one_has_every_node(
-    made: Made, heightmap: HeightMap
-) -> None:
-    live, whole = made(largest=60), made()
-    assert max(live.depth_mm.shape) <= 61 < LIVE_NODES
-    assert whole.depth_mm.shape[1] == heightmap.depth_mm.shape[1]
 
 
 def test_the_mesh_ends_at_the_rim_of_the_working_area(made: Made) -> None:

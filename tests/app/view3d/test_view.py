@@ -17,7 +17,6 @@ from app.services.settings import Settings
 from app.view2d.display import colour_table
 from app.view3d.panel import SurfacePanel
 from app.view3d.style import VIEWS, Style
-from app.view3d.surface import SurfaceLine
 from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, Made, flat_map, pixels
 
 PLAIN = Style(axes=False, colour_bar=False, orientation=False)
@@ -185,37 +184,6 @@ def test_the_clip_plane_hides_one_side_and_can_be_removed(
     assert view.scene.clip is None
     again = _drawn(panel, qtbot)
     assert np.abs(_colour_at(again, hidden) - _colour_at(whole, hidden)).max() < 12
-
-
-def test_a_line_on_the_surface_is_hidden_behind_the_relief(
-    panel: SurfacePanel, qtbot: QtBot
-) -> None:
-    panel.set_style(replace(PLAIN, exaggeration=4.0))
-    line = SurfaceLine(((BUMP[0] - 0.5, BUMP[1] - 3.0), (BUMP[0] + 0.5, BUMP[1] - 3.0)), "#ff0000")
-
-    def red_seen() -> int:
-        image = _drawn(panel, qtbot).astype(int)
-        return int(((image[..., 0] > 200) & (image[..., 1:].max(axis=2) < 60)).sum())
-
-    panel.view_from("top")
-    assert red_seen() == 0
-    panel.show_lines((line,))
-    assert red_seen() > 20
-    # From the front, the bump hides it.
-    panel.view_from("front")
-    assert red_seen() == 0
-
-
-def test_keys_of_the_page_reach_the_page(panel: SurfacePanel, qtbot: QtBot) -> None:
-    view = panel.view
-    assert view is not None
-    # VTK's own keys: exit, wireframe, pick, stereo.
-    for key in (Qt.Key.Key_Q, Qt.Key.Key_E, Qt.Key.Key_W, Qt.Key.Key_P, Qt.Key.Key_3):
-        qtbot.keyClick(view, key)
-    assert view.isVisible() and view.scene._sheet.actor.prop.style.lower() == "surface"
-    before = view.scene.viewpoint
-    qtbot.keyClick(view, Qt.Key.Key_Left)
-    assert view.scene.viewpoint != before
 
 
 def test_a_click_on_the_orientation_widget_changes_the_view(

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtGui import Qt, QTextDocument
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 import app
 from app.theme import theme
-from app.widgets.label import MarkupLabel, PlainLabel, escaped, plain_tip
-from app.widgets.naming import named
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 
 EVIL = ["<img src=x>", "<h1>Sensor 7</h1>", "a <b>bold</b> & @pass note\nof two lines", "&lt;"]
 SOURCES = sorted(Path(app.__file__).parent.rglob("*.py"))
@@ -46,15 +45,6 @@ def test_markup_shows_text_from_outside_literally(text: str, qtbot: QtBot) -> No
     label = MarkupLabel(f"<b>{escaped(text)}</b>")
     qtbot.addWidget(label)
     assert seen(label.text()) == text
-
-
-@pytest.mark.parametrize("text", EVIL)
-def test_a_tooltip_shows_text_from_outside_literally(text: str, qtbot: QtBot) -> None:
-    widget = named(QWidget(), "a", "b", text)
-    qtbot.addWidget(widget)
-    tip = widget.toolTip()
-    assert (seen(tip) if Qt.mightBeRichText(tip) else tip) == text
-    assert plain_tip("5 < 6 mm") == "5 < 6 mm"
 
 
 def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:

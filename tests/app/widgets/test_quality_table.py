@@ -44,17 +44,6 @@ def test_failing_figures_show_advice(widget: QualityTableWidget) -> None:
     ]
 
 
-def test_new_values_leave_selection_and_items_where_they_are(widget: QualityTableWidget) -> None:
-    widget.set_table(table(0.2, 16))
-    widget._grid.selectRow(1)
-    item, height = widget._grid.item(0, 2), widget._grid.height()
-    widget.set_table(table(0.1, 15))
-    assert widget._grid.item(0, 2) is item
-    assert item.text() == "0.1 px"
-    assert widget._grid.height() == height
-    assert {index.row() for index in widget._grid.selectedIndexes()} == {1}
-
-
 def test_rows_can_be_copied_by_the_keyboard(widget: QualityTableWidget, qtbot: QtBot) -> None:
     widget.set_table(table(0.2, 16))
     widget.copy()

@@ -13,7 +13,7 @@ import pytest
 from technician import Technician
 
 from app.calibrate import validation as validating
-from app.workspace.validation import Comparison, Validation, validation_path, write_validation
+from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.project import CalibrationProject
@@ -85,29 +85,6 @@ def test_a_doubtful_trial_cannot_be_recorded(
     assert not panel.keep.isEnabled()
     assert panel.result.property("meaning") == "warn"
     assert "cut by the border" in panel.result.text()
-
-
-def test_an_old_trial_cannot_be_recorded_during_the_next_measurement(
-    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    path = save(technician, computed_project(), tmp_path / "workspace")
-    step, panel = (
-        technician.wizard.at("validation").validating,
-        technician.wizard.at("validation").form,
-    )
-    step.import_press(small_session / PRESS)
-    technician.until(panel.keep.isEnabled)
-    held = Held(validating.run_trial)
-    monkeypatch.setattr(validating, "run_trial", held)
-    step.import_press(small_session / PRESS)
-    assert not panel.keep.isEnabled()
-    step.keep()
-    assert not validation_path(path).exists()
-    held.go.set()
-    technician.until(panel.keep.isEnabled)
-    technician.click("validation.keep")
-    assert technician.state("validation") == "pass"
 
 
 def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(

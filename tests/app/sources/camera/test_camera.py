@@ -314,19 +314,3 @@ def test_a_slow_reopening_does_not_end_a_stream(
     eventually(lambda: stream.figures().lost is None)
     assert len(stream.capture(1).result(20.0)) == 1
     stream.stop()
-
-
-def test_a_slow_first_opening_is_not_a_loss(
-    camera: Camera, fake: FakeCamera, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("app.sources.camera.camera.SLOW_REOPEN_S", 0.0)
-    fake.hangs = threading.Event()
-    stream = Stream(CameraSource(camera))
-    stream.start()
-    waiting = stream.capture(1)
-    eventually(lambda: camera.state.phase == "opening")
-    time.sleep(0.3)
-    assert stream.figures().lost is None
-    fake.hangs.set()
-    assert len(waiting.result(20.0)) == 1
-    stream.stop()
