@@ -19,10 +19,10 @@ from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture
-def session(virtual_session: Path, tmp_path: Path) -> Path:
-    """Return a copy of the virtual session for modification."""
+def session(small_session: Path, tmp_path: Path) -> Path:
+    """Return a copy of the small session for modification."""
     ignored = shutil.ignore_patterns("presses", "truth")
-    return Path(shutil.copytree(virtual_session, tmp_path / "session", ignore=ignored))
+    return Path(shutil.copytree(small_session, tmp_path / "session", ignore=ignored))
 
 
 def test_a_copied_image_is_refused_for_every_caller(session: Path) -> None:

@@ -19,7 +19,7 @@ from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
 
 HERE = Path(__file__).resolve().parent
-ROUNDS = 12
+ROUNDS = 6
 
 AT_WORK = """
 import json, sys
@@ -125,9 +125,9 @@ def test_who_decides_second_is_reported_in_a_sentence(
 
 def test_settings_of_both_are_kept(tmp_path: Path) -> None:
     one, two = Settings(tmp_path / "desktop.ini"), Settings(tmp_path / "desktop.ini")
-    one.theme = "dark"
+    one.prefer(theme="dark")
     one.save()
-    two.last_page = "measure"
+    two.prefer(last_page="measure")
     two.save()
     again = Settings(tmp_path / "desktop.ini")
-    assert (again.theme, again.last_page) == ("dark", "measure")
+    assert (again.preferences.theme, again.preferences.last_page) == ("dark", "measure")
