@@ -31,6 +31,7 @@ from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import difference, usable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.misfit import Misfit, solve_misfit
+from gelpolight_core.reconstruction.modes import IN_PLACE
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
@@ -190,7 +191,7 @@ class Maker:
         raw, depth_ms = self._heightmap(frame, wanted)
         done = self._process(raw, wanted.processing) if wanted.still else Processed(raw)
         heightmap = done.heightmap
-        misfit = self._misfit(frame, raw, wanted) if wanted.quality == "misfit" else None
+        misfit = self._misfit(frame, raw, wanted)
         misfit_top = 0.0 if misfit is None else self._steady_top(misfit, frame)
         # A processed map has a range of its own, which the live images do not continue.
         colours = ColourRange() if done.steps else self.colour_range
@@ -237,7 +238,9 @@ class Maker:
         self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
 
-    def _misfit(self, frame: Frame, heightmap: HeightMap, wanted: Wanted) -> Misfit:
+    def _misfit(self, frame: Frame, heightmap: HeightMap, wanted: Wanted) -> Misfit | None:
+        if wanted.quality != "misfit" or heightmap.model == IN_PLACE:
+            return None
         reconstructor = self.best if wanted.still else self.live
         assert reconstructor is not None
         nodes = MISFIT_NODES[wanted.still]

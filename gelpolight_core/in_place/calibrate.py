@@ -69,8 +69,6 @@ OUTLIER = 3.0
 """A press is left out if its error is this multiple of the median ..."""
 LEAST_OUTLIER = 0.12
 """... and above this root mean square slope."""
-WANDERS = 0.01
-"""Scatter of the images' common brightness above which it is corrected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,8 +195,7 @@ def calibrate_in_place(
     base = reference(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
     refuse_other_view(images, reduced)
-    follow = _wanders(images, base)
-    work = _begin(presses, images, base, grid, follow, say)
+    work = _begin(presses, images, base, grid, say)
     sums, ridge = _sums(work), FIRST_RIDGE
     for turn in range(ROUNDS):
         if turn == 0:
@@ -221,8 +218,7 @@ def calibrate_in_place(
         _seen_colours(work),
         max(_steepest(ball) for ball in work.balls),
         error_curve(held_out, pitch_mm=grid.pitch_mm),
-        follow,
-        scale_sd,
+        scale_sd=scale_sd,
     )
     say(1.0)
     return InPlaceResult(
@@ -235,19 +231,11 @@ def calibrate_in_place(
     )
 
 
-def _wanders(images: Sequence[Map], base: Reference) -> bool:
-    """Return whether the common brightness of the images scatters."""
-    changes = in_parallel(lambda image: colour_change(image, base, follow_gain=True), images)
-    gains = [seen.gain for seen in changes]
-    return bool(gains) and float(np.std(gains, axis=0).max()) > WANDERS
-
-
 def _begin(
     presses: Sequence[PressImage],
     images: Sequence[Map],
     base: Reference,
     grid: WorkingGrid,
-    follow: bool,
     say: Callable[[float], None],
 ) -> _Work:
     """Find the contact in each reduced image."""
@@ -262,7 +250,7 @@ def _begin(
                 edge, _ = find_contact(image, base, ball_radius=radius, name=press.name)
         except InputError as fault:
             return fault
-        seen = colour_change(image, base, follow_gain=follow)
+        seen = colour_change(image, base)
         return seen, Ball(edge.x, edge.y, edge.radius, radius).limited()
 
     work = _Work([], [], [], [], {})

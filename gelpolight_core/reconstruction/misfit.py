@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import require_open
 from gelpolight_core.reconstruction.linear import as_linear
 from gelpolight_core.reconstruction.near_light.maps import COARSE, LEAST_SHARE, SensorMaps
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -38,8 +38,7 @@ class Misfit:
     ----------
     model : str
         ``paper``: | |n| - 1 |; ``full``: root mean square over the channels of the brightness seen
-        less the brightness explained, in units of the flat membrane's; ``in-place``: slope seen
-        less slope of the depth.
+        less the brightness explained, in units of the flat membrane's.
     values : (rows, columns) float32
         NaN where it is not known.
     """
@@ -56,7 +55,7 @@ def solve_misfit(
     Parameters
     ----------
     reconstructor : Reconstructor
-        The reconstructor of the height map.
+        The reconstructor of the height map, of an open sensor.
     frame : (height, width, 3)
         The raw image, as given to :meth:`Reconstructor.depth`.
     heightmap : HeightMap
@@ -68,14 +67,15 @@ def solve_misfit(
     ------
     ValueError
         If normals are needed and missing.
+    InputError
+        If the sensor is closed: its colours determine no more than the slopes.
     """
     rows, columns = heightmap.depth_mm.shape
     step = max(-(-max(rows, columns) // largest), 1)
     thin = np.s_[step // 2 :: step, step // 2 :: step]
     inside = heightmap.flags[thin] & Flag.OUTSIDE.value == 0
-    calibration = reconstructor.calibration
-    if isinstance(calibration, InPlaceCalibration):
-        return Misfit(heightmap.model, np.where(inside, _slope_misfit(heightmap, thin), np.nan))
+    where = reconstructor.calibration.identity
+    calibration = require_open(reconstructor.calibration, where=where)
     full = calibration.full
     if heightmap.model != "full" or full is None:
         left = reconstructor.slopes(frame).length_error[thin]
@@ -89,16 +89,6 @@ def solve_misfit(
         gain = np.ones(3) if light is None else light.share
         left = _image_misfit(seen, gain, calibration, full, heightmap, thin, inside)
     return Misfit(heightmap.model, np.where(inside, left, np.nan).astype(np.float32))
-
-
-def _slope_misfit(heightmap: HeightMap, thin: tuple[slice, slice]) -> Map:
-    """Return the difference between the measured slopes and those of the depth."""
-    if heightmap.normals is None:
-        raise ValueError("the misfit of calibration in place needs the normals")
-    down, across = np.gradient(heightmap.depth_mm, heightmap.pitch_mm)
-    n = heightmap.normals
-    left = np.hypot(n[..., 0] / n[..., 2] - across, n[..., 1] / n[..., 2] - down)
-    return np.asarray(left[thin], np.float32)
 
 
 def _image_misfit(

@@ -47,6 +47,8 @@ from gelpolight_core.stated_lengths import stated_sd
 from gelpolight_core.translation import tr
 
 LIGHT = tr("light of the image")
+STATED_CHANGE = 0.01
+"""Change of a closed sensor's light that is stated: its images scatter by less."""
 
 
 class Reconstructor:
@@ -209,7 +211,7 @@ class Reconstructor:
         else:
             steps = tuple(TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS)
             found = Trace(self.effort, steps)
-        return replace(found, steps=(_light_step(light), *found.steps))
+        return replace(found, steps=(_light_step(light and light.share), *found.steps))
 
     def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
         """Return the depth's slopes of a raw frame (height, width, 3), RGB.
@@ -272,12 +274,13 @@ class Reconstructor:
         else:
             found = self._paper_depth(frame, name, normals, health.light)
         assert found.trace is not None
+        light = _light_step(health.light and health.light.share)
         return replace(
             found,
             health=health,
             notes=(*(finding.line for finding in health.findings), *found.notes),
             faults=(*found.faults, *(finding.cause for finding in health.faults)),
-            trace=replace(found.trace, steps=(_light_step(health.light), *found.trace.steps)),
+            trace=replace(found.trace, steps=(light, *found.trace.steps)),
         )
 
     def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
@@ -371,7 +374,10 @@ class Reconstructor:
             with_normals=normals,
             uncertainty=uncertainty,
         )
-        heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, found.notes)
+        light = _light_step(found.gain)
+        changed = np.abs(found.gain - 1.0).max() > STATED_CHANGE
+        notes = (*((Note(light.reason, doubtful=False),) if changed else ()), *found.notes)
+        heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
         return replace(
             heightmap,
             slope_sd=found.slope_sd,
@@ -382,7 +388,7 @@ class Reconstructor:
             # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
             depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
             lateral_scale_sd=model.scale_sd,
-            trace=found.trace,
+            trace=replace(found.trace, steps=(light, *found.trace.steps)),
         )
 
     def _heightmap(
@@ -460,10 +466,10 @@ def _notes(found: NearLightDepth) -> Notes:
     return (*notes, *unsolved_notes(found.unsolved), *hidden)
 
 
-def _light_step(light: LightGain | None) -> TraceStep:
-    """Return the trace step about the light of a frame."""
-    if light is None:
+def _light_step(gain: NDArray[np.float64] | None) -> TraceStep:
+    """Return the trace step about the light (3,) of a frame over that at calibration."""
+    if gain is None:
         return TraceStep(LIGHT, False, tr("it is as at calibration, or cannot be corrected"))
-    shares = ", ".join(f"{share:.4f}" for share in light.share)
+    shares = ", ".join(f"{share:.4f}" for share in gain)
     reason = tr("red, green and blue are {shares} of those at calibration, which is corrected")
     return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)

@@ -11,6 +11,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
 from gelpolight_core.in_place.next_ball import next_position
 from gelpolight_core.in_place.scale import scale_from_pins
+from gelpolight_core.reconstruction.in_place.change import light_gain, reference
 from gelpolight_core.reconstruction.in_place.depth import depth_of, normals
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reconstruction.in_place.model import (
@@ -50,6 +51,17 @@ def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit() -> None:
     x, y = np.meshgrid(*position_axes(12, 17))
     wanted = design_rows(change.reshape(-1, 3), x.ravel(), y.ravel()) @ coefficients
     assert found.reshape(-1, 2) == pytest.approx(wanted, abs=2e-4)
+
+
+def test_the_light_is_that_of_the_untouched_part_also_with_a_third_pressed() -> None:
+    random = np.random.default_rng(3)
+    background = random.uniform(0.2, 0.5, (120, 160, 3)).astype(np.float32)
+    base = reference(background)
+    light = np.array([0.8, 1.05, 1.0], np.float32)
+    seen = base.smooth * light * random.normal(1.0, 0.01, background.shape).astype(np.float32)
+    pressed = random.uniform(0.9, 1.8, (120, 54, 3)).astype(np.float32)
+    seen[:, :54] *= pressed
+    assert light_gain(seen, base) == pytest.approx(light, rel=0.003)
 
 
 def test_normals_are_those_of_the_depth_map() -> None:

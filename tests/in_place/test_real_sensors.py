@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gelpolight_core import Measurement, measure, read_image
 from gelpolight_core.calibration.in_place_session import calibrate_closed_session
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.closed import ClosedSession, read_any_session
@@ -52,6 +53,37 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None
         errors.append(float(np.degrees(np.arccos(cosine)).mean()))
     # Labels of 1 to 2 px alone cost 1.5 degrees.
     assert np.mean(errors) < 2.8
+
+
+def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data: Path) -> None:
+    """x0.95 read 11.6 for 12.7 mm and ok, x1.05 no object at all."""
+    session = real_session(shared_data, "mini-1")
+    names = ("ball_03.png", "ball_20.png", "ball_40.png")
+    # Every third ball, and none of those that are measured.
+    excluded = {
+        f"balls/{path.name}"
+        for n, path in enumerate(session.files("balls"))
+        if n % 3 or path.name in names
+    }
+    training = replace(session, decisions=replace(session.decisions, excluded=frozenset(excluded)))
+    reconstructor = Reconstructor(calibrate_closed_session(training).calibration)
+    for name in names:
+        image = read_image(session.folder / "balls" / name)
+
+        def exposed(gain: float, image: np.ndarray = image) -> Measurement:
+            frame = np.clip(np.rint(gain * image.astype(float)), 0, 255).astype(np.uint8)
+            height_map = reconstructor.depth(frame, uncertainty=True)
+            stated = any("corrected" in note for note in height_map.notes)
+            assert stated or gain == 1.0
+            return measure(height_map, shape="ball")
+
+        alone = exposed(1.0)
+        for gain in (0.8, 0.95, 1.05, 1.1):
+            found = exposed(gain)
+            assert found.verdict == alone.verdict
+            assert found.diameter_mm == pytest.approx(
+                alone.diameter_mm, abs=0.2 * alone.sd["diameter_mm"]
+            )
 
 
 def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data: Path) -> None:

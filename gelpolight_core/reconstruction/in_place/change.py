@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.health.judging import LED_OFF
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reflectance.markers import Markers, find_markers
 
@@ -22,7 +23,7 @@ SMOOTHING_NODES = 2.0
 OFFSET = 0.02
 """Added to the background in the divisor, so that noise of dark areas is not amplified."""
 LARGEST_CHANGE = 4.0
-GAIN_STEP = 5
+GAIN_STEP, GAIN_ROUNDS = 5, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +81,8 @@ def reference(background: Map) -> Reference:
     return Reference(background, _smooth(background, plain), markers, known, plain)
 
 
-def colour_change(image: Map, base: Reference, *, follow_gain: bool = False) -> ColourChange:
-    """Return how an image differs from the untouched membrane.
+def colour_change(image: Map, base: Reference) -> ColourChange:
+    """Return how an image differs from the untouched membrane, but for the strength of its light.
 
     Parameters
     ----------
@@ -89,9 +90,6 @@ def colour_change(image: Map, base: Reference, *, follow_gain: bool = False) -> 
         Linear light on the working grid; what is not finite is left out.
     base : Reference
         The untouched membrane.
-    follow_gain : bool, optional
-        Whether a common change of each channel's brightness is corrected, for example when the
-        exposure changes.
     """
     # Channel by channel: a reduction over an axis of three is ten times slower.
     red, green, blue = (image[..., k] for k in range(3))
@@ -104,28 +102,29 @@ def colour_change(image: Map, base: Reference, *, follow_gain: bool = False) -> 
     # Both from the same nodes: gaps shift the position of an average.
     same = np.array_equal(usable, base.plain)
     there = base.smooth if same else _smooth(base.background, usable)
-    gain = np.ones(3)
-    if follow_gain:
-        gain = np.asarray(common_gain(smooth, base), np.float64)
-        smooth = np.asarray(smooth / gain.astype(np.float32), np.float32)
-    change = (smooth - there) / (there + np.float32(OFFSET))
+    gain = light_gain(smooth, base)
+    change = (smooth / gain.astype(np.float32) - there) / (there + np.float32(OFFSET))
     np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE, out=change)
     return ColourChange(change, usable, saturated, gain)
 
 
-def common_gain(smooth: Map, base: Reference) -> NDArray[np.float64]:
-    """Return the median brightness (3,) of an image over its background's."""
+def light_gain(smooth: Map, base: Reference) -> NDArray[np.float64]:
+    """Return the brightness (3,) of an image over its background's, where nothing touches.
+
+    Exposure and LEDs change it from image to image. The half of the nodes that agree best is
+    untouched if the contact covers less than the other half.
+    """
     thin = np.s_[::GAIN_STEP, ::GAIN_STEP]
-    seen, there = smooth[thin], base.smooth[thin]
-    lit: Mask = np.greater(there, 2.0 * OFFSET)
-    return np.array(
-        [
-            float(np.median(seen[..., k][lit[..., k]] / there[..., k][lit[..., k]]))
-            if lit[..., k].any()
-            else 1.0
-            for k in range(3)
-        ]
-    )
+    there = base.smooth[thin]
+    lit = there > 2.0 * OFFSET
+    ratio = np.where(lit, smooth[thin] / np.where(lit, there, 1.0), np.nan)[lit.any(axis=2)]
+    if not lit.any(axis=(0, 1)).all() or (np.nanmedian(ratio, axis=0) < 1.0 + LED_OFF).any():
+        return np.ones(3)
+    gain = np.nanmedian(ratio, axis=0)
+    for _ in range(GAIN_ROUNDS):
+        off = np.nanmax(np.abs(ratio / gain - 1.0), axis=1)
+        gain = np.nanmean(ratio[off <= np.median(off)], axis=0)
+    return np.asarray(gain, np.float64)
 
 
 def _smooth(rgb: Map, usable: Mask) -> Map:

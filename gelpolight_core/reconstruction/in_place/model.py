@@ -76,7 +76,8 @@ class InPlaceModel:
     errors : ErrorCurve
         Of presses that were left out.
     follow_gain : bool
-        Whether a common change of brightness is corrected in each frame.
+        Whether the strength of the light was corrected in the images of the balls: not in some
+        files of older programs. Part of the identity.
     scale_sd : float
         Relative standard deviation of `grid.mm_per_px`.
     """
@@ -87,7 +88,7 @@ class InPlaceModel:
     seen_colours: Map
     steepest: float
     errors: ErrorCurve
-    follow_gain: bool = False
+    follow_gain: bool = True
     scale_sd: float = 0.0
 
     @cached_property
@@ -97,7 +98,7 @@ class InPlaceModel:
 
     def change(self, rgb: Map) -> ColourChange:
         """Return the change of colour in a camera image (height, width, 3)."""
-        return colour_change(self.grid.reduce(rgb), self.reference, follow_gain=self.follow_gain)
+        return colour_change(self.grid.reduce(rgb), self.reference)
 
     def slopes(self, change: Map, workers: RowWorkers | None = None) -> tuple[Map, Map]:
         """Return d(depth)/dx and d(depth)/dy (rows, columns) of a change of colour."""

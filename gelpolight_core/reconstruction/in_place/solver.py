@@ -47,6 +47,8 @@ class InPlaceDepth:
         For the user.
     trace : Trace
         What was done.
+    gain : (3,)
+        Light of each channel over that at calibration, which is corrected.
     slope_sd, depth_sd_mm : (rows, columns) float32 or None
         From the image's noise.
     slope_model_sd, depth_model_sd_mm : (rows, columns) float32 or None
@@ -60,6 +62,7 @@ class InPlaceDepth:
     flags: NDArray[np.uint8]
     notes: Notes
     trace: Trace
+    gain: NDArray[np.float64]
     slope_sd: Map | None = None
     depth_sd_mm: Map | None = None
     slope_model_sd: Map | None = None
@@ -142,6 +145,7 @@ class InPlaceSolver:
             flags,
             (*crossed_notes, *_difference_notes(seen.change)),
             Trace(effort, tuple(record.steps)),
+            seen.gain,
             **(self._deviations(linear, depth, slope_x, slope_y) if uncertainty else {}),
         )
 

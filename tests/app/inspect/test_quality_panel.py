@@ -41,3 +41,22 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(
     assert not panel.map.has_image and not panel._legend.text() and not panel.map.bar.isVisible()
     panel.show_frame(replace(shown, quality_top=0.002), still=True)
     assert panel.map.has_image and panel._legend.text() and panel.map.bar.isVisible()
+
+
+def test_a_closed_sensor_offers_no_misfit(dome: HeightMap, qtbot: QtBot) -> None:
+    """Its three colours determine the slopes and nothing else: the misfit was 0 by construction."""
+    panel = QualityPanel()
+    qtbot.addWidget(panel)
+    panel._what.setCurrentIndex(panel._what.findData("misfit"))
+    frame = Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)
+    maker = Maker(Reconstruction(replace(dome, model="in-place")))  # type: ignore[arg-type]
+    maker.wanted = Wanted(quality=panel.what)
+    shown = maker(frame)
+    assert shown.misfit is None
+    with qtbot.waitSignal(panel.chosen):
+        panel.show_frame(shown, still=True)
+    assert panel._what.findData("misfit") < 0 and panel.what == "flags"
+    maker = Maker(Reconstruction(dome))  # type: ignore[arg-type]
+    maker.wanted = Wanted(quality=panel.what)
+    panel.show_frame(maker(frame), still=True)
+    assert panel._what.findData("misfit") >= 0
