@@ -211,7 +211,7 @@ class Reconstructor:
         else:
             steps = tuple(TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS)
             found = Trace(self.effort, steps)
-        return replace(found, steps=(_light_step(light and light.share), *found.steps))
+        return replace(found, steps=(_light_step(light), *found.steps))
 
     def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
         """Return the depth's slopes of a raw frame (height, width, 3), RGB.
@@ -274,7 +274,7 @@ class Reconstructor:
         else:
             found = self._paper_depth(frame, name, normals, health.light)
         assert found.trace is not None
-        light = _light_step(health.light and health.light.share)
+        light = _light_step(health.light)
         return replace(
             found,
             health=health,
@@ -374,7 +374,7 @@ class Reconstructor:
             with_normals=normals,
             uncertainty=uncertainty,
         )
-        light = _light_step(found.gain)
+        light = _corrected_light(found.gain)
         changed = np.abs(found.gain - 1.0).max() > STATED_CHANGE
         notes = (*((Note(light.reason, doubtful=False),) if changed else ()), *found.notes)
         heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
@@ -466,10 +466,15 @@ def _notes(found: NearLightDepth) -> Notes:
     return (*notes, *unsolved_notes(found.unsolved), *hidden)
 
 
-def _light_step(gain: NDArray[np.float64] | None) -> TraceStep:
-    """Return the trace step about the light (3,) of a frame over that at calibration."""
-    if gain is None:
+def _light_step(light: LightGain | None) -> TraceStep:
+    """Return the trace step about the light of a frame."""
+    if light is None:
         return TraceStep(LIGHT, False, tr("it is as at calibration, or cannot be corrected"))
+    return _corrected_light(light.share)
+
+
+def _corrected_light(gain: NDArray[np.float64]) -> TraceStep:
+    """Return the trace step about a light (3,), over that at calibration, that is corrected."""
     shares = ", ".join(f"{share:.4f}" for share in gain)
     reason = tr("red, green and blue are {shares} of those at calibration, which is corrected")
     return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)
