@@ -71,7 +71,7 @@ class Seen:
     flags : str
         The flags that were set, each with its share of the nodes.
     condition : float or None
-        Largest condition number of the light directions, or that of the joint fit.
+        Largest condition number of the light directions.
     """
 
     summary: str

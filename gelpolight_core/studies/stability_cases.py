@@ -6,7 +6,6 @@ from gelpolight_core.studies.extreme_calibrations import calibration_cases
 from gelpolight_core.studies.extreme_grids import grid_cases
 from gelpolight_core.studies.extreme_images import image_cases
 from gelpolight_core.studies.extreme_sensors import sensor_cases
-from gelpolight_core.studies.extreme_sessions import session_cases
 from gelpolight_core.studies.stability import Case
 
 
@@ -16,6 +15,5 @@ def all_cases() -> tuple[Case, ...]:
         *image_cases(),
         *sensor_cases(),
         *calibration_cases(),
-        *session_cases(),
         *grid_cases(),
     )

@@ -12,11 +12,11 @@ from app.command_line.main import MENDABLE, main
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.session import session_toml
-from gelpolight_core.studies import extreme_sessions
-from gelpolight_core.studies.extreme_sessions import LENGTHS, state_wrongly
 from gelpolight_core.studies.stability import Case, Mode, Outcome, Seen, run_case, seen_once
 from gelpolight_core.studies.stability_cases import all_cases
 from gelpolight_core.studies.trial import judged, standard_press, standard_sensor
+from tests.studies import extreme_sessions
+from tests.studies.extreme_sessions import LENGTHS, session_cases, state_wrongly
 
 CASES = all_cases()
 RIGHT, WRONG = Mode("best", True, 1.0, 2.0), Mode("fast", False, 3.0, 2.0)
@@ -138,7 +138,7 @@ def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode
     whole = SensorDesign()
     fewer = replace(whole, balls=whole.balls[:5])
     monkeypatch.setattr(extreme_sessions, "SensorDesign", lambda: fewer)
-    case = next(c for c in CASES if c.name == "session_scale_0.25")
+    case = next(c for c in session_cases() if c.name == "session_scale_0.125")
     result = run_case(case)
     assert result.outcome is not Outcome.FAILED, result.message
     assert len(result.seen.modes) == 4

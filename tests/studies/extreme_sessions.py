@@ -1,4 +1,6 @@
-"""Extreme calibrations: sessions with too little, damaged or wrong data.
+"""Calibrations from sessions with too little, damaged or wrong data.
+
+    python -m tests.studies.extreme_sessions
 
 Each case changes a session of the virtual sensor, calibrates from it, and measures a press whose
 size is known, in every mode. It passes if height and size are within three stated standard
@@ -31,7 +33,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.studies.stability import Case, Mode, Seen, group
+from gelpolight_core.studies.stability import Case, Mode, Seen, group, run_case
 from gelpolight_core.studies.trial import maps_of
 
 Image = NDArray[np.uint8]
@@ -186,3 +188,8 @@ def _small_spots(image: Image) -> Image:
 def _uneven(share: float, image: Image) -> NDArray[Any]:
     ramp = 1.0 + share * (np.linspace(0.0, 1.0, image.shape[1]) - 0.5)
     return np.asarray(image * ramp[:, None])
+
+
+if __name__ == "__main__":
+    for extreme in session_cases():
+        print(run_case(extreme).line, flush=True)
