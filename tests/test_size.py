@@ -68,7 +68,7 @@ MOST = {
     "gelpolight_core/response": 413,
     "gelpolight_core/session": 1111,
     "gelpolight_core/simulation": 2097,
-    "gelpolight_core/studies": 1328,
+    "gelpolight_core/studies": 1183,
     "tests/.": 1384,
     "tests/app": 11172,
     "tests/batch": 476,
@@ -100,7 +100,7 @@ MOST = {
     "tests/session": 474,
     "tests/simulation": 733,
     "tests/strangers": 1039,
-    "tests/studies": 1166,
+    "tests/studies": 1312,
 }
 
 
