@@ -9,9 +9,7 @@ import scene
 from gelpolight_core.calibration import depth_scale
 from gelpolight_core.calibration.depth_scale import (
     depth_scale_sd,
-    found_depth,
     lateral_scale_sd,
-    synthetic_press,
 )
 from gelpolight_core.calibration.jackknife import jackknife_covariance
 from gelpolight_core.optics.refraction import LayerStack, build_stack
@@ -30,15 +28,6 @@ def full_model(calibration: Calibration) -> FullModel:
         (0.0, 0.0),
         "refined",
     )
-
-
-def test_the_synthetic_press_is_what_the_sensor_would_find() -> None:
-    calibration = scene.calibration()
-    full = full_model(calibration)
-    field, depth, plateau = synthetic_press(full, calibration.table)
-    found = found_depth(full, field, depth)
-    # An edge at the plateau's rim lies between nodes a fifth of a millimetre apart.
-    assert np.median(found[plateau]) == pytest.approx(np.median(depth[plateau]), rel=0.05)
 
 
 def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch: pytest.MonkeyPatch) -> None:

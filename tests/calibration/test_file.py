@@ -110,29 +110,6 @@ def test_a_file_from_before_camera_responses_is_read_as_linear(whole: Path, tmp_
     assert old.identity == scene.calibration().identity
 
 
-@pytest.mark.parametrize(
-    "curves",
-    [
-        np.tile([0.0, 0.6, 0.5, 1.0], (3, 1)),
-        np.tile([0.0, np.nan, 1.0], (3, 1)),
-        np.tile([0.0, 0.5, 0.9], (3, 1)),
-        np.tile(np.linspace(0.0, 1.0, 10_001), (3, 1)),
-        np.tile(np.linspace(0.0, 1.0, 9), (2, 1)),
-    ],
-)
-def test_a_response_that_no_camera_has_is_refused(tmp_path: Path, curves: np.ndarray) -> None:
-    class Forged:
-        """Passes for a response until it is read."""
-
-        def __init__(self) -> None:
-            self.curves = curves
-
-    path = tmp_path / "forged.gplcal"
-    write_calibration(replace(scene.calibration(), response=Forged()), path)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="camera response"):
-        read_calibration(path)
-
-
 def test_the_blur_of_the_lens_comes_back_and_may_be_missing(tmp_path: Path) -> None:
     for blur_px in (None, 0.55):
         before = replace(scene.calibration(), lens_blur_px=blur_px)

@@ -334,23 +334,6 @@ def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors(seed
         assert after <= before
 
 
-def test_pixels_that_do_not_count_change_nothing() -> None:
-    random = np.random.default_rng(8)
-    known = truth()
-    presses = [found_press(pose, random) for pose in BALLS[:3]]
-    pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:3]]
-    spoilt = []
-    for p in pixels:
-        lost = random.uniform(size=p.ratio.shape) < 0.2
-        weight = np.where(lost, 0.0, p.weight)
-        without = replace(p, weight=weight)
-        spoilt.append((without, replace(without, ratio=np.where(lost, 5.0, p.ratio))))
-    clean = refine_jointly(presses, [a for a, _ in spoilt], MIRROR, SLAB)
-    dirty = refine_jointly(presses, [b for _, b in spoilt], MIRROR, SLAB)
-    assert clean.membrane == dirty.membrane
-    assert clean.balls == dirty.balls
-
-
 def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
     random = np.random.default_rng(9)
     known = truth(decay_mm=0.6)
@@ -364,15 +347,6 @@ def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
     assert result.ball_misfits.argmax() == 2
     for index in (0, 1, 3, 4, 5):
         assert np.hypot(*np.subtract(result.balls[index].centre_mm, BALLS[index].centre_mm)) < 0.03
-
-
-def test_views_run_back_along_the_rays() -> None:
-    ray_slope = np.array([[[0.3, -0.1], [0.0, 0.0]]])
-    view = view_directions(ray_slope)
-    np.testing.assert_allclose(view[0, 1], [0.0, 0.0, -1.0])
-    # A step of 1 mm of depth along the view shifts the point by the ray slope.
-    np.testing.assert_allclose(view[0, 0, :2] / -view[0, 0, 2], ray_slope[0, 0])
-    assert np.linalg.norm(view[0, 0]) == pytest.approx(1.0)
 
 
 def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> None:

@@ -170,20 +170,3 @@ def test_frames_become_linear_light_channel_by_channel(kind: type) -> None:
     # Saturation is detected by full scale, which does not change.
     assert (light[0, 0] == 0.0).all()
     assert (light[0, 1] == 1.0).all()
-
-
-@pytest.mark.parametrize(
-    "curves",
-    [
-        np.ones((3, 5)),
-        np.tile(np.linspace(0.0, 1.0, 5), (2, 1)),
-        np.tile([0.0, 0.6, 0.5, 1.0], (3, 1)),
-        np.tile([0.0, np.nan, 1.0], (3, 1)),
-        np.tile([0.0, 0.5, 0.9], (3, 1)),
-        np.tile([0.1, 0.5, 1.0], (3, 1)),
-        np.tile(np.linspace(0.0, 1.0, 20_000), (3, 1)),
-    ],
-)
-def test_what_is_no_response_is_refused(curves: np.ndarray) -> None:
-    with pytest.raises(ValueError, match="camera response"):
-        CameraResponse(curves)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import threading
 import time
 from pathlib import Path
 
@@ -65,32 +64,3 @@ class Spent:
         cores = (time.process_time() - self._cpu_s) / self.wall_s
         load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
         return f"processor: {cores:.2f} cores of {os.cpu_count()}; load of the machine: {load}"
-
-
-class ThreadTimes:
-    """Processor time of each thread since it was made."""
-
-    def __init__(self) -> None:
-        self._before = self._now()
-
-    def _now(self) -> dict[tuple[int, str], float]:
-        names = {thread.native_id: thread.name for thread in threading.enumerate()}
-        times = {}
-        for task in Path("/proc/self/task").iterdir():
-            try:
-                name = names.get(int(task.name)) or (task / "comm").read_text().strip()
-                fields = (task / "stat").read_text().rsplit(")", 1)[1].split()
-            except FileNotFoundError:  # it has just ended
-                continue
-            ticks = int(fields[11]) + int(fields[12])
-            times[int(task.name), name] = ticks / os.sysconf("SC_CLK_TCK")
-        return times
-
-    def reported(self, frames: int, least_ms: float = 0.5) -> str:
-        """Return lines with the time per frame of the busiest threads."""
-        spent: dict[str, float] = {}
-        for (number, name), seconds in self._now().items():
-            spent[name] = spent.get(name, 0.0) + seconds - self._before.get((number, name), 0.0)
-        each = {name: 1e3 * seconds / max(frames, 1) for name, seconds in spent.items()}
-        busiest = sorted(each.items(), key=lambda item: -item[1])
-        return "\n".join(f"  {ms:6.1f} ms  {name}" for name, ms in busiest if ms >= least_ms)

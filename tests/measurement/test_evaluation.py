@@ -233,23 +233,6 @@ def test_a_truth_file_that_cannot_be_used_says_where_and_why(
         read_truth(tmp_path)
 
 
-def test_each_direction_counts_its_own_series_of_a_protocol() -> None:
-    """Heights of 5 mm objects would count four times as much as any other size."""
-    rows = [press("cylinder", 4.0, 1.0), press("cylinder", 5.0, 1.0), press("cylinder", 5.0, 0.5)]
-    found = [
-        measurement("cylinder", 4.04, 1.5),
-        measurement("cylinder", 5.1, 1.01),
-        measurement("cylinder", 6.0, 0.49),
-    ]
-    evaluation = evaluate(rows, found, crossing=Crossing(size_mm=5.0, height_mm=1.0))
-    assert evaluation.overall("planar").mean_percent == pytest.approx((1.0 + 2.0) / 2)
-    assert evaluation.overall("depth").mean_percent == pytest.approx((1.0 - 2.0) / 2)
-    dimensions = {(g.direction, g.dimension_mm) for g in evaluation.groups if g.dimension_mm}
-    assert dimensions == {("planar", 4.0), ("planar", 5.0), ("depth", 1.0), ("depth", 0.5)}
-    panels = evaluation_figure(evaluation).axes
-    assert [label.get_text() for label in panels[1].get_xticklabels()] == ["0.5", "1"]
-
-
 def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet() -> None:
     rows = [press("cylinder", 4.0, 1.0, region="same"), press("cylinder", 4.0, 1.0, region="r1")]
     found = [measurement("cylinder", 4.04, 1.0)] * 2

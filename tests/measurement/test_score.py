@@ -82,14 +82,6 @@ def test_rows_are_y_and_columns_are_x() -> None:
     assert score_depth(np.ascontiguousarray(right.T), nodes, nodes, wide, **options).rms_um > 100.0
 
 
-def test_the_truth_of_the_virtual_sensor_is_read_where_it_is(virtual_session: Path) -> None:
-    truth = read_true_depth(virtual_session / "truth" / "cylinder_s5_d100.npz")
-    x, y = np.meshgrid(truth.x_mm, truth.y_mm)
-    top = truth.depth_mm > 0.98
-    # The design presses it at (3.6, -2.2).
-    assert (x[top].mean(), y[top].mean()) == pytest.approx((3.6, -2.2), abs=0.02)
-
-
 @pytest.mark.parametrize("content", [b"", b"not an archive", b"PK\x03\x04cut", None])
 def test_a_truth_that_cannot_be_read_is_refused(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "press.npz"
@@ -97,9 +89,3 @@ def test_a_truth_that_cannot_be_read_is_refused(tmp_path: Path, content: bytes |
         path.write_bytes(content)
     with pytest.raises(InputError):
         read_true_depth(path)
-
-
-def test_a_truth_that_lacks_a_part_is_refused(tmp_path: Path) -> None:
-    np.savez(tmp_path / "press.npz", depth_mm=np.zeros((3, 3)), pitch_mm=0.05)
-    with pytest.raises(InputError, match="true depth"):
-        read_true_depth(tmp_path / "press.npz")

@@ -126,15 +126,6 @@ def test_three_views_are_not_enough(views: list[LinearImage]) -> None:
         calibrate_lens(views[:3], BOARD)
 
 
-def test_a_session_of_another_board_says_which(views: list[LinearImage]) -> None:
-    """The message names the size once, not once per file."""
-    smaller = type(BOARD)((8, 6), 3.0)
-    with pytest.raises(InputError, match="9 x 6 inner corners, not 8 x 6") as refusal:
-        calibrate_lens(views[:4], smaller)
-    assert str(refusal.value).count("9 x 6") == 1
-    assert "inner corners" in refusal.value.advice
-
-
 def test_parallel_views_are_refused_for_want_of_a_focal_length() -> None:
     """Views of an untilted board look the same for any focal length."""
     images = [

@@ -9,7 +9,6 @@ import re
 import subprocess
 import tomllib
 import xml.etree.ElementTree as ET
-from importlib.metadata import distribution
 from pathlib import Path
 
 import freeze_parts as parts
@@ -18,7 +17,6 @@ import pytest
 
 from app.command_line.main import OPENED
 from app.context.pages import all_pages
-from app.shell import about
 from app.shell.documentation import find_documentation
 from app.workspace.workspace import ENDING as CALIBRATION
 from gelpolight_core.recording.recording import ENDING as RECORDING
@@ -103,13 +101,6 @@ def test_every_page_is_in_a_package_that_is_taken_whole() -> None:
     assert all(importlib.util.find_spec(module) for module in modules)
 
 
-def test_the_versions_that_about_shows_are_known_in_the_frozen_program() -> None:
-    assert set(about.PARTS) <= set(parts.NAMED_VERSIONS)
-    asked = re.findall(r'[^_]version\("([\w-]+)"\)', _sources())
-    assert set(asked) <= {*parts.NAMED_VERSIONS, "gelpolight-studio"}
-    assert all(distribution(name) for name in parts.NAMED_VERSIONS)
-
-
 def _sources() -> str:
     files = [path for package in parts.PACKAGES for path in (ROOT / package).rglob("*.py")]
     return "\n".join(path.read_text("utf-8") for path in files)
@@ -164,17 +155,6 @@ def test_compiled_loops_and_fonts_are_kept_in_a_folder_of_the_user(
     frozen_start.choose_caches(tmp_path / "cache")
     assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "cache" / "kernels")
     assert Path(os.environ["MPLCONFIGDIR"]).parent == tmp_path / "cache"
-
-
-def test_programs_that_are_opened_find_their_own_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        os, "environ", {"LD_LIBRARY_PATH": "/ours", "QT_PLUGIN_PATH": "/ours", "HOME": "/home"}
-    )
-    frozen_start.give_back_environment()
-    assert os.environ == {"HOME": "/home"}
-    os.environ.update(LD_LIBRARY_PATH="/ours", LD_LIBRARY_PATH_ORIG="/theirs")
-    frozen_start.give_back_environment()
-    assert os.environ == {"HOME": "/home", "LD_LIBRARY_PATH": "/theirs"}
 
 
 def test_the_desktop_entry_starts_the_program_with_files_of_both_kinds() -> None:

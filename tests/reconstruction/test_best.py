@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.near_light.solver import NearLightDepth, NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -174,15 +174,3 @@ def test_a_spoilt_pixel_on_the_ground_leaves_the_plateau_alone(
     assert np.abs(after.depth_mm - before.depth_mm)[top].max() < 3e-3
     changed = (after.flags != before.flags).sum()
     assert 1 <= changed < 100
-
-
-@pytest.mark.parametrize("value", [0.0, 1.0, np.nan])
-def test_an_image_without_information_is_flat_and_flagged(
-    virtual_calibration: Calibration, value: float
-) -> None:
-    camera = virtual_calibration.camera
-    rgb = np.full((camera.height, camera.width, 3), value, np.float32)
-    result = solve(rgb, virtual_calibration)
-    assert np.abs(result.depth_mm).max() < 1e-6
-    useless = Flag.DARK | Flag.SATURATED | Flag.OUTSIDE | Flag.INVALID
-    assert ((result.flags & int(useless)) != 0).all()

@@ -156,17 +156,6 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort: str)
     assert note.text in found.notes
 
 
-@pytest.mark.parametrize("effort", EFFORTS)
-def test_images_of_ordinary_size_are_solved_as_wanted(effort: str) -> None:
-    known = sensor(0.5)
-    press = known.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, samples=2)
-    found = Reconstructor(known.calibration, effort=effort).depth(press.frame)
-    assert found.trace is not None
-    assert found.trace.effort == effort
-    assert not found.notes
-    assert rms_um(depth_error(found, press.truth, radius_mm=12.0)) < 10.0
-
-
 @lru_cache(maxsize=1)
 def steep_press(decay_mm: float) -> tuple[KnownSensor, KnownPress]:
     """Return a press with steep walls, and its sensor."""

@@ -108,18 +108,6 @@ def test_light_as_at_calibration_changes_nothing(known: KnownSensor, press: Know
             assert CORRECTION in found.trace.left_out
 
 
-def test_where_nothing_is_pressed_nothing_is_solved_whatever_the_exposure(
-    known: KnownSensor,
-) -> None:
-    for share in (0.96, 1.04):
-        found = Reconstructor(known.calibration).depth(
-            known.noisy(known.bare() * np.float32(share))
-        )
-        assert found.trace is not None
-        assert found.trace.done == (CORRECTION, "contact detection")
-        assert not found.depth_mm.any()
-
-
 def test_with_a_camera_that_is_not_linear_the_light_is_corrected_too(
     known: KnownSensor, press: KnownPress
 ) -> None:

@@ -260,14 +260,3 @@ def test_walls_steeper_than_can_be_seen_are_held_and_flagged() -> None:
     steep = found.normals[..., 2] > -0.1501
     assert ((found.flags[steep] & int(Flag.NOT_OBSERVABLE)) != 0).all()
     assert np.isfinite(found.slope_x).all()
-
-
-@pytest.mark.parametrize("workers", [2, 3, 8])
-def test_the_number_of_threads_changes_no_bit(workers: int) -> None:
-    field, depth, _ = scene_of(GLOSSY)
-    random = np.random.default_rng(6)
-    ratio = (field.ratio * random.uniform(0.0, 1.3, field.ratio.shape)).astype(np.float32)
-    shaken = replace(field, ratio=ratio)
-    one, many = solved(shaken, depth, GLOSSY), solved(shaken, depth, GLOSSY, workers=workers)
-    for name in ("slope_x", "slope_y", "normals", "weight", "flags"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(many, name))

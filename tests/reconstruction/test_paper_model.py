@@ -47,28 +47,6 @@ def test_the_fused_pass_is_the_plain_mathematics() -> None:
     assert np.abs(depth - plain)[seen].max() < 2e-3
 
 
-def test_eight_and_sixteen_bit_and_float_images_agree() -> None:
-    raw = np.clip(scene.raw_image(lopsided, CALIBRATION), 0, 1)
-    fields = [
-        solve_slopes(image, MAPS)
-        for image in (
-            raw,
-            np.round(raw * 255).astype(np.uint8),
-            np.round(raw * 65535).astype("u2"),
-        )
-    ]
-    seen = fields[0].flags & int(Flag.OUTSIDE) == 0
-    assert np.abs(fields[0].slope_x - fields[2].slope_x)[seen].max() < 1e-3
-    assert np.abs(fields[0].slope_x - fields[1].slope_x)[seen].max() < 0.15
-
-
-def test_the_number_of_threads_does_not_change_a_bit() -> None:
-    raw = scene.raw_image(lopsided, CALIBRATION)
-    one, three = (solve_slopes(raw, MAPS, workers=n) for n in (1, 3))
-    np.testing.assert_array_equal(one.slope_x, three.slope_x)
-    np.testing.assert_array_equal(one.flags, three.flags)
-
-
 def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
     raw = scene.raw_image(lopsided, CALIBRATION)
     bad = raw.copy()

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.reflectance.membrane import CURVE_NODES
@@ -34,7 +33,6 @@ Frame = NDArray[np.uint8]
 PRESS = "cylinder_s5_d100"
 # What a region of the contact may change: drape below half a degree, and depth 0 at its border.
 REGION_MM = 8e-3
-ALWAYS_TWO_ROUNDS = {effort: replace(own, shallow_mm=0.0) for effort, own in SETTINGS.items()}
 
 
 def as_camera(rgb: NDArray[np.float32]) -> Frame:
@@ -99,23 +97,6 @@ def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
     )
     assert region.depth_mm.max() > 0.5 * depth_mm
     assert np.abs(region.depth_mm - whole.depth_mm).max() < REGION_MM
-
-
-@settings(
-    max_examples=4, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(st.floats(0.01, 0.06))
-def test_one_round_is_enough_for_a_shallow_press(
-    balanced: Reconstructor, shown: Callable[[State], Frame], depth_mm: float
-) -> None:
-    surface = pressed(Cylinder(3.0, depth_mm), x_mm=1.0, y_mm=-2.0)
-    image = shown(PressedMembrane(surface))
-    once = balanced.depth(image)
-    assert once.depth_mm.max() > 0.5 * depth_mm
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(balanced.near_light, "_settings", ALWAYS_TWO_ROUNDS)
-        twice = balanced.depth(image)
-    assert np.abs(once.depth_mm - twice.depth_mm).max() < 1e-3
 
 
 @pytest.mark.parametrize("name", [PRESS, "cuboid_s4_d100"])
@@ -187,15 +168,6 @@ def test_what_a_frame_needs_is_known_without_reconstructing_it(
         assert set(needed.left_out) <= set(found.left_out)
 
 
-def test_the_number_of_threads_changes_no_bit(
-    frame: Frame, balanced: Reconstructor, virtual_calibration: Calibration
-) -> None:
-    alone = Reconstructor(virtual_calibration, effort="balanced", workers=1).depth(frame)
-    both = balanced.depth(frame)
-    np.testing.assert_array_equal(alone.depth_mm, both.depth_mm)
-    np.testing.assert_array_equal(alone.flags, both.flags)
-
-
 def test_a_result_is_not_touched_by_the_next_frames(frame: Frame, balanced: Reconstructor) -> None:
     first = balanced.depth(frame)
     kept = first.depth_mm.copy()
@@ -245,19 +217,3 @@ def test_a_curve_with_a_kink_is_solved_at_every_effort(
     found = Reconstructor(calibration, effort=effort).depth(frame)
     assert np.isfinite(found.depth_mm).all()
     assert 0.3 < found.depth_mm.max() < 3.0
-
-
-@pytest.fixture(scope="module")
-def pressed_to_the_lights(shown: Callable[[State], Frame]) -> Frame:
-    """Return an image of a press almost to the lights."""
-    return shown(PressedMembrane(pressed(Ball(8.0, 12.0), x_mm=1.2, y_mm=-0.8)))
-
-
-@pytest.mark.parametrize("effort", EFFORTS)
-def test_a_press_almost_to_the_lights_stays_finite(
-    effort: str, pressed_to_the_lights: Frame, virtual_calibration: Calibration
-) -> None:
-    found = Reconstructor(virtual_calibration, effort=effort).depth(pressed_to_the_lights)
-    assert found.normals is not None
-    assert np.isfinite(found.depth_mm).all()
-    np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.score import DepthScore, read_true_depth, score_depth
-from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.near_light.ratio import PressSampler
-from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.near_light.solver import NearLightDepth, NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.terms import Terms
@@ -71,45 +67,6 @@ def test_light_frozen_at_the_flat_membrane_makes_the_press_too_high(
     assert abs(error) > abs(best) + 1.0
 
 
-def test_every_near_light_round_comes_nearer_to_the_last(
-    rgb: Map, whole: NearLightDepth, virtual_calibration: Calibration
-) -> None:
-    away = [
-        np.abs(
-            solved(rgb, virtual_calibration, near_light_rounds=n).depth_mm - whole.depth_mm
-        ).max()
-        for n in (0, 1, 2)
-    ]
-    assert away[0] > 2.0 * away[1] > 0.0
-    assert away[2] == 0.0
-
-
-def test_slopes_as_if_rays_ran_straight_make_another_depth(
-    rgb: Map, whole: NearLightDepth, virtual_calibration: Calibration, virtual_session: Path
-) -> None:
-    straight = solved(rgb, virtual_calibration, ray_true_slopes=False)
-    worse = scored(straight, virtual_calibration, virtual_session)
-    best = scored(whole, virtual_calibration, virtual_session)
-    assert worse.rms_um > 1.5 * best.rms_um
-
-
-def test_a_depth_left_at_its_flat_position_lies_beside_the_truth(
-    rgb: Map, whole: NearLightDepth, virtual_calibration: Calibration, virtual_session: Path
-) -> None:
-    left = solved(rgb, virtual_calibration, true_positions=False)
-    assert left.depth_mm.max() == pytest.approx(whole.depth_mm.max(), rel=1e-3)
-    worse = scored(left, virtual_calibration, virtual_session)
-    assert worse.rms_um > 2.0 * scored(whole, virtual_calibration, virtual_session).rms_um
-    # Farther from the centre a ray meets the raised membrane nearer to it: the press looks moved.
-    top = whole.depth_mm > 0.75
-    grid = virtual_calibration.table.grid
-    x, y = np.meshgrid(grid.x_mm, grid.y_mm)
-    moved = [np.hypot(x[m].mean(), y[m].mean()) for m in (top, left.depth_mm > 0.75)]
-    row, column = np.argwhere(top).mean(axis=0).round().astype(int)
-    lean = np.hypot(*virtual_calibration.table.ray_slope[row, column])
-    assert moved[1] - moved[0] == pytest.approx(0.75 * lean, rel=0.15)
-
-
 def test_dark_channels_that_are_believed_are_not_flagged_and_cost_accuracy(
     rgb: Map, whole: NearLightDepth, virtual_calibration: Calibration, virtual_session: Path
 ) -> None:
@@ -118,36 +75,6 @@ def test_dark_channels_that_are_believed_are_not_flagged_and_cost_accuracy(
     assert not (believed.flags & int(Flag.DARK)).any()
     worse = scored(believed, virtual_calibration, virtual_session)
     assert worse.rms_um > scored(whole, virtual_calibration, virtual_session).rms_um
-
-
-def test_saturated_channels_that_are_believed_flatten_what_faces_the_light(
-    rgb: Map, virtual_calibration: Calibration
-) -> None:
-    overexposed = np.minimum(rgb * 1.6, 1.0).astype(np.float32)
-    full = virtual_calibration.full
-    assert full is not None
-    brighter = replace(full, background=full.background * np.float32(1.6))
-    calibration = replace(virtual_calibration, full=brighter)
-    minded, believed = (
-        NearLightSolver(calibration, brighter, workers=2).depth(
-            overexposed, terms=Terms(saturation=on)
-        )
-        for on in (True, False)
-    )
-    assert ((minded.flags & int(Flag.SATURATED)) != 0).sum() > 100
-    assert not (believed.flags & int(Flag.SATURATED)).any()
-    cut = solved(rgb, virtual_calibration)
-    missed = [np.sqrt(np.mean((r.depth_mm - cut.depth_mm) ** 2)) for r in (minded, believed)]
-    assert missed[1] > 1.5 * missed[0]
-
-
-def test_without_weights_what_cannot_be_seen_spoils_the_depth(
-    rgb: Map, whole: NearLightDepth, virtual_calibration: Calibration, virtual_session: Path
-) -> None:
-    even = solved(rgb, virtual_calibration, weights=False)
-    worse = scored(even, virtual_calibration, virtual_session)
-    best = scored(whole, virtual_calibration, virtual_session)
-    assert worse.rms_um > best.rms_um + 2.0
 
 
 def test_a_rim_that_is_held_pulls_a_contact_that_crosses_it_down(
@@ -166,23 +93,3 @@ def test_a_rim_that_is_held_pulls_a_contact_that_crosses_it_down(
     top = (np.hypot(x + 11.0, y - 3.0) < 2.7) & (np.hypot(x, y) < 12.0)
     error = [abs(np.median(r.depth_mm[top]) - 0.8) for r in (free, held)]
     assert error[1] > 2.0 * error[0]
-
-
-def test_denoising_quiets_the_even_ground(rgb: Map, virtual_calibration: Calibration) -> None:
-    full = virtual_calibration.full
-    assert full is not None
-    solver = NearLightSolver(virtual_calibration, full, workers=2)
-    sampler = PressSampler(solver.maps, solver.workers, Buffers())
-    grid = virtual_calibration.table.grid
-    whole = Region((0, 0), (grid.shape[0] // 4, grid.shape[1] // 4))
-    raw = np.round(rgb * 255.0).astype(np.uint8)
-    noise = []
-    for on in (True, False):
-        terms = Terms(denoising=on)
-        ratio = sampler.compare(raw, whole, factor=1, linear=False, terms=terms).fine.ratio
-        x, y = np.meshgrid(grid.x_mm, grid.y_mm)
-        ground = (np.hypot(x - 1.2, y - 4.1) > 6.0) & (np.hypot(x, y) < 11.0)
-        ground &= solver.maps.usable
-        noise.append(float(np.std(ratio[:, ground] - 1.0)))
-    # A quarter of the camera's own noise stays, and all of what the membrane does there.
-    assert noise[0] < 0.75 * noise[1]

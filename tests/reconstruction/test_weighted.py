@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
-from gelpolight_core.reconstruction.integration.weighted import SHARED_SUMS, integrate_weighted
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 
 Array = NDArray[np.float64]
 PITCH = 0.05
@@ -140,19 +139,6 @@ def test_the_least_squares_balance_is_the_dense_one() -> None:
     found = integrate_weighted(*single(slope_x, slope_y, weight), pitch_mm=pitch, tolerance=1e-6)
     assert found.converged
     np.testing.assert_allclose(found.depth_mm, expected, atol=1e-5)
-
-
-def test_threads_do_not_change_the_answer() -> None:
-    """On a grid that is large enough for threads to share it."""
-    _, slope_x, slope_y, r = plateau()
-    weight = np.where(r > 2.0, 0.5, 1.0)
-    maps = [np.tile(m, (3, 3)) for m in single(slope_x, slope_y, weight)]
-    assert maps[0].size > SHARED_SUMS
-    one, *more = (
-        integrate_weighted(*maps, pitch_mm=PITCH, workers=RowWorkers(n)) for n in (1, 2, 3)
-    )
-    for other in more:
-        np.testing.assert_array_equal(one.depth_mm, other.depth_mm)
 
 
 def test_slopes_without_weight_do_not_leak_into_their_neighbours() -> None:

@@ -15,11 +15,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.records.entry import (
     MeasurementRecord,
     Quantity,
-    indenter_record,
 )
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.records.statistics import statistics_of
@@ -160,35 +158,3 @@ def test_what_no_measurement_is_is_refused() -> None:
         MeasurementRecord("", "", "ball", twice[:1])
     with pytest.raises(ValueError, match="zone"):
         MeasurementRecord("A", "", "ball", twice[:1], time=datetime(2026, 1, 1))
-
-
-def test_a_fitted_cuboid_is_stored_with_its_errors_and_details() -> None:
-    measurement = Measurement(
-        shape="cuboid", diameter_mm=None, side_mm=(4.0, 4.2), height_mm=1.1, centre_mm=(0.0, 1.0),
-        yaw_deg=3.0, drape_decay_mm=0.5, sd={"side_mm": (0.02, 0.04), "height_mm": 0.01},
-        edge_radius_mm=0.1, blur_mm=0.1, baseline_mm=0.0, residual_rms_mm=0.01,
-        correlated_pixels=4.0, outline_mm=np.zeros((3, 2)), verdict="ok", reason="",
-    )  # fmt: skip
-    comparison = compare(measurement, Truth("cuboid", 4.0, 1.0))
-    record = indenter_record(
-        measurement, comparison, serial="A", calibration_id="c", size_limit_percent=5.0,
-        height_limit_percent=8.0,
-    )  # fmt: skip
-    side, height = record.quantities
-    assert (side.name, height.name) == ("side_mm", "height_mm")
-    assert side.error_percent == pytest.approx(comparison.size_error_percent)
-    assert height.error_percent == pytest.approx(comparison.height_error_percent)
-    assert side.sd == pytest.approx(0.03)
-    assert record.verdict == "fail"
-    assert record.details["side_mm"] == [4.0, 4.2]
-    doubtful = replace(
-        measurement,
-        verdict="doubtful",
-        reason="no edge",
-        sd={**measurement.sd, "height_mm": math.nan},
-    )
-    record = indenter_record(
-        doubtful, serial="A", calibration_id="c", size_limit_percent=5.0, height_limit_percent=8.0
-    )
-    assert (record.verdict, record.reason) == ("doubtful", "no edge")
-    assert record.quantities[1].sd is None

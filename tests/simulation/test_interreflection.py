@@ -14,8 +14,7 @@ from gelpolight_core.simulation.interreflection import FLAT, indirect_light
 from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.membrane import even_factor
 from gelpolight_core.simulation.paths import membrane_hit
-from gelpolight_core.simulation.scattering import scattered
-from gelpolight_core.simulation.shading import Material, metallic_lobe, metallic_rise
+from gelpolight_core.simulation.shading import Material
 from gelpolight_core.simulation.surface import PressedSurface
 
 HALF_ANGLE_DEG, RADIUS_MM = 72.0, 1.5
@@ -178,27 +177,3 @@ def test_a_ray_meets_the_wall_where_the_geometry_puts_it() -> None:
     found, x, _, d = membrane_hit(*parts, (7.0, 0.0, 3.0), (-0.6, 0.0, 0.8), 0.0)
     assert found
     assert (x, d) == pytest.approx((7.0 - 3.0 * 0.75, 0.0))
-
-
-@pytest.mark.parametrize("tilt_deg", [0.0, 30.0, 65.0])
-def test_drawn_directions_scatter_as_much_as_the_integral_over_the_hemisphere(
-    tilt_deg: float,
-) -> None:
-    material = (0.36, 0.4, 0.35)
-    tilt = math.radians(tilt_deg)
-    normal, view = (0.0, 0.0, -1.0), (math.sin(tilt), 0.0, -math.cos(tilt))
-    numbers = np.random.default_rng(1).uniform(size=(40_000, 3))
-    drawn = [scattered(normal, view, material, *some) for some in numbers]
-    assert np.allclose([math.hypot(*some[:3]) for some in drawn[:100]], 1.0)
-    total = 0.0
-    angles, step = np.linspace(0.0, 2.0 * math.pi, 120, endpoint=False), 1.0 / 120
-    for cosine in np.arange(0.5 * step, 1.0, step):
-        side = math.sqrt(1.0 - cosine**2)
-        for angle in angles:
-            h = np.array([side * math.cos(angle), side * math.sin(angle), -cosine]) + view
-            h /= np.linalg.norm(h)
-            v_h = float(h @ view)
-            lobe = metallic_lobe(cosine, math.cos(tilt), -h[2], v_h, material[2])
-            reflected = material[0] + material[1] * metallic_rise(v_h) * lobe
-            total += reflected * cosine / math.pi * step * (2.0 * math.pi / 120)
-    assert np.mean([some[3] for some in drawn]) == pytest.approx(total, rel=0.01)

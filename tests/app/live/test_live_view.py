@@ -165,21 +165,6 @@ def test_a_dragged_rim_resizes_the_circle(view: LiveView, qtbot: QtBot) -> None:
     assert reported.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (40.0, 30.0, 16.0))]
 
 
-def test_a_newer_result_does_not_move_a_dragged_handle(view: LiveView) -> None:
-    view.show_image(black())
-    circle = Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),))
-    view.set_overlay(circle)
-    image_view = child(view, "live.image")
-    positions = [image_view.view_position(u, 30.0) for u in (40.0, 42.0, 44.0, 46.0)]
-    mouse(image_view, QEvent.Type.MouseMove, positions[0], False)
-    mouse(image_view, QEvent.Type.MouseButtonPress, positions[0], True)
-    for position in positions[1:]:
-        mouse(image_view, QEvent.Type.MouseMove, position, True)
-    view.set_overlay(circle)
-    assert image_view.overlay.handles[0].u > 43.0
-    mouse(image_view, QEvent.Type.MouseButtonRelease, positions[-1], False)
-
-
 def test_arrow_keys_move_the_selected_handle(view: LiveView, qtbot: QtBot) -> None:
     view.show_image(black())
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))

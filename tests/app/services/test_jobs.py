@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import gc
 import threading
-import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -20,29 +18,6 @@ Tell = Callable[[float], None]
 
 class Heavy:
     """Replaces a calibration: memory that must not wait for the garbage collector."""
-
-
-@pytest.fixture
-def no_collection() -> Iterator[None]:
-    """Without garbage collection, only the last reference releases an object."""
-    gc.disable()
-    yield
-    gc.enable()
-
-
-@pytest.mark.usefixtures("no_collection")
-def test_only_the_caller_keeps_the_result_of_a_job(qtbot: QtBot) -> None:
-    jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
-
-    def done(heavy: Heavy) -> None:
-        assert job.over
-        found.append(weakref.ref(heavy))
-
-    job = Job("read", lambda _progress: Heavy(), done)  # it and `done` refer to each other
-    jobs.submit(job)
-    qtbot.waitUntil(lambda: bool(found))
-    qtbot.waitUntil(lambda: found[0]() is None)
-    assert jobs.close()
 
 
 def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:

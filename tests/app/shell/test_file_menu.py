@@ -118,13 +118,6 @@ def test_export_offers_what_the_visible_page_can_export(window: MainWindow) -> N
     assert not nothing.isEnabled()
 
 
-def test_import_is_done_by_the_library(window: MainWindow) -> None:
-    window.show_page("inspect")
-    window.findChild(QAction, "file.import").trigger()
-    assert window.page_name == "sensors"
-    assert window.page("sensors").done == ["import"]
-
-
 def test_the_real_pages_offer_their_exports(context: AppContext, qtbot: QtBot) -> None:
     window = MainWindow(context=context)
     qtbot.addWidget(window)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.sources.bench import FAULTS, ITEMS, PRESSED, STAGES, Bench, Scene
+from app.sources.bench import ITEMS, PRESSED, STAGES, Bench
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.rays import project_through_layers
 
@@ -67,29 +67,3 @@ def test_every_image_of_a_session_can_be_arranged() -> None:
         assert len(scenes) == count
     with pytest.raises(ValueError, match="no 'balls' number 10"):
         BENCH.show("balls", 10)
-
-
-def test_a_mounted_membrane_hides_only_the_mirror() -> None:
-    bench = Bench(BENCH.design)
-    bench.switch("membrane_on", True)
-    bench.lay("mirror")
-    assert bench.seen.item == "bare"
-    bench.lay("whiteboard")
-    assert bench.seen.item == "whiteboard"
-    bench.lay("mirror")
-    bench.switch("membrane_on", False)
-    assert bench.seen.item == "mirror"
-
-
-def test_watchers_are_notified_until_they_are_removed() -> None:
-    bench = Bench(BENCH.design)
-    heard: list[Scene] = []
-    leave = bench.watch(lambda: heard.append(bench.scene))
-    bench.lay("ball")
-    bench.arrange(x_mm=1.0)
-    bench.adjust(noise=0.0)
-    bench.switch(FAULTS[0], True)
-    assert [scene.x_mm for scene in heard] == [0.0, 1.0, 1.0, 1.0]
-    leave()
-    bench.lay("mirror")
-    assert len(heard) == 4

@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 from app.sources.bench import ITEMS, Bench
-from app.sources.bench_faults import ROOM_LIGHT
 from app.sources.rendering import state_of
 from app.sources.source import Frame, SourceLost
 from app.sources.stream import Stream
 from app.sources.virtual import VirtualSource
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor, Whiteboard
+from gelpolight_core.simulation.virtual_sensor import VirtualSensor, Whiteboard
 
 WAIT_S = 60.0
 
@@ -87,38 +86,6 @@ def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
     assert np.mean(difference > 20) < 0.02
 
 
-@pytest.mark.parametrize("bit_depth", [8, 16])
-def test_mean_and_spread_match_the_virtual_sensor_noise(bit_depth: int) -> None:
-    design = SensorDesign().scaled(0.25)
-    # Noise of several counts, so that rounding does not hide it.
-    camera = replace(design.camera, bit_depth=bit_depth, shot_variance=4e-4, read_sd=0.01)
-    design = replace(design, camera=camera)
-    bench = Bench(design)
-    bench.adjust(rate_hz=60.0)
-    source = VirtualSource(bench)
-    source.open()
-    settled(source)
-    ours = np.stack([settled(source).rgb for _ in range(12)]).astype(float)
-    source.close()
-    sensor = VirtualSensor(design, bench.seed)
-    theirs = np.stack([sensor.frame(BareMembrane()) for _ in range(12)]).astype(float)
-    light = sensor.brightness(BareMembrane())
-    full = 2.0**bit_depth - 1.0
-    for low, high in ((0.02, 0.1), (0.1, 0.3), (0.3, 0.7)):
-        chosen = (light > low) & (light < high)
-        many = ours[:, chosen]
-        # The mean of n values of spread s is known to s / sqrt(n), the spread to s / sqrt(2 n).
-        spread = theirs[:, chosen].std(axis=0, ddof=1)
-        error = spread.mean() / np.sqrt(many.size)
-        assert many.mean() == pytest.approx(theirs[:, chosen].mean(), abs=6.0 * error)
-        variance = many.var(axis=0, ddof=1).mean()
-        assert variance == pytest.approx(
-            theirs[:, chosen].var(axis=0, ddof=1).mean(), rel=6.0 * np.sqrt(4.0 / many.size)
-        )
-        expected = camera.shot_variance * light[chosen].mean() + camera.read_sd**2
-        assert variance / full**2 == pytest.approx(expected, rel=0.02)
-
-
 def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSource) -> None:
     first = settled(source)
     source.close()
@@ -142,14 +109,6 @@ def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
     bright = settled(source).rgb
     assert bright.max() == 255
     assert (bright == 255).mean() > 0.1
-
-
-def test_room_light_brightens_dark_areas(source: VirtualSource) -> None:
-    source.bench.adjust(noise=0.0)
-    dark = settled(source).rgb[:4, :4].mean(axis=(0, 1))
-    source.bench.switch("room_light", True)
-    lit = settled(source).rgb[:4, :4].mean(axis=(0, 1))
-    assert lit - dark == pytest.approx(255.0 * np.array(ROOM_LIGHT), abs=1.0)
 
 
 def test_the_light_of_a_dead_led_is_missing_in_every_channel(source: VirtualSource) -> None:

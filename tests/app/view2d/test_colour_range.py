@@ -59,19 +59,6 @@ def test_a_lighter_press_has_a_smaller_range_after_a_while_and_not_before() -> N
     assert shown[1] == pytest.approx(0.2)
 
 
-def test_negative_depths_have_colours_where_they_matter() -> None:
-    colours = ColourRange()
-    assert colours.update(_press(0.9, -0.05), 0.0) == (0.0, pytest.approx(1.0))
-    assert colours.update(_press(0.9, -0.3), FRAME_S) == pytest.approx((-0.5, 1.0))
-
-
-def test_another_sensor_starts_with_a_range_of_its_own() -> None:
-    colours = ColourRange()
-    colours.update(_press(4.0), 0.0)
-    colours.reset()
-    assert colours.update(_press(0.3), 1.0)[1] == pytest.approx(0.5)
-
-
 @given(st.lists(st.floats(0.0, 4.0), min_size=2, max_size=40))
 def test_all_depths_have_colours_and_the_range_changes_rarely(depths: list[float]) -> None:
     colours = ColourRange()

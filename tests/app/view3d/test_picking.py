@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.view3d.picking import along, between, hit
+from app.view3d.picking import between, hit
 from app.view3d.pins import pins_text, with_pin
 from tests.app.view3d.conftest import BUMP, SMALL, Made
 
@@ -82,11 +82,3 @@ def test_a_third_pin_replaces_the_first(made: Made) -> None:
     two = pins_text(made(), ((-6.0, 0.0), (-5.0, 0.0)))
     assert one.count("\n") == 0 and two.startswith(one)
     assert "1.000" in two and "+0.000" in two
-
-
-def test_a_line_keeps_its_corners() -> None:
-    corners = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0))
-    places = along(corners)
-    for corner in corners:
-        assert np.hypot(*(places - corner).T).min() < 1e-9
-    assert np.hypot(*np.diff(places, axis=0).T).max() < 0.2

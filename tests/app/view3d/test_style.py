@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from app.view3d.style import (
-    Style,
     Viewpoint,
-    style_as_text,
-    style_from_text,
     ticks,
     viewpoints_as_text,
     viewpoints_from_text,
@@ -29,20 +25,6 @@ def test_ticks_are_even_few_and_hold_the_range(low: float, width: float, most: i
     assert max(steps) == pytest.approx(min(steps))
 
 
-def test_a_style_is_saved_without_the_exaggeration() -> None:
-    style = Style(exaggeration=3.0, axes=False, wireframe=True, parallel=True)
-    assert style_from_text(style_as_text(style)) == replace(style, exaggeration=1.0)
-
-
 def test_viewpoints_are_kept_by_name() -> None:
     kept = {"coin": Viewpoint((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), True, 4.0)}
     assert viewpoints_from_text(viewpoints_as_text(kept)) == kept
-
-
-@pytest.mark.parametrize("text", [
-    "", "[]", '{"a": 1}', '{"a": {"position": [1, 2], "focus": [0, 0, 0], "up": [0, 1, 0]}}',
-    '{"a": {"position": [1, NaN, 2], "focus": [0, 0, 0], "up": [0, 1, 0], "parallel": true, '
-    '"parallel_scale": 1}}',
-])  # fmt: skip
-def test_damaged_viewpoints_are_none(text: str) -> None:
-    assert viewpoints_from_text(text) == {}

@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 
 import app
 from app.theme import theme
-from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.label import PlainLabel
 
 EVIL = ["<img src=x>", "<h1>Sensor 7</h1>", "a <b>bold</b> & @pass note\nof two lines", "&lt;"]
 SOURCES = sorted(Path(app.__file__).parent.rglob("*.py"))
@@ -38,13 +38,6 @@ def test_a_label_shows_text_from_outside_literally(text: str, qtbot: QtBot) -> N
     qtbot.addWidget(label)
     assert label.textFormat() is Qt.TextFormat.PlainText
     assert label.text() == text
-
-
-@pytest.mark.parametrize("text", EVIL)
-def test_markup_shows_text_from_outside_literally(text: str, qtbot: QtBot) -> None:
-    label = MarkupLabel(f"<b>{escaped(text)}</b>")
-    qtbot.addWidget(label)
-    assert seen(label.text()) == text
 
 
 def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:

@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 import scene
-from hypothesis import given
-from hypothesis import strategies as st
 
 from app.workspace.entries import read_entry
 from app.workspace.validation import (
@@ -249,16 +247,6 @@ def test_a_damaged_trial_is_refused(
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
     with pytest.raises(InputError):
         read_validation(place)
-
-
-@given(st.binary(max_size=60))
-def test_a_trial_of_any_bytes_is_refused_or_absent(
-    tmp_path_factory: pytest.TempPathFactory, content: bytes
-) -> None:
-    calibration = tmp_path_factory.mktemp("bytes") / "c.gplcal"
-    validation_path(calibration).write_bytes(content)
-    with pytest.raises(InputError):
-        read_validation(calibration)
 
 
 def test_age_is_counted_in_days(workspace: Workspace, source: Path) -> None:
