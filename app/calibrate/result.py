@@ -25,12 +25,11 @@ from app.calibrate.step_data import Step
 from app.context.context import AppContext
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
-from app.widgets.label import PlainLabel
+from app.widgets.label import PlainLabel, RoomyLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.roomy_label import RoomyLabel
 from app.widgets.sign import Sign
 from app.workspace.report import stated_validation
 from gelpolight_core.calibration.inputs import FOLDERS, Stage

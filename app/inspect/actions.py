@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QBuffer, QObject
+from PySide6.QtCore import QBuffer, QCoreApplication, QObject
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
-from app.inspect.movie_source import recorded_surfaces
 from app.inspect.views import Views
 from app.live.depth import LiveDepth
+from app.live.frame_results import Maker, Wanted
 from app.services.file_dialogs import ask_open, ask_save
 from app.sources.recording import RecordingSource
 from app.view2d.quantities import Reference
@@ -27,6 +28,8 @@ from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.map_processing import difference
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.reader import Recording
 from gelpolight_core.translation import tr
 
 
@@ -177,3 +180,42 @@ def png_bytes(image: QImage) -> bytes:
     buffer.open(QBuffer.OpenModeFlag.WriteOnly)
     image.save(buffer, "PNG")
     return bytes(buffer.data().data())
+
+
+WAIT_S = 0.02
+"""Longest time between two looks at the events of the window: it follows the mouse."""
+
+
+def recorded_surfaces(
+    path: Path, reconstructor: Reconstructor, wanted: Wanted
+) -> Iterator[Surface]:
+    """Yield the surface of every frame of a recording. Meanwhile the window can be used.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    reconstructor : Reconstructor
+        No other thread may use it at the same time.
+    wanted : Wanted
+        How the surface is coloured.
+
+    Raises
+    ------
+    InputError
+        If the recording or a frame cannot be used.
+    """
+    maker = Maker(reconstructor)
+    maker.wanted = Wanted(surface=True, display=wanted.display, reference=wanted.reference)
+    recording = Recording.open(path)
+    try:
+        with ThreadPoolExecutor(1, "movie") as pool:
+            for index in range(len(recording)):
+                made = pool.submit(lambda frame: maker(frame).surface, recording.frame(index))
+                while wait([made], WAIT_S).not_done:
+                    QCoreApplication.processEvents()
+                surface = made.result()
+                if surface is not None:
+                    yield surface
+    finally:
+        recording.close()

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.inspect.actions import FileActions
-from app.inspect.export_control import ExportControl
+from app.inspect.export import ExportControl
 from app.inspect.modes import ModeChoice
 from app.inspect.processing_panel import ProcessedLine
 from app.inspect.record_control import RecordControl

@@ -1,4 +1,4 @@
-"""Panel for the processing of a frozen height map, and the line that says what was done."""
+"""Panels for the processing and for the display of the height map."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QCheckBox, QSizePolicy, QWidget
 
+from app.view2d.display import Display
 from app.view2d.processing import Processing
 from app.view2d.quantities import Reference
 from app.widgets.buttons import push_button
@@ -133,3 +134,59 @@ class ProcessedLine(QWidget):
         self._text.setToolTip(plain_tip(self._text.text()))
         show_meaning(self._text, "fail" if refused else "warn")
         self.setVisible(bool(steps or refused))
+
+
+class DisplayPanel(QWidget):
+    """Lets the user choose the display settings of depth.
+
+    Signals
+    -------
+    changed()
+        The display settings changed.
+    """
+
+    changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "inspect.display", tr("Display"))
+        self._range = 0.0, 1.0
+        self._form = Form(Display(), "inspect.display")
+        self._form.changed.connect(self._on_changed)
+        vbox(self._form, None, of=self)
+
+    @property
+    def display(self) -> Display:
+        """The display settings."""
+        return self._form.value
+
+    def colour_by(self, quantity: str) -> None:
+        """Colour the surface in 3D by one of QUANTITIES."""
+        self._form.change(colour_by=quantity)
+
+    def show_display(self, display: Display) -> None:
+        """Show display settings without emitting a signal."""
+        self._form.show_value(display)
+
+    def show_range(self, low: float, high: float) -> None:
+        """Note the range of a frame, which is that of a lock."""
+        self._range = low, high
+
+    def toggle_lock(self) -> None:
+        """Lock the current range, or make it automatic."""
+        self._form.change(locked=not self.display.locked)
+
+    def lock_range(self, low: float, high: float) -> None:
+        """Lock the range at these depths, mm."""
+        self._range = low, high
+        self._form.change(locked=True)
+
+    def unlock_range(self) -> None:
+        """Make the range automatic."""
+        self._form.change(locked=False)
+
+    def _on_changed(self, name: str) -> None:
+        if name == "locked" and self.display.locked:
+            low, high = self._range
+            self._form.show_value(replace(self.display, low_mm=low, high_mm=high))
+        self.changed.emit()

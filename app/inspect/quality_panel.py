@@ -1,4 +1,4 @@
-"""Quality of the depth: flags, misfit and uncertainty."""
+"""Panels that show the quality of the depth, and the normals or the slope."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from app.live.frame_results import Shown
 from app.view2d.map_point import flag_words
 from app.view2d.map_view import MapView, extent_of
-from app.view2d.quantities import FLAG_COLOURS
+from app.view2d.quantities import FLAG_COLOURS, STEEPEST_DEG
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import vbox
@@ -137,3 +137,44 @@ def legend(flags: np.ndarray) -> str:
             block = f'<span style="color: rgb{colour}">■</span>'
             parts.append(f"{block} {words[flag]} {100.0 * share:.1f} %")
     return "&nbsp;&nbsp; ".join(parts) or tr("No flags: all pixels are measured normally.")
+
+
+class NormalsPanel(QWidget):
+    """Shows the normals as colours, or the slope.
+
+    Signals
+    -------
+    chosen()
+        The other quantity was selected.
+    """
+
+    chosen = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "inspect.normals", tr("Normals"))
+        self.map = MapView("inspect.normals.map", tr("Normals"))
+        self._what = named(ComboBox(), "inspect.normals.what", tr("Quantity shown"))
+        self._what.addItem(tr("Normals: x in red, y in green"), "normals")
+        self._what.addItem(tr("Slope"), "slope")
+        self._what.currentIndexChanged.connect(self._on_chosen)
+        vbox(self._what, (self.map, 1), of=self, margins=0, spacing=2)
+        self.map.say(tr("No depth yet."))
+
+    @property
+    def what(self) -> str:
+        """The shown quantity: ``normals`` or ``slope``."""
+        return str(self._what.currentData())
+
+    def show_frame(self, shown: Shown) -> None:
+        """Show a frame."""
+        if shown.normals is not None and shown.heightmap is not None:
+            self.map.set_image(shown.normals, extent_of(shown.heightmap))
+            if self.what == "slope":
+                self.map.show_colours("magma", 0.0, STEEPEST_DEG, "°")
+
+    def _on_chosen(self) -> None:
+        # The colours of one quantity are meaningless for the other.
+        if self.map.has_image:
+            self.map.say(tr("Please wait."))
+        self.chosen.emit()

@@ -17,12 +17,9 @@ from PySide6.QtWidgets import (
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
-from app.inspect.display_panel import DisplayPanel
-from app.inspect.level_points import LevelPoints
-from app.inspect.normals_panel import NormalsPanel
-from app.inspect.processing_panel import ProcessingPanel
-from app.inspect.quality_panel import QualityPanel
-from app.inspect.section_line import REGION_INK, RegionBox, SectionLines
+from app.inspect.processing_panel import DisplayPanel, ProcessingPanel
+from app.inspect.quality_panel import NormalsPanel, QualityPanel
+from app.inspect.section_line import REGION_INK, LevelPoints, RegionBox, SectionLines
 from app.inspect.section_panel import SectionPanel
 from app.live.frame_results import Shown, Wanted
 from app.live.height_panel import HeightPanel

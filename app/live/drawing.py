@@ -14,15 +14,21 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
 
-from app.live.handles import (
+from app.live.overlay import (
+    Circle,
     Grip,
     Handle,
+    Line,
+    Marker,
+    Mask,
+    Note,
+    Overlay,
+    Role,
     drag,
     find_grip,
     handles_of,
     with_handle,
 )
-from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay, Role
 
 # Distinguishable without red-green vision, too: the colours differ in brightness.
 ROLE_COLOURS: dict[Role, str] = {

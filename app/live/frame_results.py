@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.live.zebra import eight_bits
+from app.live.image_checks import eight_bits
 from app.sources.source import Frame
 from app.view2d import shading
 from app.view2d.colour_range import ColourRange, SteadyEnd

@@ -14,21 +14,20 @@ from PySide6.QtCore import QStandardPaths, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
-from app.live.checks_bar import ChecksBar
-from app.live.handles import Handle, move, next_name, resize
-from app.live.histogram import Histogram
+from app.live.checks_bar import ChecksBar, Histogram
 from app.live.image_checks import (
     BestFocus,
     Rgb,
     channel_histograms,
+    eight_bits,
     measure_exposure,
     measure_focus,
     pixel_text,
+    with_zebra,
 )
 from app.live.image_view import ImageView
-from app.live.overlay import Overlay
+from app.live.overlay import Handle, Overlay, move, next_name, resize
 from app.live.tools import ImageTools
-from app.live.zebra import eight_bits, with_zebra
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError

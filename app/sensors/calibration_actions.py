@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtGui import QUndoStack
+from PySide6.QtGui import QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
-from app.sensors.commands import LibraryCommand, RemoveCommand, RestoreCommand, UseCommand
 from app.services.jobs import Job, Jobs
 from app.widgets.question import ask
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from app.workspace.trash import Removal
 from gelpolight_core.translation import tr
+
+Change = Callable[[], object]
 
 
 class CalibrationActions:
@@ -66,7 +67,11 @@ class CalibrationActions:
 
     def use(self, entry: Entry) -> None:
         """Use this calibration from now on."""
-        use = partial(self._push, UseCommand(entry.path, context=self._context))
+        workspace, before = self._context.workspace, self._context.workspace.in_use
+        use = partial(
+            self._push, tr("use of {name}").format(name=entry.path.stem),
+            lambda: workspace.use(entry.path), lambda: workspace.use(before),
+        )  # fmt: skip
         put_into_use(entry.path, self._page, context=self._context, use=use)
 
     def name_elastomer(self, entry: Entry, name: str) -> None:
@@ -113,19 +118,31 @@ class CalibrationActions:
         return self._context.workspace.removals()
 
     def restore(self, removal: Removal) -> None:
-        """Move a calibration from the trash back to its place."""
-        if self._push(RestoreCommand(removal, context=self._context)):
+        """Move a calibration from the trash back to its place. The one in use stays in use."""
+        removals = [removal]
+        workspace = self._context.workspace
+        if self._push(
+            tr("restoration of {name}").format(name=removal.old_path.stem),
+            lambda: workspace.restore(removals[-1], use=workspace.in_use is None),
+            lambda: removals.append(workspace.remove(removal.old_path)),
+        ):
             text = tr("{name} is in the library again.").format(name=removal.old_path.name)
             self._context.toasts.show(text, "pass")
 
     def _remove(self, entry: Entry) -> None:
-        if self._push(RemoveCommand(entry.path, context=self._context)):
+        workspace, removals = self._context.workspace, list[Removal]()
+        if self._push(
+            tr("removal of {name}").format(name=entry.path.stem),
+            lambda: removals.append(workspace.remove(entry.path)),
+            lambda: workspace.restore(removals[-1]),
+        ):
             self._context.toasts.show(
                 tr("{name} was moved to the trash.").format(name=entry.path.name),
                 actions=((tr("Undo"), self.undo.undo),),
             )
 
-    def _push(self, command: LibraryCommand) -> bool:
+    def _push(self, text: str, redo: Change, undo: Change) -> bool:
+        command = LibraryCommand(text, redo, undo, context=self._context)
         self.undo.push(command)
         return command.worked
 
@@ -134,3 +151,34 @@ class CalibrationActions:
         if self._context.workspace.folder != self._folder:
             self._folder = self._context.workspace.folder
             self.undo.clear()
+
+
+class LibraryCommand(QUndoCommand):
+    """A change of the library that can be undone. One that fails leaves the history.
+
+    Attributes
+    ----------
+    worked : bool
+        Whether the last change was made.
+    """
+
+    def __init__(self, text: str, redo: Change, undo: Change, *, context: AppContext) -> None:
+        super().__init__(text)
+        self._redo, self._undo, self._context = redo, undo, context
+        self.worked = False
+
+    def redo(self) -> None:
+        """Make the change."""
+        self._run(self._redo)
+
+    def undo(self) -> None:
+        """Take it back."""
+        self._run(self._undo)
+
+    def _run(self, change: Change) -> None:
+        self.worked = False
+        with self._context.toasts.errors():
+            change()
+            self.worked = True
+        self.setObsolete(not self.worked)
+        self._context.requests.calibrations_changed.emit()

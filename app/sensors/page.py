@@ -6,12 +6,13 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
     QStackedWidget,
     QToolBar,
+    QToolButton,
     QWidget,
 )
 
@@ -19,15 +20,15 @@ from app.context.context import AppContext
 from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
-from app.sensors.model import cells_of, library_titles
 from app.sensors.sessions_box import SessionsBox
-from app.sensors.tables import Cell, CellsTable
+from app.sensors.tables import Cell, CellsTable, cells_of, library_titles
 from app.sensors.trash_dialog import TrashDialog
-from app.sensors.welcome import Welcome
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job, Jobs
+from app.theme.icons import application_icon
 from app.widgets.actions import make_action
-from app.widgets.layout import splitter, vbox
+from app.widgets.label import MarkupLabel, PlainLabel
+from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.gel_care import presses_text, read_presses
@@ -279,3 +280,51 @@ class SensorsPage(QWidget):
 def _open_folder(folder: Path) -> None:
     make_folder(folder)
     QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
+
+
+WIDTH = 480
+
+
+class Welcome(QWidget):
+    """Shows a short introduction and the first actions.
+
+    Parameters
+    ----------
+    actions : tuple of QAction
+        The first one is the most common.
+    """
+
+    def __init__(self, actions: tuple[QAction, ...]) -> None:
+        super().__init__()
+        named(self, "sensors.welcome", tr("Welcome"))
+        sign = PlainLabel(parent=self)
+        sign.setPixmap(application_icon().pixmap(96, 96))
+        heading = tr("No sensor yet")
+        title = MarkupLabel(f"<h1>{heading}</h1>", self)
+        text = PlainLabel(
+            tr(
+                "Sensors are listed here after calibration. Start with one of these "
+                "actions, or drop a session folder or a calibration file onto this window."
+            ),
+            self,
+            wrap=True,
+        )
+        text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        middle = QWidget(self)
+        middle.setFixedWidth(WIDTH)
+        centre = Qt.AlignmentFlag.AlignHCenter
+        buttons = [(_button(action), 0, centre) for action in actions]
+        head = (sign, 0, centre), (title, 0, centre)
+        vbox((None, 2), *head, text, 16, *buttons, (None, 3), of=middle)
+        hbox(middle, of=self)
+
+
+def _button(action: QAction) -> QToolButton:
+    button = QToolButton()
+    named(button, f"welcome.{action.objectName()}", action.text().replace("&", ""))
+    button.setDefaultAction(action)
+    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+    button.setIconSize(QSize(24, 24))
+    button.setMinimumSize(320, 44)
+    button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    return button

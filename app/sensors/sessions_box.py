@@ -6,8 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QToolButton, QWidget
 
-from app.sensors.model import session_cells, session_titles
-from app.sensors.tables import CellsTable
+from app.sensors.tables import CellsTable, session_cells, session_titles
 from app.widgets.actions import make_action
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox

@@ -1,9 +1,10 @@
-"""The tables on the Sensors page: one row of cells for each thing in the library."""
+"""The tables on the Sensors page, and their cells for calibrations and sessions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, Generic, TypeVar
 
 from PySide6.QtCore import (
@@ -19,6 +20,10 @@ from app.theme import theme
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
+from app.workspace.entries import Entry
+from app.workspace.sessions import SessionEntry
+from gelpolight_core.quality import verdict_word
+from gelpolight_core.translation import tr
 
 ROW_PX = 30
 Index = QModelIndex | QPersistentModelIndex
@@ -148,3 +153,89 @@ class CellsTable(QTableView, Generic[Item]):
         """Return the selected item."""
         rows = self.selectionModel().selectedRows()
         return self._items[self.sorted.mapToSource(rows[0]).row()] if rows else None
+
+
+def library_titles() -> tuple[str, ...]:
+    """Return the titles of the columns of :func:`cells_of`."""
+    first = "", tr("Sensor"), tr("Created"), tr("Age"), tr("Verdict")
+    return (*first, tr("Validation"), tr("Model"), tr("Name"))
+
+
+def session_titles() -> tuple[str, ...]:
+    """Return the titles of the columns of :func:`session_cells`."""
+    return tr("Sensor"), tr("Session"), tr("Images"), tr("Last changed")
+
+
+def session_cells(entry: SessionEntry) -> tuple[Cell, ...]:
+    """Return the cells of a session's row."""
+    return (
+        Cell(entry.serial),
+        Cell(entry.folder.name, tip=str(entry.folder)),
+        Cell(str(entry.images), key=entry.images),
+        Cell(f"{entry.changed.astimezone():%Y-%m-%d %H:%M}", key=entry.changed.timestamp()),
+    )
+
+
+def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...]:
+    """Return the cells of a calibration's row."""
+    first, nothing = (_in_use(entry), Cell(entry.serial)), Cell("")
+    if entry.summary is None:
+        broken = Cell(tr("Broken"), "broken", "fail", entry.broken, key=3)
+        name = Cell(entry.name, tip=str(entry.path))
+        return (*first, nothing, nothing, broken, nothing, nothing, name)
+    verdict = entry.summary.verdict
+    return (
+        *first,
+        made_cell(entry),
+        age_cell(entry.age_days(now), oldest_days),
+        Cell(
+            verdict_word(verdict),
+            verdict.value,
+            verdict.value,
+            key=("pass", "warn", "fail").index(verdict.value),
+        ),
+        validated_cell(entry),
+        Cell(entry.summary.model),
+        Cell(entry.name, tip=f"{entry.path}\n{entry.summary.identity}"),
+    )
+
+
+def made_cell(entry: Entry) -> Cell:
+    """Return the local time at which a calibration was made."""
+    made = entry.created
+    if made is None:
+        return Cell(tr("unknown"), key=0.0)
+    local = made.astimezone()
+    return Cell(f"{local:%Y-%m-%d %H:%M}", key=made.timestamp())
+
+
+def age_cell(age_days: float | None, oldest_days: float) -> Cell:
+    """Return an age as text, marked if it is above the limit."""
+    if age_days is None:
+        return Cell("", key=0.0)
+    if age_days < 1.0:
+        text = tr("today")
+    else:
+        text = tr("{n} d").format(n=int(age_days))
+    if age_days <= oldest_days:
+        return Cell(text, key=age_days)
+    tip = tr(
+        "Older than {n:.0f} days. Gel hardens and yellows: validate this calibration, or "
+        "calibrate again."
+    )
+    return Cell(text, "stale", "stale", tip.format(n=oldest_days), key=age_days)
+
+
+def validated_cell(entry: Entry) -> Cell:
+    """Return the validation state of a calibration."""
+    trial = entry.validation
+    if entry.validated and trial is not None:
+        tip = tr("{what}, {when}").format(what=trial.indenter, when=trial.when)
+        return Cell(tr("validated"), "validated", "pass", tip, key=2)
+    if trial is not None and not entry.validation_note:
+        return Cell(tr("failed"), "fail", "fail", trial.indenter, key=1)
+    return Cell(tr("not validated"), "", "muted", entry.validation_note, key=0)
+
+
+def _in_use(entry: Entry) -> Cell:
+    return Cell("", "use", "accent", tr("In use"), key=1) if entry.in_use else Cell("", key=0)

@@ -36,8 +36,7 @@ from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_d
 from app.services.status import FailedLine, StatusLine
 from app.shell.about import AboutDialog
 from app.shell.documentation import find_documentation
-from app.shell.loader import Loader
-from app.shell.loading_view import LoadingView
+from app.shell.loader import Loader, LoadingView
 from app.shell.log_window import LogWindow
 from app.shell.memory import give_back
 from app.shell.menus import Menus

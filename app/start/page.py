@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import datetime
 
-from PySide6.QtCore import Qt, SignalInstance
-from PySide6.QtGui import QImageReader, QPixmap
-from PySide6.QtWidgets import QFrame, QScrollArea, QWidget
+from PySide6.QtCore import QSize, Qt, SignalInstance
+from PySide6.QtGui import QIcon, QImageReader, QPixmap
+from PySide6.QtWidgets import QCommandLinkButton, QFrame, QScrollArea, QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
-from app.start.card import IMAGE, Card
+from app.theme.icons import icon
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold
@@ -165,3 +165,38 @@ def _image(session: SessionEntry) -> QPixmap | None:
         return None
     reader.setScaledSize(size.scaled(IMAGE * 2, Qt.AspectRatioMode.KeepAspectRatio))
     return QPixmap.fromImageReader(reader)
+
+
+IMAGE = QSize(96, 64)
+
+
+class Card(QCommandLinkButton):
+    """One action of the Start page.
+
+    Parameters
+    ----------
+    name : str
+        Object name.
+    title : str
+        What a click does.
+    sign : str
+        Name of the icon that is shown while there is no image.
+    """
+
+    def __init__(self, name: str, title: str, sign: str) -> None:
+        super().__init__(title, "")
+        named(self, name, title.replace("&", ""))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._sign = sign
+        self.show_image(None)
+
+    def say(self, text: str) -> None:
+        """Show lines of text below the title."""
+        self.setDescription(text)
+        self.setAccessibleDescription(text)
+
+    def show_image(self, image: QPixmap | None) -> None:
+        """Show an image, or the sign."""
+        none = image is None or image.isNull()
+        self.setIcon(icon(self._sign) if image is None or none else QIcon(image))
+        self.setIconSize(QSize(28, 28) if none else IMAGE)

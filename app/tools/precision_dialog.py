@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -80,7 +79,7 @@ class PrecisionDialog(WorkDialog):
         self.folder.clicked.connect(self.choose_folder)
 
     def _make_result(self) -> None:
-        self.figure = named(QLabel(), "precision.figure", tr("Error against time of a frame"))
+        self.figure = named(PlainLabel(), "precision.figure", tr("Error against time of a frame"))
         self.figure.setMinimumHeight(HEIGHT_PX)
         self.figure.setAlignment(Qt.AlignmentFlag.AlignCenter)
         heads = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.widgets.lengths import round_up
+from app.widgets.units import round_up
 
 LEAST_MM = 0.02
 """Smallest upper end, so that the noise of the bare membrane is not shown as depth."""

@@ -16,9 +16,9 @@ from app.theme import theme
 from app.view2d.colour_bar import TEXT_FILL, ColourBar
 from app.view2d.display import SURROUND
 from app.widgets.label import PlainLabel
-from app.widgets.lengths import length_text, round_length_mm
 from app.widgets.naming import named
 from app.widgets.plots import own_plot_menus
+from app.widgets.units import length_text, round_length_mm
 from gelpolight_core.translation import tr
 
 CURSOR = "#ffffff"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.view2d.display import colour_table
 from app.view2d.map_point import flag_words
 from app.view3d.surface import ColourScale
-from app.widgets.lengths import round_up
+from app.widgets.units import round_up
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 

@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonCore import vtkStringArray
 
 from app.view3d.style import Ink, Style, ticks
 from app.view3d.surface import ColourScale, Surface
-from app.widgets.lengths import length_text, round_length_mm
+from app.widgets.units import length_text, round_length_mm
 from gelpolight_core.translation import tr
 
 Box = tuple[float, float, float, float, float, float]

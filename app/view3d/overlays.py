@@ -9,8 +9,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from app.view3d.legend import FONT, Plotter
-from app.view3d.picking import along
-from app.view3d.pins import PIN_NAMES
+from app.view3d.picking import PIN_NAMES, along
 from app.view3d.sheet import Sheet
 from app.view3d.style import Ink
 from app.view3d.surface import Surface, SurfaceLine

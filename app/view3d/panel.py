@@ -23,8 +23,7 @@ from app.services.jobs import Job, Jobs
 from app.services.opengl import opengl_problem
 from app.services.settings import Settings
 from app.view3d.menu import ViewMenu
-from app.view3d.picking import Point
-from app.view3d.pins import pins_text, with_pin
+from app.view3d.picking import Point, pins_text, with_pin
 from app.view3d.style import Style, style_as_text, style_from_text
 from app.view3d.surface import Surface, SurfaceLine
 from app.widgets.label import PlainLabel

@@ -1,4 +1,4 @@
-"""From a ray through the 3D view to a point on the surface, and measurements between two points."""
+"""From a ray through the 3D view to a point on the surface; pins and what is between them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.view3d.surface import Surface
+from app.widgets.units import in_unit
+from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
 Array = NDArray[np.float64]
@@ -100,3 +102,32 @@ def along(corners_mm: tuple[Point, ...]) -> Array:
     count = min(max(int(length[-1] / _LINE_STEP_MM), 1) + 1, _LINE_POINTS)
     at = np.union1d(np.linspace(0.0, length[-1], count), length)
     return np.stack([np.interp(at, length, corners[:, k]) for k in (0, 1)], axis=-1)
+
+
+PIN_NAMES = ("A", "B")
+
+
+def with_pin(pins: tuple[Point, ...], point: Point) -> tuple[Point, ...]:
+    """Return the pins with one more. A third pin replaces the oldest."""
+    return (*pins, point)[-len(PIN_NAMES) :]
+
+
+def pins_text(surface: Surface, pins: tuple[Point, ...]) -> str:
+    """Return position and depth of each pin, and the measurements between two, one line each."""
+    lines = [
+        tr("{name}: x {x:.2f} mm  y {y:.2f} mm  depth {d}").format(
+            name=name, x=x, y=y, d=in_unit(float(surface.depth_at([x], [y])[0]))
+        )
+        for name, (x, y) in zip(PIN_NAMES, pins, strict=False)
+    ]
+    found = between(surface, *pins) if len(pins) == len(PIN_NAMES) else None
+    if found is not None:
+        lines += [
+            tr("distance {d}, across {a}").format(
+                d=in_unit(found.distance_mm), a=in_unit(found.across_mm)
+            ),
+            tr("height difference {h}, angle {a:.1f}°").format(
+                h=in_unit(found.rise_mm, sign="+"), a=found.angle_deg
+            ),
+        ]
+    return "\n".join(lines)

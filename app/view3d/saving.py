@@ -109,8 +109,14 @@ class ViewSaving(QObject):
 
     def save_movie(self, path: Path, choice: MovieChoice) -> None:
         """Save a movie, frame by frame. It can be cancelled."""
-        from app.view3d.images import studio
-        from app.view3d.movie import MovieCancelled, playback, turntable, watched, write_movie
+        from app.view3d.images import (
+            MovieCancelled,
+            playback,
+            studio,
+            turntable,
+            watched,
+            write_movie,
+        )
 
         assert self._panel.view is not None
         if path.suffix.lower() not in (".mp4", ".gif"):

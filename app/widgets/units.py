@@ -1,14 +1,14 @@
-"""The unit in which measured lengths and depths are shown. Files, records and inputs keep mm."""
+"""Lengths in the preferred unit, and round lengths."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
-    # The window opens before the numerical libraries are loaded.
     from gelpolight_core.measurement.measured import Measured
 
 LENGTH_UNITS = ("mm", "um")
@@ -67,3 +67,35 @@ def figure_in_unit(figure: Measured) -> Measured:
         return figure
     sd = None if figure.sd is None else figure.sd * per_mm()
     return replace(figure, value=figure.value * per_mm(), sd=sd, unit=_unit)
+
+
+_STEPS = (1.0, 2.0, 5.0, 10.0)
+_SLACK = 1e-9
+
+
+def round_length_mm(largest_mm: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is not longer. 0 if there is none."""
+    if not (math.isfinite(largest_mm) and largest_mm > 0.0):
+        return 0.0
+    power = _power_of_ten(largest_mm)
+    return max(k * power for k in _STEPS if k * power <= largest_mm * (1.0 + _SLACK))
+
+
+def round_up(least: float) -> float:
+    """Return the smallest of 1, 2, 5 times a power of ten that is not smaller; 0 below 0."""
+    if not (math.isfinite(least) and least > 0.0):
+        return 0.0
+    power = _power_of_ten(least)
+    return min(k * power for k in _STEPS if k * power >= least * (1.0 - _SLACK))
+
+
+def length_text(length_mm: float) -> str:
+    """Return a length as text."""
+    if length_mm < 0.1:
+        return tr("{l:g} um").format(l=round(1e3 * length_mm, 6))
+    return tr("{l:g} mm").format(l=length_mm)
+
+
+def _power_of_ten(length_mm: float) -> float:
+    """Return the power of ten of a length's first digit."""
+    return float(10.0 ** math.floor(math.log10(length_mm) + _SLACK))

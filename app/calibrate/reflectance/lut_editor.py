@@ -21,10 +21,9 @@ from app.calibrate.reflectance.lut_effect import Effect
 from app.calibrate.reflectance.lut_live import LivePanel
 from app.calibrate.reflectance.lut_model import CurveEdit
 from app.calibrate.reflectance.lut_plot import CurvePlot
-from app.widgets.label import plain_tip
+from app.widgets.label import RoomyLabel, plain_tip
 from app.widgets.layout import vbox
 from app.widgets.naming import named
-from app.widgets.roomy_label import RoomyLabel
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError

@@ -10,7 +10,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.inspect.export_dialog import ExportDialog
+from app.inspect.export import ExportDialog
 from app.view3d.image_dialog import image_dialog, movie_dialog
 
 MAKERS: dict[str, Callable[[QWidget], QDialog]] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.context.context import AppContext
-from app.inspect.display_panel import DisplayPanel
+from app.inspect.processing_panel import DisplayPanel
 from app.inspect.views import Views
 from app.services.jobs import Jobs
 from app.view2d.display import Display, display_as_text, display_from_text

@@ -6,17 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.live.handles import (
+from app.live.overlay import (
     LEAST_RADIUS_PX,
+    Circle,
     Grip,
     Handle,
+    Marker,
+    Overlay,
     drag,
     find_grip,
     handles_of,
     next_name,
     resize,
 )
-from app.live.overlay import Circle, Marker, Overlay
 
 SIZE = (640, 480)
 BALL = Handle("ball", 200.0, 100.0, 40.0)

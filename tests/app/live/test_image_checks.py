@@ -9,13 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.live.image_checks import (
+    STRIPE_RGB,
     BestFocus,
     channel_histograms,
+    eight_bits,
     measure_exposure,
     measure_focus,
     saturated,
+    with_zebra,
 )
-from app.live.zebra import STRIPE_RGB, eight_bits, with_zebra
 from gelpolight_core.quality import Verdict
 
 DEPTHS = [np.uint8, np.uint16]

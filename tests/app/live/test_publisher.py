@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from app.live.publisher import Publisher
+from app.inspect.stream import Publisher
 
 zmq = pytest.importorskip("zmq")
 PATIENCE_S = 20.0

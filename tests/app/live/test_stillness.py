@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.live.stillness import MOVING_SHARE, StillnessDetector, moving_share
+from app.live.live_detection import MOVING_SHARE, StillnessDetector, moving_share
 
 ROWS, COLUMNS = 240, 320
 DEPTHS = [np.uint8, np.uint16]

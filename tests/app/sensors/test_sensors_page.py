@@ -24,9 +24,9 @@ from pytestqt.qtbot import QtBot
 from report_pdf import report_data
 
 from app.context.context import AppContext
-from app.sensors.gel_care import GelCarePanel
-from app.sensors.model import cells_of
+from app.sensors.details import GelCarePanel
 from app.sensors.page import SensorsPage
+from app.sensors.tables import cells_of
 from app.sensors.trash_dialog import TrashDialog
 from app.services.preferences import Limits
 from app.widgets.quality_table import QualityTableWidget

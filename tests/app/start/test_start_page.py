@@ -11,8 +11,7 @@ from PySide6.QtGui import QImage
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
-from app.start.card import Card
-from app.start.page import StartPage
+from app.start.page import Card, StartPage
 from app.workspace.sessions import read_session_entry
 from gelpolight_core.calibration.file import write_calibration
 

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.view3d.picking import between, hit
-from app.view3d.pins import pins_text, with_pin
+from app.view3d.picking import between, hit, pins_text, with_pin
 from tests.app.view3d.conftest import BUMP, SMALL, Made
 
 NODE_MM = 0.15

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.widgets.lengths import length_text, round_length_mm, round_up
+from app.widgets.units import length_text, round_length_mm, round_up
 
 
 @given(st.floats(1e-4, 1e3))
