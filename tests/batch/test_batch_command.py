@@ -106,48 +106,6 @@ def test_what_cannot_be_done_is_refused_in_one_line(
     assert words in output(capsys)
 
 
-def test_inputs_that_cannot_be_are_refused_in_one_line(
-    command, day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "day.png").write_bytes(b"")
-    (tmp_path / "other" / "day").mkdir(parents=True)
-    (tmp_path / "other" / "day" / "run.gplrec").write_bytes((day / "run.gplrec").read_bytes())
-    frames = tmp_path / "frames"
-    (frames / "run").mkdir(parents=True)
-    (frames / "run.gplrec").write_bytes((day / "run.gplrec").read_bytes())
-    (frames / "run" / "run_000003.png").write_bytes((day / "left" / "a.png").read_bytes())
-    (frames / "run" / "run_000004.png").write_bytes((day / "left" / "a.png").read_bytes())
-    for inputs, words in (
-        ([frames], "Two inputs would have results named frames/run/run_000003"),
-        ([tmp_path / "empty"], "here are no frames"),
-        ([tmp_path / "none"], "The file or folder does not exist"),
-        ([day, "-o", tmp_path], "The input is inside the folder of the results"),
-        (
-            [day, tmp_path / "other" / "day"],
-            "Two inputs would have results named day/run/run_000000",
-        ),
-    ):
-        assert command(*inputs) == MENDABLE
-        assert words in output(capsys)
-
-
-def test_an_image_named_like_an_excluded_frame_is_accepted(
-    command, day: Path, tmp_path: Path
-) -> None:
-    (day / "run").mkdir()
-    (day / "run" / "run_000003.png").write_bytes((day / "left" / "a.png").read_bytes())
-    assert command(day, "--frames", "0:1") == 0
-    assert command(day, "-o", tmp_path / "all") == MENDABLE
-
-
-def test_results_within_the_input_are_no_input(command, day: Path) -> None:
-    out = day / "out"
-    assert command(day, "-o", out, "--format", "png,tif") == 0
-    assert command(day, "-o", out, "--format", "png,tif") == 0
-    assert not (out / "day" / "out").exists()
-
-
 def test_without_dask_the_command_says_what_to_install(
     command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

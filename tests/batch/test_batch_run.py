@@ -6,7 +6,6 @@ import csv
 import errno
 import multiprocessing
 import os
-import pickle
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from gelpolight_core.batch import run as batch_run
 from gelpolight_core.batch import workers
 from gelpolight_core.batch.plan import Job
 from gelpolight_core.batch.results import FILE as ROWS
-from gelpolight_core.batch.results import FrameRow, finished_frames, keep_rows, write_summary
+from gelpolight_core.batch.results import FrameRow
 from gelpolight_core.batch.run import run_batch
 from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.work import work
@@ -115,22 +114,6 @@ def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> Non
     assert not part.exists()
     assert {name: results(out)[name] for name in before} == before
     assert go(day, out=out).before == 6
-
-
-def test_the_table_can_be_made_again_from_the_rows(go, day: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    go(day, out=out)
-    text = (out / "batch.csv").read_bytes()
-    (out / "batch.csv").unlink()
-    assert go(day, out=out).done == 0
-    assert (out / "batch.csv").read_bytes() == text
-
-
-def test_a_removed_result_is_computed_again(go, day: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    go(day, out=out)
-    (out / "day" / "left" / "a.tif").unlink()
-    assert (go(day, out=out).done, len(results(out))) == (1, 12)
 
 
 def test_another_image_of_the_same_name_is_another_frame(go, day: Path, tmp_path: Path) -> None:
@@ -234,13 +217,6 @@ def test_a_run_that_another_program_works_at_is_left_alone(go, day: Path, tmp_pa
     assert go(day, out=out).done == 6
 
 
-def test_a_part_of_a_day_can_be_done_first(go, day: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert go(day, out=out, selection=slice(0, None, 3)).done == 3
-    assert go(day, out=out, selection=slice(1, 3)).done == 3
-    assert (go(day, out=out).before, len(results(out))) == (6, 12)
-
-
 def ends_its_process(settings: BatchSettings, out: Path, job: Job) -> FrameRow:
     """Work on a frame; one frame ends its process once, and another one always."""
     marker = out / "ended"
@@ -265,25 +241,6 @@ def test_a_killed_process_costs_only_the_frame_that_kills_every_process(
     assert results(out) == {name: expected[name] for name in expected if "left/b." not in name}
     assert len(lines(out)) == 6
     assert not multiprocessing.active_children()
-
-
-def test_a_worker_that_does_not_see_the_run_ends_it(
-    settings: BatchSettings, tmp_path: Path
-) -> None:
-    """As on a cluster whose machines have other folders."""
-    with pytest.raises(InputError, match="each worker has access to this folder") as reported:
-        work(settings, tmp_path / "elsewhere", Job(Path("a.png"), None, "a", ""))
-    assert str(pickle.loads(pickle.dumps(reported.value))) == str(reported.value)
-
-
-def test_an_invalid_line_of_the_rows_is_skipped(tmp_path: Path) -> None:
-    (tmp_path / ROWS).write_text('{"output": 3}\n[1]\nnonsense\n{"output":"a","notes":5}\n')
-    row = FrameRow("a_2", "1", "a.png", notes=("näher",))
-    keep_rows([row, replace(row, output="a_10"), replace(row, output="b", error="torn")], tmp_path)
-    assert finished_frames(tmp_path) == {("a_2", "1"), ("a_10", "1")}
-    write_summary(tmp_path, measured=False)
-    assert [line["output"] for line in table(tmp_path)] == ["a_2", "a_10", "b"]
-    assert table(tmp_path)[0]["notes"] == "näher"
 
 
 def test_dask_gives_the_same_bits_and_survives_a_killed_worker(

@@ -187,33 +187,6 @@ def test_interreflection_of_an_older_file_makes_heights_less_certain(
     assert read.scale_sd.depth == pytest.approx(np.hypot(now.scale_sd.depth, 0.03))
 
 
-@pytest.mark.parametrize(
-    "membrane",
-    [
-        {"gloss": -0.1},
-        {"gloss": 1.0},
-        {"gloss": float("nan")},
-        {"exponent": 0.0},
-        {"exponent": -1.0},
-        {"roughness": 0.0},
-        {"roughness": 1.5},
-        {"interreflection": float("inf")},
-        {"bounce_reach_mm": float("nan")},
-        {"colour": 1.0},
-        {"exponent": "steep"},
-        {"exponent": None},
-    ],
-)
-def test_a_membrane_that_cannot_be_is_refused(
-    whole: Path, tmp_path: Path, membrane: dict[str, Any]
-) -> None:
-    def change(manifest: dict[str, Any]) -> None:
-        manifest["full"]["membrane"].update(membrane)
-
-    with pytest.raises(InputError):
-        read_calibration(forged(whole, tmp_path / "forged.gplcal", change))
-
-
 def spoilt(array: np.ndarray, value: float) -> np.ndarray:
     copy = np.array(array)
     copy.flat[copy.size // 2] = value

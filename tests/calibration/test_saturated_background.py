@@ -45,15 +45,3 @@ def test_light_beyond_saturation_is_found_from_what_is_around(calibration: Calib
     off = np.abs(factors[known] / calibration.factors[known] - 1.0)
     assert np.percentile(off, 95.0) < 0.05
     np.testing.assert_array_equal(factors[~lost], unknown[~lost])
-
-
-def test_far_from_any_known_light_nothing_is_made_up(calibration: Calibration) -> None:
-    true, shown = clipped(calibration, top=1.1)
-    assert calibration.full is not None
-    everywhere = np.ones_like(shown)
-    full = replace(calibration.full, background=shown)
-    light, _ = beyond_saturation(
-        full, everywhere, calibration.factors, calibration.crosstalk, calibration.table
-    )
-    middle = tuple(n // 2 for n in true.shape[:2])
-    np.testing.assert_array_equal(light[middle], shown[middle])

@@ -66,20 +66,6 @@ def test_a_path_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path
         refuse_unwritable(tmp_path / "kept" / "new")
 
 
-def test_a_really_full_disk_is_reported_in_plain_words(tmp_path: Path) -> None:
-    full = Path("/dev/full")
-    if not full.exists():
-        pytest.skip("this system has no /dev/full")
-
-    def writer(file: BinaryIO) -> None:
-        with full.open("wb", buffering=0) as device:
-            device.write(b"too much")
-
-    with pytest.raises(InputError, match="disk is full"):
-        write_atomically(tmp_path / "press.npz", writer)
-    assert os.listdir(tmp_path) == []
-
-
 def test_a_missing_folder_and_a_file_with_its_name_are_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     (tmp_path / "folder").mkdir()

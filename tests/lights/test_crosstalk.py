@@ -71,21 +71,6 @@ def test_a_camera_without_crosstalk_has_none() -> None:
     assert np.abs(found.matrix - np.eye(3)).max() < 0.002
 
 
-def test_the_result_names_the_images_used_and_the_difference_of_the_others() -> None:
-    from_spots = find_crosstalk(spots(TRUTH))
-    assert from_spots.source == "mirror"
-    np.testing.assert_allclose(from_spots.matrix, TRUTH)
-    agree = find_crosstalk(spots(TRUTH), single_led(TRUTH)).quality
-    assert agree["crosstalk_difference_percent"].verdict is Verdict.PASS
-    other = TRUTH.copy()
-    other[0, 1] += 0.05
-    differ = find_crosstalk(spots(other), single_led(TRUTH))
-    figure = differ.quality["crosstalk_difference_percent"]
-    assert figure.value == pytest.approx(5.0, abs=0.5)
-    assert figure.verdict is Verdict.WARN
-    assert differ.matrix[0, 1] == pytest.approx(TRUTH[0, 1], abs=0.005)
-
-
 def test_crosstalk_that_no_spot_shows_is_a_warning_and_not_zero() -> None:
     hidden = TRUTH.copy()
     hidden[:, 1:] = np.nan

@@ -160,18 +160,6 @@ def test_a_run_that_is_killed_between_any_two_presses_loses_none(tmp_path: Path)
     assert run.next() == run.wanted[2]
 
 
-@pytest.mark.parametrize("damage", ["", "not = [toml", 'format = "else"\n', None])
-def test_a_damaged_protocol_is_refused_and_nothing_is_touched(
-    tmp_path: Path, damage: str | None
-) -> None:
-    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    path = run.folder / "protocol.toml"
-    text = path.read_text()
-    path.write_text(text.replace("version = 1", "version = 9") if damage is None else damage)
-    with pytest.raises(InputError, match="version 9" if damage is None else "protocol|format"):
-        open_run(run.folder)
-
-
 @pytest.mark.parametrize(
     ("key", "other", "message"),
     [

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
-
 import compiled
 import numpy as np
-import pytest
 from compiled import ShadedField
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,8 +12,8 @@ from scipy.ndimage import map_coordinates
 
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.near_light.maps import light_levels
-from gelpolight_core.reconstruction.near_light.sampling import halve, sample_rows
-from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE, RatioImage
+from gelpolight_core.reconstruction.near_light.sampling import sample_rows
+from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 
 Array = NDArray[np.float64]
@@ -141,36 +138,6 @@ def test_a_node_sees_the_pixels_about_it(seed: int, kind: type, wide: bool) -> N
     np.testing.assert_allclose(found.ratio, expected, atol=2e-4)
     np.testing.assert_allclose(found.noise, np.moveaxis(0.01 / background, -1, 0), rtol=1e-5)
     assert not found.marks.any()
-
-
-def _means_of_numbers(found: RatioImage) -> NDArray[np.float32]:
-    """Return the mean of each 2 x 2 nodes without those that are no number; 1 where none is."""
-    blocks = np.where(found.marks & NOT_FINITE, np.nan, found.ratio[1]).reshape(8, 2, 8, 2)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of blocks without any number
-        return np.nan_to_num(np.nanmean(blocks, axis=(1, 3)), nan=1.0)
-
-
-@pytest.mark.parametrize("wide", [False, True])
-@pytest.mark.parametrize(("code", "mark"), [(65534, 2), (65535, 2 + 8)])
-def test_a_spoilt_pixel_marks_its_channel_in_the_nodes_about_it(
-    wide: bool, code: int, mark: int
-) -> None:
-    """A saturated value, and one that was not a number."""
-    raw = np.zeros((20, 20, 3), np.uint16)
-    raw[10, 10, 1] = code
-    u, v = (a.astype(np.float32) for a in np.meshgrid(np.arange(16.0), np.arange(16.0)))
-    ones = np.ones((16, 16, 3), np.float32)
-    found = sampled(raw, (u, v), ones, np.eye(3, dtype=np.float32), wide=wide, coded=True)
-    assert set(np.unique(found.marks)) == {0, mark}
-    assert found.marks[10, 10] == mark
-    assert (found.marks > 0).sum() <= 9
-    planes = [np.empty((3, 8, 8), np.float32) for _ in range(2)]
-    small = RatioImage(planes[0], planes[1], found.around, np.empty((8, 8), np.uint8))
-    halve(0, 8, found, small)
-    np.testing.assert_allclose(small.ratio[1], _means_of_numbers(found))
-    # An average of four has half the noise.
-    np.testing.assert_allclose(small.noise, 0.005, rtol=1e-5)
 
 
 def test_a_strong_lobe_does_not_lead_a_solve_astray() -> None:

@@ -8,7 +8,6 @@ import pytest
 from gelpolight_core.reconstruction.near_light.from_around import (
     CLEAR,
     clear_rows,
-    surface_normals,
     with_surroundings,
 )
 from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
@@ -16,17 +15,6 @@ from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED,
 NODES, PITCH = 120, 0.1
 AXIS = (PITCH * (np.arange(NODES) - NODES / 2)).astype(np.float32)
 LEDS = np.array([[0.0, 10.0, -10.0], [-9.0, -5.0, -10.0], [9.0, -5.0, -10.0]], np.float32)
-
-
-def test_normals_of_a_slanted_plane_do_not_depend_on_the_rays() -> None:
-    x, _ = np.meshgrid(AXIS, AXIS)
-    rays = np.empty((2, NODES, NODES), np.float32)
-    rays[0], rays[1] = 0.2, -0.1
-    # d = 0.5 + 0.3 (x + 0.2 d), seen along rays of one direction.
-    depth = ((0.5 + 0.3 * x) / (1.0 - 0.3 * 0.2)).astype(np.float32)
-    found = surface_normals(depth, np.s_[:NODES, :NODES], rays, PITCH)
-    assert found[0] == pytest.approx(np.full_like(depth, -0.3 / np.hypot(0.3, 1.0)), abs=1e-4)
-    assert found[1] == pytest.approx(np.zeros_like(depth), abs=1e-4)
 
 
 def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches() -> None:

@@ -141,20 +141,6 @@ def test_the_least_squares_balance_is_the_dense_one() -> None:
     np.testing.assert_allclose(found.depth_mm, expected, atol=1e-5)
 
 
-def test_slopes_without_weight_do_not_leak_into_their_neighbours() -> None:
-    """The outer two of an edge's four slopes must not be read where they have no weight."""
-    depth, slope_x, slope_y = lopsided()
-    spoilt = (np.abs(XX - 2.0) < 0.6) & (np.abs(YY + 1.0) < 0.5)
-    weight = np.where(spoilt, 0.0, 1.0)
-    errors = []
-    for wrong in (0.0, 10.0):
-        x, y = (np.where(spoilt, wrong, s) for s in (slope_x, slope_y))
-        found = integrate_weighted(*single(x, y, weight), pitch_mm=PITCH, tolerance=1e-5)
-        errors.append(float(np.abs(found.depth_mm - depth)[~spoilt].max()))
-    assert errors[1] == pytest.approx(errors[0], abs=1e-7)
-    assert errors[0] < 2e-3
-
-
 def test_rounds_that_do_not_suffice_are_reported() -> None:
     """A tolerance below single precision cannot be reached."""
     random = np.random.default_rng(2)

@@ -22,7 +22,7 @@ from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
-from gelpolight_core.quality import Figure, QualityTable, Verdict, judge, limit_text
+from gelpolight_core.quality import QualityTable, Verdict, judge, limit_text
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts
@@ -220,10 +220,6 @@ def test_a_limit_is_shown_on_the_side_where_it_is_judged(
         return  # at its only limit the direction of the figure is unknown
     sign = "\N{GREATER-THAN OR EQUAL TO}" if higher else "\N{LESS-THAN OR EQUAL TO}"
     assert limit_text(figure).startswith(sign)
-
-
-def test_a_figure_that_is_only_reported_has_no_limit() -> None:
-    assert limit_text(Figure("k", "l", 1.0, "", None, None, Verdict.PASS, "")) == ""
 
 
 def test_the_same_report_gives_the_same_file() -> None:

@@ -120,18 +120,3 @@ def test_single_led_images_are_ordered_red_green_blue(tmp_path: Path) -> None:
     session = session_of(tmp_path, "", *names)
     assert session.optional_stages == ("single_led",)
     assert [p.name for p in session.single_led()] == ["red.png", "green.tif", "blue.png"]
-
-
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("red.png", "green.png"),
-        ("red.png", "green.png", "blue.png", "white.png"),
-        ("red.png", "red.tif", "green.png", "blue.png"),
-        ("1.png", "2.png", "3.png"),
-    ],
-)
-def test_other_single_led_images_are_refused(tmp_path: Path, names: tuple[str, ...]) -> None:
-    session = session_of(tmp_path, "", *(f"single_led/{name}" for name in names))
-    with pytest.raises(InputError, match="instead of red, green and blue"):
-        session.single_led()

@@ -14,7 +14,7 @@ from gelpolight_core.design.parts import CameraDesign, LayerDesign, MembraneDesi
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder, press
-from gelpolight_core.simulation.lamps import PointLamp, lamp_table
+from gelpolight_core.simulation.lamps import lamp_table
 from gelpolight_core.simulation.occlusion import visible_depth
 from gelpolight_core.simulation.rays import (
     project_through_layers,
@@ -136,25 +136,6 @@ def test_step_throws_a_shadow_of_its_height_over_the_tangent(elevation: float) -
     length = (share[surface.x_mm > 0.02] < 0.5).sum() * surface.pitch_mm
     # Two cells: the step itself lies between two cells, and the march goes by 0.7 cells.
     assert length == pytest.approx(1.0 / math.tan(math.radians(elevation)), abs=0.04)
-
-
-def test_near_lamp_throws_a_shadow_by_similar_triangles_with_a_soft_edge() -> None:
-    surface = step_surface(1.0)
-    lamp = PointLamp(-3.0, 0.0, 9.0, diameter_mm=1.0)
-    share = lit_share(
-        surface.depth_mm,
-        surface.tile_max,
-        (surface.x0_mm, surface.y0_mm, surface.pitch_mm, 1.0),
-        (surface.slope_x, surface.slope_y),
-        lamp_table((lamp,)),
-    )[100, :, 0]
-    right = surface.x_mm > 0.02
-    x = surface.x_mm[right]
-    # The edge (0, 1) as seen from the disc's ends -3.5, -3, -2.5 at height 9.
-    full, middle, none = (reach / 8.0 for reach in (2.5, 3.0, 3.5))
-    assert x[np.argmax(share[right] >= 0.5)] == pytest.approx(middle, abs=0.05)
-    assert x[np.argmax(share[right] > 0.01)] == pytest.approx(full, abs=0.05)
-    assert x[np.argmax(share[right] > 0.99)] == pytest.approx(none, abs=0.06)
 
 
 def test_a_wall_turned_from_the_camera_is_hidden_behind_the_plateau() -> None:

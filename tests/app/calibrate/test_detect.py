@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -123,17 +123,6 @@ def test_the_next_view_is_requested_where_no_corners_are() -> None:
     seen = detect_board(board_frame(tilt_deg=20.0, centre_mm=(-6.0, -4.0), distance_mm=60.0), BOARD)
     assert seen.ready
     assert "bottom right" in seen.sentence or "top right" in seen.sentence
-
-
-def test_a_view_like_an_earlier_one_is_not_ready(tilted: np.ndarray) -> None:
-    first = view_of(detect_board(tilted, BOARD))
-    again = detect_board(tilted, BOARD, earlier=[first])
-    assert not again.ready
-    assert "like an earlier one" in again.sentence
-    turned = replace(first, corners_px=first.corners_px[::-1])
-    assert not detect_board(tilted, BOARD, earlier=[turned]).ready
-    other = board_frame(tilt_deg=25.0, towards_deg=210.0)
-    assert detect_board(other, BOARD, earlier=[first]).ready
 
 
 def test_after_two_flat_views_a_tilted_one_is_requested() -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
-from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
@@ -143,26 +142,6 @@ def test_a_calibration_contains_its_camera_settings(computed_project: Made) -> N
     assert {stage: status.state for stage, status in project.statuses().items()} == before
     made = provenance_of(project.session, ())
     assert settings_of_texts(made.camera_settings) == stored
-
-
-def test_the_set_up_step_shows_the_camera_state_and_opens_its_settings(
-    technician: Technician,
-    context: AppContext,
-    fake: FakeCamera,
-    fresh: CalibrationProject,
-    qtbot: QtBot,
-) -> None:
-    technician.begin(fresh, "setup")
-    setup = technician.wizard.at("setup").form
-    assert "set and lock the camera before the first image" in setup.camera.text()
-    setup.camera_settings.click()
-    dialog = technician.page.findChild(QWidget, "camera")
-    live(context, qtbot)
-    qtbot.waitUntil(lambda: "not locked" in setup.camera.text(), timeout=WAIT_MS)
-    dialog.close()
-    context.source.choose(None)
-    assert "No camera is selected" in setup.camera.text()
-    assert not setup.camera_settings.isEnabled()
 
 
 def test_the_camera_of_a_new_sensor_is_selected_in_the_form(

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from technician import ScriptedCamera, Technician, read_rgb
 
@@ -328,21 +327,6 @@ def test_points_excluded_with_the_lasso_change_the_calibration(
     technician.rest()
 
 
-def test_escape_and_the_capture_key_return_to_the_live_image(
-    technician: Technician, computed_project: Made, camera: ScriptedCamera, qtbot: QtBot
-) -> None:
-    project = computed_project()
-    technician.begin(project, "balls")
-    names = [path.name for path in project.session.found("balls")]
-    for key in (Qt.Key.Key_Escape, Qt.Key.Key_F5):
-        technician.wizard.show_capture(names[0])
-        assert names[0] in technician.wizard.area.back_to_live.text()
-        qtbot.keyClick(technician.wizard, key)
-        assert technician.wizard.model.shown == ""
-        assert not technician.wizard.area.back_to_live.isVisible()
-    technician.rest()
-
-
 def test_a_step_with_too_few_images_is_incomplete_not_failed(
     technician: Technician, camera: ScriptedCamera, fresh: CalibrationProject, small_session: Path
 ) -> None:
@@ -448,20 +432,3 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
         wizard.model.jobs.cancel()
         hold.set()
         technician.rest()
-
-
-def test_the_tab_key_cycles_through_step_bar_list_and_image(
-    technician: Technician, fresh: CalibrationProject, camera: ScriptedCamera, qtbot: QtBot
-) -> None:
-    technician.begin(fresh, "balls")
-    technician.until(technician.wizard.panel.capture.isEnabled)
-    technician.wizard.at("balls").radius.box.setFocus()
-    reached: list[str] = []
-    while (name := QApplication.focusWidget().objectName()) not in reached:
-        reached.append(name)
-        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
-    parts = ("radius", "capture", "import", "automatic", "next", "leave.button", "source", "steps")
-    positions = [reached.index(f"calibrate.{part}") for part in parts]
-    assert positions == sorted(positions)
-    assert reached.index("live.fit") > positions[-1]
-    technician.rest()

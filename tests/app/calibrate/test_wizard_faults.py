@@ -20,18 +20,6 @@ from gelpolight_core.calibration.project import CalibrationProject
 Made = Callable[[], CalibrationProject]
 
 
-def test_without_a_camera_the_page_says_where_to_get_images(
-    technician: Technician, computed_project: Made
-) -> None:
-    technician.begin(computed_project(), "balls")
-    panel = technician.wizard.panel
-    assert "No camera" in panel.live.text()
-    assert "import" in panel.live.text()
-    assert not panel.capture.isEnabled()
-    technician.wizard.go_to("validation")
-    assert not technician.wizard.at("validation").form.measure.isEnabled()
-
-
 def test_a_stopped_camera_is_reported_and_can_be_reconnected(
     technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
 ) -> None:

@@ -173,14 +173,3 @@ def test_the_slope_view_is_the_angle_of_the_normals() -> None:
     normals = np.stack([np.sin(tilt), 0.0 * tilt, -np.cos(tilt)], axis=-1)[None]
     found = shading.steepness_deg(normals.astype(np.float32))
     np.testing.assert_allclose(found, [[0.0, 30.0, 60.0]], atol=0.1)
-
-
-def test_colours_keep_their_depth_when_the_press_becomes_lighter(
-    dome: HeightMap, frame: Frame
-) -> None:
-    reconstruction = Reconstruction(dome)
-    maker = Maker(reconstruction)  # type: ignore[arg-type]
-    maker.wanted = Wanted(height=True)
-    deep = maker(frame).range_mm
-    reconstruction.heightmap = replace(dome, depth_mm=0.2 * dome.depth_mm)
-    assert maker(replace(frame, number=1, time_s=0.03)).range_mm == deep == (0.0, 1.0)

@@ -197,20 +197,6 @@ def test_removing_the_calibration_in_use_asks_first(
     assert context.workspace.in_use is not None
 
 
-def test_removing_a_validated_calibration_asks_first(
-    page: SensorsPage, source: Path, context: AppContext
-) -> None:
-    page.open_path(source)
-    identity = scene.calibration().identity
-    passed = (Comparison("height", 1.02, 1.0, 8.0),)
-    trial = Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder 5 mm", passed)
-    write_validation(trial, page.chosen().path)
-    page.refresh()
-    page.remove.trigger()
-    answer(page, "cancel")
-    assert page.chosen() is not None
-
-
 def test_undo_and_redo_of_a_removal_last_longer_than_its_message(
     page: SensorsPage, source: Path, context: AppContext
 ) -> None:

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QPushButton, QStackedWidget, QToolButton, QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.services.toasts import Toasts
 from app.shell.notifications import NotificationsButton
-from app.widgets.native import give_own_window
 
 
 @pytest.fixture
@@ -67,44 +66,6 @@ def test_its_button_acts_once_and_closes_it(
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
     assert undone == [1]
     assert not context.toasts.shown()
-
-
-def test_messages_stay_above_a_page_that_is_shown_later(context: AppContext, qtbot: QtBot) -> None:
-    """A click on the button that closes a message arrives there, whatever lies below it."""
-    window, stack = QWidget(), QStackedWidget()
-    qtbot.addWidget(window)
-    window.resize(800, 600)
-    stack.setParent(window)
-    stack.resize(800, 560)
-    pages = QWidget(), QWidget()
-    for page in pages:
-        stack.addWidget(page)
-    context.toasts.attach(window, lambda: None, over=stack)
-    with qtbot.waitExposed(window):
-        window.show()
-    context.toasts.show("not saved", "fail")
-    (toast,) = context.toasts.shown()
-    stack.setCurrentWidget(pages[1])
-    scene = QWidget(pages[1])
-    give_own_window(scene)
-    scene.resize(800, 560)
-    scene.show()
-    close = toast.findChild(QToolButton, "toast.close")
-    place = close.mapTo(window, close.rect().center())
-    assert window.childAt(place) is close
-    assert stack.geometry().contains(toast.geometry())
-    # What is really on the screen, with the native windows in their order.
-    qtbot.waitUntil(lambda: _same_colour(window, toast, scene), timeout=3000)
-    qtbot.mouseClick(close, Qt.MouseButton.LeftButton)
-    assert not context.toasts.shown()
-
-
-def _same_colour(window: QWidget, toast: QWidget, scene: QWidget) -> bool:
-    """Whether the screen shows the left edge of a message, which is red, above a scene."""
-    image = window.screen().grabWindow(window.winId()).toImage()
-    point = toast.geometry().center()
-    colour = image.pixelColor(toast.geometry().left() + 2, point.y())
-    return colour.red() > colour.green() + 50
 
 
 def test_the_history_keeps_what_was_closed(

@@ -42,20 +42,6 @@ def test_callbacks_run_after_their_modules_are_loaded(
     assert called[1] == "at once"
 
 
-def test_a_partly_loaded_module_does_not_count_as_loaded(
-    slow_modules: list[str], qtbot: QtBot
-) -> None:
-    loader, called = Loader(), []
-    loader.load(slow_modules)
-    gate = sys.modules["loader_gate"]
-    assert gate.begun.wait(5)
-    assert slow_modules[0] in sys.modules
-    loader.when_loaded(slow_modules[:1], lambda: called.append(1))
-    assert not called
-    gate.go.set()
-    qtbot.waitUntil(lambda: bool(called))
-
-
 def test_a_module_that_fails_to_load_is_reported_and_blocks_nothing(
     qtbot: QtBot, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -33,10 +33,6 @@ from app.context.pages import PageEntry
 from app.desktop import open_files
 from app.services.preferences import Limits
 from app.services.settings import Settings
-from app.services.status import (
-    Status,
-    status_texts,
-)
 from app.shell.about import AboutDialog
 from app.shell.log_window import LogWindow
 from app.shell.main_window import MainWindow
@@ -499,26 +495,6 @@ def test_a_new_sensor_is_started_while_the_page_shows_another(window: MainWindow
     window.context.requests.new_sensor.emit()
     assert window.page_name == "calibrate"
     assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
-
-
-def test_the_status_line_shows_what_is_known(window: MainWindow) -> None:
-    assert status_texts(Status())["camera"] == "No camera"
-    window.context.status.update(
-        camera="Virtual sensor",
-        rate_hz=29.97,
-        processing_ms=10.66,
-        dropped=3,
-        calibration="A-001-123456789abc",
-        calibration_note="not validated",
-    )
-    bar = window.statusBar()
-    output = {label.objectName(): label.text() for label in bar.findChildren(QLabel)}
-    assert output["main.status.rate"] == "30.0 fps"
-    assert output["main.status.processing"] == "10.7 ms"
-    assert output["main.status.dropped"] == "none skipped"
-    assert "not validated" in output["main.status.calibration"]
-    with pytest.raises(TypeError):
-        window.context.status.update(speed=1)
 
 
 def test_the_status_line_names_the_calibration_in_use_whatever_page_is_open(

@@ -105,20 +105,6 @@ def test_without_looping_it_pauses_at_the_last_frame(path: Path, clock: Clock) -
     source.close()
 
 
-def test_a_pause_repeats_the_same_image(path: Path, clock: Clock) -> None:
-    """Captures and views continue, and the stream does not count as lost."""
-    source = RecordingSource(path, playing=False)
-    source.open()
-    first = source.frame(0.0)
-    assert source.frame(0.0) is None
-    clock.now_s += 0.25
-    again = source.frame(0.0)
-    assert again.rgb is first.rgb
-    assert again.number == first.number + 1
-    assert again.time_s > first.time_s
-    source.close()
-
-
 def test_it_seeks_to_any_frame_and_steps(path: Path, clock: Clock) -> None:
     source = RecordingSource(path)
     source.open()

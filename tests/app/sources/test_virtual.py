@@ -12,8 +12,7 @@ import pytest
 
 from app.sources.bench import ITEMS, Bench
 from app.sources.rendering import state_of
-from app.sources.source import Frame, SourceLost
-from app.sources.stream import Stream
+from app.sources.source import Frame
 from app.sources.virtual import VirtualSource
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor, Whiteboard
@@ -135,31 +134,6 @@ def test_a_defocused_lens_widens_edges_and_keeps_the_light(source: VirtualSource
     assert soft.mean() == pytest.approx(sharp.mean(), rel=0.02)
 
 
-def test_dust_darkens_specks_and_nothing_else(source: VirtualSource) -> None:
-    source.bench.adjust(noise=0.0)
-    source.bench.lay("whiteboard")
-    clean = settled(source).rgb.astype(float)
-    source.bench.switch("dust", True)
-    dusty = settled(source).rgb.astype(float)
-    changed = (dusty != clean).any(axis=2)
-    assert 0.0005 < changed.mean() < 0.05 and (dusty <= clean).all()
-
-
-def test_a_stopped_camera_is_reported_and_can_be_reopened(bench: Bench) -> None:
-    stream = Stream(VirtualSource(bench))
-    stream.start()
-    assert len(stream.capture(2).result(WAIT_S)) == 2
-    waiting = stream.capture(10_000)
-    bench.switch("camera_stops", True)
-    with pytest.raises(SourceLost, match="camera has stopped"):
-        waiting.result(WAIT_S)
-    assert "camera has stopped" in (stream.figures().lost or "")
-    bench.switch("camera_stops", False)
-    stream.reopen()
-    assert len(stream.capture(2).result(WAIT_S)) == 2
-    stream.stop()
-
-
 def test_closing_does_not_wait_for_a_slow_image() -> None:
     source = VirtualSource(Bench())
     source.bench.lay("coin")
@@ -169,17 +143,3 @@ def test_closing_does_not_wait_for_a_slow_image() -> None:
         pass
     source.close()  # waits for a second, and leaves behind what has not ended then
     assert not any(thread.name == "virtual sensor" for thread in threading.enumerate())
-
-
-def test_an_error_while_rendering_is_reported_by_the_stream(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def broken(*_: object, **__: object) -> None:
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(VirtualSensor, "brightness", broken)
-    stream = Stream(VirtualSource(bench))
-    stream.start()
-    with pytest.raises(SourceLost, match="internal error"):
-        stream.capture(1).result(WAIT_S)
-    stream.stop()

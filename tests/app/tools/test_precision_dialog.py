@@ -89,34 +89,6 @@ def test_its_table_and_figure_are_saved(
     assert (tmp_path / "work-precision.png").is_file()
 
 
-def test_presses_of_another_sensor_are_refused_in_one_sentence(
-    dialog: PrecisionDialog, tmp_path: Path, small_session: Path, qtbot: QtBot
-) -> None:
-    text = (small_session / "session.toml").read_text("utf-8")
-    (tmp_path / "session.toml").write_text(text.replace('"virtual-1"', '"other"'), "utf-8")
-    dialog.use_folder(tmp_path)
-    dialog.start.click()
-    qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=20_000)
-    assert "other" in dialog.words.text() and "virtual-1" in dialog.words.text()
-    assert dialog.start.isEnabled()
-
-
-@pytest.mark.parametrize("mode", ["escape", "close"])
-def test_it_can_be_closed_and_shown_again(
-    dialog: PrecisionDialog, mode: str, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
-) -> None:
-    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
-    for _ in range(2):
-        if mode == "escape":
-            qtbot.keyClick(dialog, Qt.Key.Key_Escape)
-        else:
-            dialog.close()
-        assert not dialog.isVisible()
-        dialog.show()
-    dialog.start.click()
-    qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
-
-
 def test_closing_it_stops_the_measurement(
     dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:

@@ -12,22 +12,6 @@ from hypothesis import strategies as st
 from app.view3d.picking import between, hit, pins_text, with_pin
 from tests.app.view3d.conftest import BUMP, SMALL, Made
 
-NODE_MM = 0.15
-
-
-@pytest.mark.parametrize("target", [BUMP[:2], SMALL[:2], (1.0, 5.0)])
-@pytest.mark.parametrize("towards", [(0.0, 0.0, 1.0), (0.6, -0.5, 1.0), (-0.4, 1.0, 0.8)])
-def test_a_ray_to_a_point_of_the_surface_finds_it(
-    made: Made, target: tuple[float, float], towards: tuple[float, float, float]
-) -> None:
-    surface = made(largest=128)
-    depth = float(surface.depth_at(np.array([target[0]]), np.array([target[1]]))[0])
-    point = np.array([*target, depth])
-    start, end = point + 40.0 * np.array(towards), point - 40.0 * np.array(towards)
-    found = hit(surface, start, end)
-    assert found is not None
-    assert math.dist(found, target) < NODE_MM
-
 
 def test_nearer_parts_hide_parts_behind_them(made: Made) -> None:
     surface = made()

@@ -118,20 +118,6 @@ def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(
     assert len(asked) == 1 and view.scene.viewpoint != before
 
 
-def test_the_view_is_drawn_once_for_each_frame(
-    panel: SurfacePanel, made: Made, qtbot: QtBot
-) -> None:
-    view = panel.view
-    assert view is not None
-    qtbot.wait(100)
-    before = view.drawings
-    for number in range(5):
-        panel.show_surface(made(factor=0.1 * number, largest=128))
-        qtbot.waitUntil(lambda number=number: view.drawings > before + number, timeout=WAIT_MS)
-    qtbot.wait(50)
-    assert view.drawings == before + 5
-
-
 def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(
     panel: SurfacePanel, qtbot: QtBot
 ) -> None:

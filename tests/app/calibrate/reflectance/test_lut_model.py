@@ -161,16 +161,6 @@ def test_end_nodes_and_the_last_nodes_cannot_be_removed() -> None:
         model.remove_node(edit, 0, 1)
 
 
-def test_snap_moves_a_bent_curve_back_to_the_fit() -> None:
-    edit = model.thin_nodes(start(), 2)
-    index = len(edit[2].curve.cosines) // 2
-    bent = model.move_node(edit, 2, index, edit[2].curve.cosines[index], 9.0)
-    assert bent != edit
-    for snapped in (model.snap_to_fit(bent, 2, index), model.snap_to_fit(bent, 2)):
-        fit = edit[2].fit.at(edit[2].curve.cosines[index])
-        assert snapped[2].curve.values[index] == pytest.approx(float(fit))
-
-
 def test_excluded_points_no_longer_bend_the_curve() -> None:
     true = 0.05 + 0.9 * 0.55**1.3
     # The fit goes through the dirt, which has more points than the membrane.

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fake_camera import C310, FORMATS, FakeCamera, FakeDriver, eventually
 
-from app.sources.camera.applying import differences, is_locked
+from app.sources.camera.applying import is_locked
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.driver import CameraGone, Format, without_port
@@ -252,19 +252,6 @@ def test_a_lock_fixes_the_present_automatic_values(
     assert camera.wanted.size == (128, 96)
 
 
-def test_changes_by_another_program_are_detected(fake: FakeCamera) -> None:
-    reported = threading.Event()
-    camera = Camera(FakeDriver(fake), C310, on_change=reported.set, check_s=0.02)
-    stream = Stream(CameraSource(camera))
-    stream.start()
-    stream.capture(1).result(20.0)
-    reported.clear()
-    fake.settings["gain"] = replace(fake.settings["gain"], value=3.0)
-    assert reported.wait(20.0)
-    assert values(camera)["gain"] == 3.0
-    stream.stop()
-
-
 def test_a_camera_without_settings_or_formats_still_delivers() -> None:
     fake = FakeCamera(formats=(), settings={})
     stream = Stream(CameraSource(Camera(FakeDriver(fake), C310, pause_s=0.02)))
@@ -283,19 +270,6 @@ def test_a_driver_error_is_logged_and_retried(
     fake.light = real
     eventually(lambda: stream.figures().lost is None)
     assert "ZeroDivisionError" in caplog.text
-
-
-def test_differences_from_stored_settings_are_reported(camera: Camera, stream: Stream) -> None:
-    stream.capture(1).result(20.0)
-    state = camera.state
-    assert differences(camera.settings_now(), state.format, state.controls) == ()
-    stored = replace(STORED, pixel_format="MJPG", controls={"gain": 10.0, "exposure_auto": 0.0})
-    assert differences(stored, state.format, state.controls) == (
-        "the image size is 128x96, not 64x48 pixels",
-        "the format is YUYV, not MJPG",
-        "Automatic exposure is on, not off",
-        "Gain is 64, not 10",
-    )
 
 
 def test_a_slow_reopening_does_not_end_a_stream(

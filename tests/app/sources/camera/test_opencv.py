@@ -16,7 +16,7 @@ from fake_camera import eventually
 from app.sources.camera import opencv
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
-from app.sources.camera.driver import CameraGone, Device, Format
+from app.sources.camera.driver import CameraGone, Device
 from app.sources.camera.opencv import OpenCvDriver
 from app.sources.source import Frame
 from app.sources.stream import Stream
@@ -113,30 +113,6 @@ class Capture:
 
     def release(self) -> None:
         self.values.clear()
-
-
-def test_a_format_is_requested_in_the_order_that_drivers_need() -> None:
-    made: list[Capture] = []
-
-    def capture(address: Any, interface: int) -> Capture:
-        made.append(Capture(address, interface))
-        return made[0]
-
-    device = Device("046d:081b@usb", "C310", "046d:081b", "2")
-    driver = OpenCvDriver(capture, interface=cv2.CAP_DSHOW)
-    camera = driver.open(device, Format("YUYV", 1280, 960, 7.5))
-    assert (made[0].address, made[0].interface) == (2, cv2.CAP_DSHOW)
-    assert [number for number, _ in made[0].asked] == [
-        cv2.CAP_PROP_FOURCC,
-        cv2.CAP_PROP_FRAME_WIDTH,
-        cv2.CAP_PROP_FRAME_HEIGHT,
-        cv2.CAP_PROP_FPS,
-    ]
-    assert camera.format == Format("YUYV", 1280, 960, 7.5)
-    exposure = {s.key: s for s in camera.controls()}["exposure_ms"]
-    assert exposure.value == pytest.approx(1000 / 64)
-    camera.set("exposure_ms", 8.0)  # the nearest power of two is 1/128 s
-    assert made[0].asked[-1] == (cv2.CAP_PROP_EXPOSURE, -7.0)
 
 
 def test_an_image_repeated_after_a_timeout_is_dropped(

@@ -193,16 +193,6 @@ def test_an_unplugged_camera_raises_camera_gone(camera: V4l2, kernel: Kernel) ->
         camera.set("gain", 1.0)
 
 
-def test_a_range_of_sizes_offers_the_usual_ones(camera: V4l2, kernel: Kernel) -> None:
-    def stepwise(a: Any) -> None:
-        a.type = 3
-        a.values[:] = [32, 1280, 2, 32, 720, 2]
-
-    kernel._size = stepwise  # type: ignore[method-assign]
-    sizes = {(f.width, f.height) for f in camera.formats()}
-    assert sizes == {(640, 480), (800, 600), (1280, 720)}
-
-
 @pytest.mark.parametrize(
     ("number", "words"),
     [
