@@ -70,7 +70,7 @@ MOST = {
     "gelpolight_core/simulation": 2097,
     "gelpolight_core/studies": 1183,
     "tests/.": 1384,
-    "tests/app": 10653,
+    "tests/app": 10654,
     "tests/batch": 408,
     "tests/calibration": 1481,
     "tests/command_line": 1017,
