@@ -31,7 +31,7 @@ MOST = {
     "app/cameras": 630,
     "app/command_line": 2049,
     "app/context": 423,
-    "app/inspect": 1942,
+    "app/inspect": 1944,
     "app/live": 2474,
     "app/measure": 4278,
     "app/sensors": 815,
