@@ -16,8 +16,6 @@ from report_pdf import report_data, report_text
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.drape import cylinder_depth
 from gelpolight_core.measurement.evaluation import (
-    RANDOM,
-    SAME,
     Crossing,
     Evaluation,
     evaluate,
@@ -107,20 +105,6 @@ def test_errors_are_averaged_by_direction_shape_and_dimension() -> None:
     assert groups["planar", "cylinder", 4.0].sd_percent == pytest.approx(7.5 / math.sqrt(2))
     assert groups["depth", "cylinder", 1.0].mean_percent == pytest.approx(-10.0)
     assert groups["depth", "all", None].highest_percent == pytest.approx(20.0)
-
-
-def test_regions_named_same_and_random_are_taken_at_their_word() -> None:
-    rows = [
-        press("ball", 6.0, 0.8, region=name, repeat=str(k), name=f"{name}{k}")
-        for name in ("same", "random")
-        for k in range(3)
-    ]
-    found = [measurement("ball", 6.0, 0.8 + 0.01 * k) for k in range(6)]
-    evaluation = evaluate(rows, found)
-    counts = {g.regions: g.statistic.count for g in evaluation.groups if g.shape == "all"}
-    assert counts == {"all": 6, SAME: 3, RANDOM: 3}
-    depth = {gauge.direction: gauge for gauge in evaluation.repeatability}["depth"]
-    assert depth.within_region_mm == pytest.approx(0.01)
 
 
 def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.reflectance.membrane import CURVE_NODES
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.indenters import Ball, Cylinder
@@ -200,20 +198,3 @@ def test_standard_deviations_are_those_of_the_best_answer(
     np.testing.assert_array_equal(stated.depth_mm, best.depth_mm)
     assert stated.trace is not None
     assert stated.trace.effort == "best"
-
-
-@pytest.mark.parametrize("effort", EFFORTS)
-def test_a_curve_with_a_kink_is_solved_at_every_effort(
-    effort: str, frame: Frame, virtual_calibration: Calibration
-) -> None:
-    """As a hand may draw it: no polynomial follows it, and it is looked up instead."""
-    full = virtual_calibration.full
-    assert full is not None
-    even = np.linspace(0.0, 1.0, CURVE_NODES)
-    kinked = tuple(np.minimum(even, 0.5 + 0.2 * (even - 0.5)).tolist())
-    bent = replace(full.membrane, diffuse=(kinked, kinked, kinked))
-    calibration = replace(virtual_calibration, full=replace(full, membrane=bent))
-    assert Reconstructor(calibration).near_light.maps.membrane.table is not None
-    found = Reconstructor(calibration, effort=effort).depth(frame)
-    assert np.isfinite(found.depth_mm).all()
-    assert 0.3 < found.depth_mm.max() < 3.0

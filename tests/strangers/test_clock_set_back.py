@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -20,7 +19,6 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.measurement import protocol_run
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
-from gelpolight_core.session.known_files import KnownFiles
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
 
@@ -101,13 +99,3 @@ def test_a_run_goes_on_where_it_was_left(tmp_path: Path, clock: type[Clock]) -> 
     twice.append(again.take_back(run.wanted[0]))
     assert all(path is not None and path.is_file() for path in twice)
     assert twice[0] != twice[1]
-
-
-def test_a_file_that_was_replaced_is_noticed_whatever_its_time_says(tmp_path: Path) -> None:
-    path, other = tmp_path / "decisions.toml", tmp_path / "other"
-    path.write_text("a = 1\n")
-    known = KnownFiles([path])
-    other.write_text("a = 2\n")
-    os.utime(other, ns=(path.stat().st_atime_ns, path.stat().st_mtime_ns))
-    os.replace(other, path)
-    assert known.changed() == (path,)

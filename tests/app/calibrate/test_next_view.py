@@ -5,12 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from app.calibrate.balls import next_press_mm
 from app.calibrate.lens import TILT_DEG, next_view, uncovered_ninth
 from gelpolight_core.optics.board_grid import foreshortening_tilt_deg
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_quality import coverage_counts
-from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.session.board import BoardSpec
 
 BOARD, SIZE = BoardSpec((9, 6), 3.0), (1280, 960)
@@ -39,20 +37,3 @@ def test_twelve_suggested_views_are_whole_tilted_and_cover_the_image() -> None:
         assert abs(views[-1].tilt_deg - TILT_DEG) < 12.0
     assert uncovered_ninth(views) is None
     assert (coverage_counts(views, SIZE) > 0).mean() > 0.9
-
-
-def test_presses_are_suggested_from_the_middle_outwards_and_far_apart() -> None:
-    axis = np.arange(-200, 201) * 0.05
-    inside = np.hypot(*np.meshgrid(axis, axis)) <= 9.0
-    seen = np.where(inside, 100.0, -1.0).astype(np.float32)
-    slopes = np.zeros((*inside.shape, 2), np.float32)
-    table = ResamplingTable(MembraneGrid(axis, axis, 0.05), seen, seen, inside, slopes)
-    done: list[tuple[float, float]] = []
-    for _ in range(6):
-        place = next_press_mm(table, 3.0, done)
-        assert place is not None
-        assert np.hypot(*place) < 9.0 - 0.8 * 3.0
-        assert all(np.hypot(place[0] - x, place[1] - y) > 4.0 for x, y in done)
-        done.append(place)
-    assert np.hypot(*done[0]) < 1.0
-    assert next_press_mm(table, 20.0, ()) is None

@@ -57,12 +57,3 @@ def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz: float, fra
             for i in range(frames)
         ]
         assert reported == [False] * (frames - 1) + [True]
-
-
-def test_movement_is_reported_while_it_lasts() -> None:
-    watch = StillnessDetector()
-    reported = []
-    for number, position in enumerate((0.0, 0.0, 20.0, 20.0)):
-        watch.update(shot(scene(position), number, noise=0.005), 0.1 * number)
-        reported.append(watch.moves)
-    assert reported == [False, False, True, False]

@@ -25,7 +25,7 @@ from app.measure.judging import Stated
 from app.measure.page import MeasurePage
 from app.services.preferences import Limits
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.measurement.tools import ProfileWidth, tool_from_dict
+from gelpolight_core.measurement.tools import tool_from_dict
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
@@ -325,32 +325,6 @@ def test_a_steady_press_is_frozen_and_detected_automatically(
     press_view.freeze_action.trigger()
     assert press_view.work.image is None
     assert not press_view.panel.keep.isEnabled()
-
-
-@pytest.mark.usefixtures("library")
-def test_a_section_is_shown_where_its_width_was_read_and_the_tools_in_the_other_views(
-    page: MeasurePage, qtbot: QtBot, press: Path
-) -> None:
-    page.open_path(press)
-    press_view = page.press_view
-    qtbot.waitUntil(lambda: press_view.work.heightmap is not None, timeout=PATIENCE_MS)
-    press_view.details.open_at(press_view.details.section)
-    depth = press_view.work.heightmap
-    row, column = np.unravel_index(depth.depth_mm.argmax(), depth.depth_mm.shape)
-    x, y = float(depth.x_mm[column]), float(depth.y_mm[row])
-    press_view.work.add(ProfileWidth((x - 6.0, y), (x + 6.0, y)))
-    _measured(page, qtbot)
-    assert press_view.details.section.currentWidget() is press_view.details.plot
-    assert not press_view.map.panel.grab().isNull() and not press_view.details.plot.grab().isNull()
-
-    press_view.details.open_at(press_view.details.camera)
-    assert press_view.details.camera.image_size == (320, 240)
-    press_view.details.open_at(press_view.details.surface)
-    qtbot.waitUntil(lambda: press_view.details.surface.view is not None, timeout=PATIENCE_MS)
-    view = press_view.details.surface.view
-    qtbot.waitUntil(lambda: view.drawings > 0, timeout=PATIENCE_MS)
-    press_view.details.open_at(press_view.details.surface, False)
-    assert not press_view.details.wants_surface
 
 
 @pytest.mark.usefixtures("library")

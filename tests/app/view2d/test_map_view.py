@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
@@ -109,20 +107,6 @@ def test_the_scale_bar_is_as_long_as_it_says(view: MapView) -> None:
         assert scale.bar.rect().width() == pytest.approx(scale.size * px_per_mm, rel=0.01)
         text, unit = scale.text.toPlainText().split()
         assert float(text) * {"mm": 1.0, "um": 1e-3}[unit] == pytest.approx(scale.size)
-
-
-def test_the_pointer_has_a_position_on_the_image_only(view: MapView, qtbot: QtBot) -> None:
-    view.set_image(_marked(), EXTENT)
-    view.box.setRange(QRectF(-4.0, -4.0, 8.0, 8.0), padding=0)
-    qtbot.wait(50)  # lays out
-    pointed: list[tuple[float, float]] = []
-    view.pointed.connect(lambda x, y: pointed.append((x, y)))
-    view._on_pointer(view.box.mapViewToScene(QPointF(1.5, -2.0)))
-    assert pointed[-1] == pytest.approx((1.5, -2.0))
-    # The image continues below the axes, hidden.
-    axis = view._plot.getAxis("left").sceneBoundingRect()
-    view._on_pointer(axis.center())
-    assert all(map(math.isnan, pointed[-1]))
 
 
 # The colour range

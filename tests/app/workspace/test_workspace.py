@@ -226,29 +226,6 @@ def test_a_verdict_that_does_not_match_its_lengths_is_refused(
     assert "does not match" in entry.validation_note
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"version": 2},
-        {"version": "1"},
-        {"format": "x"},
-        {"identity": 3},
-        {"comparisons": [{"quantity": "height"}]},
-        {"comparisons": [{"quantity": "h", "measured_mm": 1, "true_mm": 0, "limit_percent": 5}]},
-        {"comparisons": 5},
-    ],
-    ids=str,
-)
-def test_a_damaged_trial_is_refused(
-    workspace: Workspace, source: Path, change: dict[str, object]
-) -> None:
-    place = workspace.import_calibration(source)
-    path = write_validation(trial(place, GOOD), place)
-    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
-    with pytest.raises(InputError):
-        read_validation(place)
-
-
 def test_age_is_counted_in_days(workspace: Workspace, source: Path) -> None:
     entry = read_entry(workspace.import_calibration(source))
     made = entry.created
