@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 
 from app.view2d import shading
 from app.view2d.display import SURROUND, Display, colour_table
-from app.view2d.map_image import map_image
 from app.view2d.map_view import Extent, Grid, MapView, extent_of
+from app.view2d.shading import map_image
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold

@@ -20,8 +20,7 @@ from app.live.frame_results import Maker, Wanted
 from app.services.file_dialogs import ask_open, ask_save
 from app.sources.recording import RecordingSource
 from app.view2d.quantities import Reference
-from app.view3d.image_dialog import ImageChoice, image_dialog
-from app.view3d.saving import Played, ViewSaving
+from app.view3d.saving import ImageChoice, Played, ViewSaving, image_dialog
 from app.view3d.surface import Surface
 from app.widgets.actions import make_action
 from gelpolight_core.export.profile_file import write_profiles

@@ -13,13 +13,11 @@ from app.live.image_checks import Exposure
 from app.live.overlay import Role
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
-from gelpolight_core.quality import Verdict
+from app.widgets.quality_table import SIGNS
 from gelpolight_core.translation import tr
 
 # Below this width the advice and the focus bar do not fit side by side.
 NARROW = 620
-
-SIGNS = {Verdict.PASS: "\u2713", Verdict.WARN: "!", Verdict.FAIL: "\u2715"}
 
 
 class FocusBar(QProgressBar):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from app.sources.source import Frame
 from app.view2d.display import Display
-from app.view2d.map_image import MapImage, map_image
+from app.view2d.shading import MapImage, map_image
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse

@@ -100,7 +100,7 @@ def _stages(entry: Entry) -> QWidget:
     for stage, table in (entry.summary.quality if entry.summary is not None else {}).items():
         title = stage_title(stage)
         column.addWidget(_heading(title, table.verdict))
-        shown = QualityTableWidget(f"sensors.quality.{stage}", title, stages, narrow=True)
+        shown = QualityTableWidget(f"sensors.quality.{stage}", title, narrow=True)
         shown.set_table(table)
         column.addWidget(shown)
     column.addStretch(1)

@@ -20,8 +20,7 @@ from app.context.context import AppContext
 from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
-from app.sensors.sessions_box import SessionsBox
-from app.sensors.tables import Cell, CellsTable, cells_of, library_titles
+from app.sensors.tables import Cell, CellsTable, SessionsBox, cells_of, library_titles
 from app.sensors.trash_dialog import TrashDialog
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job, Jobs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -9,9 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.view2d.display import Light
+from app.view2d import shading
+from app.view2d.colour_range import ColourRange
+from app.view2d.display import SURROUND, Display, Light, colour_table
 from app.view2d.shade_kernel import shade
-from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Map = NDArray[np.float32]
 Rgb = NDArray[np.uint8]
@@ -146,3 +149,29 @@ def outside_filled(rgb: Rgb, outside: NDArray[np.uint8], colour: tuple[int, int,
 @lru_cache(maxsize=4)
 def _filled(shape: tuple[int, int], colour: tuple[int, int, int]) -> Rgb:
     return np.full((*shape, 3), colour, np.uint8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapImage:
+    """Content of the view.
+
+    Attributes
+    ----------
+    rgb : (rows, columns, 3) uint8
+        Colours.
+    range_mm : (low, high)
+        Depths at the ends of the colours.
+    """
+
+    rgb: NDArray[np.uint8]
+    range_mm: tuple[float, float]
+
+
+def map_image(heightmap: HeightMap, display: Display) -> MapImage:
+    """Return a height map at full detail as colours."""
+    depth = heightmap.depth_mm
+    shown = display.range_mm or ColourRange().update(depth, 0.0)
+    table = colour_table(display.colours)
+    rgb = shading.shaded(depth, heightmap.pitch_mm, table, shown, display.light)
+    outside = heightmap.flags & np.uint8(Flag.OUTSIDE)
+    return MapImage(shading.outside_filled(rgb, outside, SURROUND), shown)

@@ -13,21 +13,19 @@ import pyvista as pv
 from numpy.typing import NDArray
 from pyvista.core.utilities.helpers import generate_plane
 
-from app.view3d.legend import (
-    Box,
-    Plotter,
-    axes_of,
-    draw_axes,
-    draw_note,
-    draw_scale,
-    draw_scale_bar,
-)
 from app.view3d.overlays import (
     CURSOR,
     CUT,
+    Box,
     Overlay,
+    Plotter,
+    axes_of,
     cut_edge,
+    draw_axes,
+    draw_note,
     draw_pins,
+    draw_scale,
+    draw_scale_bar,
     draw_solid,
     lines_mesh,
     points_on,

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.inspect.export import ExportDialog
-from app.view3d.image_dialog import image_dialog, movie_dialog
+from app.view3d.saving import image_dialog, movie_dialog
 
 MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
     "export": lambda host: ExportDialog(Path("depth"), count=3, at=1, parent=host),

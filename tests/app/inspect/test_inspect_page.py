@@ -19,7 +19,7 @@ from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
 from app.live.zero import FRAMES, zero_calibration
 from app.sources.processor import Outcome
-from app.view3d.image_dialog import MovieChoice
+from app.view3d.saving import MovieChoice
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
-from app.live.gel_care import PressCounter
+from app.live.depth import PressCounter
 from app.workspace.gel_care import FILE, read_presses
 
 

@@ -13,10 +13,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QProgressDialog, QPushButton
 
 from app.services.settings import Settings
-from app.view3d.image_dialog import ImageChoice, MovieChoice
 from app.view3d.images import image_of, write_movie
 from app.view3d.panel import SurfacePanel
-from app.view3d.saving import ViewSaving
+from app.view3d.saving import ImageChoice, MovieChoice, ViewSaving
 from gelpolight_core.errors import InputError
 from tests.app.view3d.conftest import Made, pixels
 
