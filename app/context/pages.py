@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -54,15 +53,6 @@ class PageEntry:
         """Name of the page's module."""
         return self.factory.partition(":")[0]
 
-    @property
-    def exists(self) -> bool:
-        """Whether the module exists."""
-        parent = self.module.rpartition(".")[0]
-        return (
-            importlib.util.find_spec(parent) is not None
-            and importlib.util.find_spec(self.module) is not None
-        )
-
     def make(self, context: AppContext) -> QWidget:
         """Load and create the page."""
         name = self.factory.partition(":")[2]
@@ -72,7 +62,7 @@ class PageEntry:
 
 def all_pages() -> tuple[PageEntry, ...]:
     """Return the pages of this program in the order of the workflow."""
-    table = (
+    return (
         PageEntry("start", tr("Start"), "home", "app.start.page:StartPage"),
         PageEntry("sensors", tr("Sensors"), "sensors", "app.sensors.page:SensorsPage"),
         PageEntry(
@@ -91,4 +81,3 @@ def all_pages() -> tuple[PageEntry, ...]:
         PageEntry("inspect", tr("Inspect"), "inspect", "app.inspect.page:InspectPage"),
         PageEntry("measure", tr("Measure"), "measure", "app.measure.page:MeasurePage"),
     )
-    return tuple(entry for entry in table if entry.exists)

@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.context.context import AppContext
-from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
 from app.sensors.tables import Cell, CellsTable, SessionsBox, cells_of, library_titles
@@ -66,7 +65,8 @@ class SensorsPage(QWidget):
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
         self._stack = QStackedWidget(self)
-        self._stack.addWidget(Welcome(self._first_actions()))
+        first = self.demo, self.new, self.session, self.import_, self.trash
+        self._stack.addWidget(Welcome(first))
         self._stack.addWidget(self._build_library(split))
         vbox(self._stack, of=self, margins=0)
         context.requests.calibrations_changed.connect(self.refresh)
@@ -121,18 +121,10 @@ class SensorsPage(QWidget):
         stack = self._library.undo
         make_action(self, "sensors.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",))
         make_action(self, "sensors.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"))
-        there = {entry.name for entry in all_pages()}
-        for action in (self.new, self.session, self.demo):
-            action.setVisible("calibrate" in there)
-            action.setEnabled("calibrate" in there)
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
         return (self.report,)
-
-    def _first_actions(self) -> tuple[QAction, ...]:
-        first = (self.demo, self.new, self.session, self.import_, self.trash)
-        return tuple(action for action in first if action.isVisible())
 
     def _build_library(self, split: QWidget) -> QWidget:
         bar = named(QToolBar(self), "sensors.bar", tr("Library"))

@@ -229,28 +229,19 @@ class MainWindow(QMainWindow):
 
     def open_path_in(self, name: str, path: str) -> None:
         """Show a page and open a folder or file in it."""
-        if name in self.entries:
-            self._with_page(name, lambda page: self._open_path(page, Path(path)))
 
-    def _open_path(self, page: QWidget, path: Path) -> None:
-        try:
-            _call(page, "open_path", path)
-        except InputError as error:
-            self.context.toasts.show(str(error), "fail")
+        def open_path(page: QWidget) -> None:
+            with self.context.toasts.errors():
+                _call(page, "open_path", Path(path))
+
+        self._with_page(name, open_path)
 
     def begin_new_sensor(self) -> None:
-        """Start calibrating a sensor, if there is a page for it."""
-        if "calibrate" in self.entries:
-            self._with_page("calibrate", lambda page: _call(page, "begin"))
+        """Start calibrating a sensor."""
+        self._with_page("calibrate", lambda page: _call(page, "begin"))
 
     def begin_demo(self) -> None:
-        """Select the virtual sensor, and start calibrating it if there is a page for it.
-
-        A page with its own start for it (``begin_demo``) is used.
-        """
-        if "calibrate" not in self.entries:
-            self.context.source.choose_virtual_sensor()
-            return
+        """Select the virtual sensor, and start calibrating it."""
 
         def begin(page: QWidget) -> None:
             self.context.source.choose_virtual_sensor()

@@ -52,8 +52,7 @@ class Menus:
         window = self._window
         menu = window.menuBar().addMenu(tr("&Tools"))
         self._add(menu, "tools.precision", tr("&Error against run time…"), window.show_precision)
-        if "inspect" in window.entries:
-            self._add(menu, "tools.stream", tr("&Stream the live depth…"), window.show_stream)
+        self._add(menu, "tools.stream", tr("&Stream the live depth…"), window.show_stream)
         self._add(menu, "tools.design", tr("&Design check…"), window.show_design)
 
     def _build_help(self) -> None:
@@ -172,17 +171,14 @@ class FileMenu(QMenu):
         self.recent.aboutToShow.connect(self._fill_recent)
         self.exports = named(QMenu(tr("&Export"), self), "file.export", tr("Export"))
         self.exports.aboutToShow.connect(self._fill_exports)
-        calibrates, has_library = (name in window.entries for name in ("calibrate", "sensors"))
-        if calibrates:
-            self._add("new", tr("&New sensor"), window.begin_new_sensor, "Ctrl+N", "add")
-            self._add("session", tr("&Open session folder…"), window.choose_session, "Ctrl+O",
-                      "folder")  # fmt: skip
-            self._add("open", tr("Open &files…"), window.choose_files, "Ctrl+Alt+O")
-            self.addMenu(self.recent)
-            self.addSeparator()
-        if has_library:
-            self._add("import", tr("&Import calibrations…"), window.import_calibrations, "Ctrl+I",
-                      "import")  # fmt: skip
+        self._add("new", tr("&New sensor"), window.begin_new_sensor, "Ctrl+N", "add")
+        session = tr("&Open session folder…")
+        self._add("session", session, window.choose_session, "Ctrl+O", "folder")
+        self._add("open", tr("Open &files…"), window.choose_files, "Ctrl+Alt+O")
+        self.addMenu(self.recent)
+        self.addSeparator()
+        calibrations = tr("&Import calibrations…")
+        self._add("import", calibrations, window.import_calibrations, "Ctrl+I", "import")
         self.addMenu(self.exports)
         self.addSeparator()
         self._add("preferences", tr("&Preferences…"), window.show_preferences, "Ctrl+,")

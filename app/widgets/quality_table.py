@@ -62,9 +62,10 @@ class QualityTableWidget(MarkupLabel):
 
     def _row(self, figure: Figure) -> str:
         verdict, cell = figure.verdict, "<td width='1%' align='right' style='white-space: nowrap"
+        colour = f"white-space: nowrap; color: @{verdict.value}"
         sign = SIGNS[verdict] if self._narrow else f"{SIGNS[verdict]} {verdict_word(verdict)}"
         row = (
-            f"<tr><td width='1%' style='white-space: nowrap; color: @{verdict.value}'><b>{sign}</b></td>"
+            f"<tr><td width='1%' style='{colour}'><b>{sign}</b></td>"
             f"<td width='97%'>{escaped(figure.label)}</td>"
             f"{cell}'>{escaped(value_text(figure))}</td>"
             f"{cell}; color: @muted'>{escaped(limit_text(figure))}</td></tr>"
