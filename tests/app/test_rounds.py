@@ -9,13 +9,13 @@ from pathlib import Path
 from statistics import median
 
 ROOT = Path(__file__).resolve().parents[2]
-ROUNDS = 14
+ROUNDS = 11
 # The first rounds load modules and fill caches.
 SETTLED = 4
 # Of memory that is asked for and not given back; a wizard's frames and images alone are 3 MB.
 KEPT_MB = 0.1
 # Rounds at the beginning and the end whose medians are compared.
-ENDS = 5
+ENDS = 3
 
 SCRIPT = """
 import gc, json, sys, threading

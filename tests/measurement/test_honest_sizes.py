@@ -39,8 +39,7 @@ def sizes(measurement: Measurement) -> list[tuple[float, float]]:
     return list(zip(measurement.side_mm, measurement.sd["side_mm"], strict=True))
 
 
-@pytest.mark.parametrize("edge_mm", [0.05, 0.1])
-@pytest.mark.parametrize("depth_mm", [0.3, 1.0])
+@pytest.mark.parametrize(("depth_mm", "edge_mm"), [(0.3, 0.05), (1.0, 0.1)])
 def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide(
     depth_mm: float, edge_mm: float
 ) -> None:

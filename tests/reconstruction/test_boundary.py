@@ -19,7 +19,6 @@ from gelpolight_core.reconstruction.checks import (
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.studies.known_sensor import (
@@ -73,17 +72,10 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
     return rms_um(depth_error(found, press.truth, radius_mm=SEEN_MM))
 
 
-@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("effort", ["fast", "best"])
 @pytest.mark.parametrize(
     "name",
-    [
-        *(f"cylinder {width} at 11" for width in (6, 12)),
-        "cylinder 12 at 10.5",
-        "cylinder 12 at 12",
-        *(f"edge {share}" for share in (0.23, 0.5)),
-        "half plane",
-        "quadrant",
-    ],
+    ["cylinder 6 at 11", "cylinder 12 at 11", "edge 0.23", "edge 0.5", "half plane", "quadrant"],
 )
 def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str) -> None:
     """Held at depth 0 all around, or freed by brightness, these are 80 to 480 um off."""
@@ -95,7 +87,7 @@ def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str)
     assert not (found.flags & int(Flag.UNANCHORED)).any()
 
 
-@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("effort", ["fast", "best"])
 @pytest.mark.parametrize("depth_mm", [0.05, 0.1])
 def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(
     effort: str, depth_mm: float
@@ -140,8 +132,8 @@ def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_ancho
     assert np.median(found.depth_model_sd_mm[inside]) > 0.5 * DEPTH_MM
 
 
-@pytest.mark.parametrize("effort", EFFORTS)
-@pytest.mark.parametrize("x_mm", [10.5, 11.0, 12.0])
+@pytest.mark.parametrize("effort", ["fast", "best"])
+@pytest.mark.parametrize("x_mm", [10.5, 12.0])
 def test_what_the_boundary_cuts_off_is_not_measured(x_mm: float, effort: str) -> None:
     press = scene(f"cylinder 12 at {x_mm:g}")
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
