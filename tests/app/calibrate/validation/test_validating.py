@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from report_pdf import report_data
 from technician import Technician
 
 from app.calibrate import validation as validating
+from app.command_line.main import main
 from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.manifest import read_summary
@@ -124,3 +126,20 @@ def test_a_validated_calibration_that_is_not_in_use_can_be_put_into_use(
     technician.click("validation.use")
     assert context.workspace.in_use == path
     assert not step.form.use.isVisible()
+
+
+def test_reports_of_the_window_and_of_the_command_state_the_validation(
+    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path
+) -> None:
+    path = save(technician, computed_project(), tmp_path / "workspace")
+    step = technician.wizard.at("validation")
+    step.validating.import_press(small_session / PRESS)
+    technician.until(lambda: "Diameter" in step.form.result.text())
+    step.validating.keep()
+    technician.wizard.at("result").saving.write_report(tmp_path / "window.pdf")
+    technician.rest()
+    assert main(["report", str(path), "-o", str(tmp_path / "command.pdf")]) == 0
+    window, command = (report_data(tmp_path / f"{n}.pdf") for n in ("window", "command"))
+    assert window["validation"] == command["validation"]
+    assert not command["validation"]["sentence"].startswith("Not validated")
+    assert command["validation"]["data"]["identity"] == read_summary(path).identity
