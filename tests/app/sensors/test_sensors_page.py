@@ -310,25 +310,6 @@ def test_a_failed_report_is_shown_to_the_user(
     assert str(place.parent) in context.toasts.shown()[-1].text
 
 
-def test_the_report_contains_the_validation(source: Path, tmp_path: Path) -> None:
-    place = tmp_path / "c.gplcal"
-    place.write_bytes(source.read_bytes())
-    write_entry_report(read_entry(place), tmp_path / "before.pdf")
-    trial = Validation(
-        read_entry(place).summary.identity, "2026-01-02T03:04:05+00:00", "M", "cylinder",
-        (Comparison("height", 1.01, 1.0, 8.0),),
-    )  # fmt: skip
-    write_validation(trial, place)
-    write_entry_report(read_entry(place), tmp_path / "after.pdf")
-    before, after = (
-        report_data(tmp_path / f"{name}.pdf")["validation"]["sentence"]
-        for name in ("before", "after")
-    )
-    assert "Not validated" in before
-    assert "Validated: cylinder" in after
-    assert "1.010 mm measured" in after
-
-
 def test_the_gel_of_a_calibration_is_shown_and_named(
     page: SensorsPage, source: Path, context: AppContext, qtbot: QtBot
 ) -> None:
