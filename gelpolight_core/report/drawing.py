@@ -133,7 +133,7 @@ def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Seq
     """Show a map of each channel with a common scale, robust against specks; 0 is unknown."""
     known = np.asarray((maps > 0.0).all(axis=2))
     shown = np.where(known[..., None], maps, np.nan)
-    low, high = np.nanpercentile(shown, [0.5, 99.5]) if known.any() else (0.0, 1.0)
+    low, high = np.percentile(maps[known], [0.5, 99.5]) if known.any() else (0.0, 1.0)
     step = max(maps.shape[1] // 420, 1)
     panels: list[Axes] = list(figure.subplots(1, 3, sharey=True))
     for k, axes in enumerate(panels):
