@@ -58,21 +58,15 @@ def detect_background(
 class BackgroundStep(ImageStep):
     """Checks that the membrane is well lit and untouched."""
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "background",
-            tr("Background"),
-            (Stage.BACKGROUND,),
-            tr(
-                "Mount the membrane. Nothing must touch it. Do not change the exposure or the "
-                "light."
-            ),
-            "membrane",
-            frames=16,
-            wanted=1,
-        )
+    step = Step(
+        "background",
+        tr("Background"),
+        (Stage.BACKGROUND,),
+        tr("Mount the membrane. Nothing must touch it. Do not change the exposure or the light."),
+        "membrane",
+        frames=16,
+        wanted=1,
+    )
 
     def detector(self, name: str) -> Detector:
         """Return the check of the bare membrane."""
@@ -96,21 +90,18 @@ def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detect
 class ClosedBackgroundStep(ImageStep):
     """Checks that the membrane is well lit."""
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "background",
-            tr("Background"),
-            (Stage.BACKGROUND,),
-            tr(
-                "Nothing must touch the membrane. Switch automatic exposure and white balance "
-                "off, and do not change the exposure or the light afterwards."
-            ),
-            "membrane",
-            frames=16,
-            wanted=1,
-        )
+    step = Step(
+        "background",
+        tr("Background"),
+        (Stage.BACKGROUND,),
+        tr(
+            "Nothing must touch the membrane. Switch automatic exposure and white balance "
+            "off, and do not change the exposure or the light afterwards."
+        ),
+        "membrane",
+        frames=16,
+        wanted=1,
+    )
 
     def detector(self, name: str) -> Detector:
         """Return the check of the light; without other images contact cannot be seen."""

@@ -249,22 +249,19 @@ class BallsStep(ImageStep):
         self.radius.box.valueChanged.connect(lambda _: self._on_radius(self.radius.radius_mm))
         self.panel.add_extra(self.radius, self.radius.box)
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "balls",
-            tr("Ball presses"),
-            (Stage.BALLS,),
-            tr(
-                "Press a ball of known diameter into the membrane. Vary the position over the "
-                "whole field, as the ring in the image suggests, and the depth. Enter the ball "
-                "diameter for each press."
-            ),
-            "ball",
-            frames=4,
-            wanted=10,
-        )
+    step = Step(
+        "balls",
+        tr("Ball presses"),
+        (Stage.BALLS,),
+        tr(
+            "Press a ball of known diameter into the membrane. Vary the position over the "
+            "whole field, as the ring in the image suggests, and the depth. Enter the ball "
+            "diameter for each press."
+        ),
+        "ball",
+        frames=4,
+        wanted=10,
+    )
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball, once the earlier stages are known."""

@@ -251,23 +251,20 @@ ASKED = ("next_ball_gain_percent", "balls_used")
 class ClosedBallsStep(BallsStep):
     """Asks for presses until more do not help."""
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "balls",
-            tr("Ball presses"),
-            (Stage.BALLS,),
-            tr(
-                "Press a ball of known diameter into the membrane, at a different place for each "
-                "image. Its slopes must be as steep as what you want to measure. The ring in the "
-                "image shows where the next press helps most."
-            ),
-            "ball",
-            frames=4,
-            wanted=ENOUGH_BALLS,
-            least=LEAST_PRESSES,
-        )
+    step = Step(
+        "balls",
+        tr("Ball presses"),
+        (Stage.BALLS,),
+        tr(
+            "Press a ball of known diameter into the membrane, at a different place for each "
+            "image. Its slopes must be as steep as what you want to measure. The ring in the "
+            "image shows where the next press helps most."
+        ),
+        "ball",
+        frames=4,
+        wanted=ENOUGH_BALLS,
+        least=LEAST_PRESSES,
+    )
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball beside the background."""

@@ -38,12 +38,9 @@ class FormPage(QScrollArea):
     -------
     accepted(object)
         The session with the entered values, in the folder of the session shown last.
-    camera_wanted()
-        The user wants to set and lock the camera.
     """
 
     accepted = Signal(object)
-    camera_wanted = Signal()
 
     def __init__(self, title: str, task: str) -> None:
         super().__init__()
@@ -134,7 +131,6 @@ class FormPage(QScrollArea):
             tr("Set and lock the camera"),
             tr("Format, exposure, gain, white balance, focus, and a test of the image stability"),
         )
-        self.camera_settings.clicked.connect(self.camera_wanted)
         row = hbox((self.camera, 1), self.camera_settings, of=box)
         self._camera_row = row
         self.show_camera(tr("No camera is selected."), "", settable=False)

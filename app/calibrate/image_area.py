@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QPushButton,
     QSizePolicy,
@@ -26,18 +25,7 @@ IMAGE, RESULT = range(2)
 
 
 class ImageArea(QWidget):
-    """Image, result and film strip; with a message when the camera is lost.
-
-    Signals
-    -------
-    live_wanted()
-        Return from a capture to the live image.
-    reconnect_wanted()
-        Open the lost camera again.
-    """
-
-    live_wanted = Signal()
-    reconnect_wanted = Signal()
+    """Image, result and film strip; with a message when the camera is lost."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -56,7 +44,6 @@ class ImageArea(QWidget):
             tr("Back to the live image"),
             tr("Back to the live image (Esc)"),
         )
-        self.back_to_live.clicked.connect(self.live_wanted)
         self.tabs.setCornerWidget(self.back_to_live)
         vbox(self._build_lost(), (self.tabs, 1), self.strip, of=self, margins=0, spacing=2)
         self.show_capture_name("")
@@ -68,11 +55,10 @@ class ImageArea(QWidget):
         show_meaning(self.why, "fail")
         make_bold(self.why)
         self.why.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
-        again = named(
+        self.reconnect = named(
             QPushButton(tr("Re&connect")), "calibrate.reconnect", tr("Open the camera again")
         )
-        again.clicked.connect(self.reconnect_wanted)
-        hbox((self.why, 1), again, of=self.lost, margins=(8, 4, 8, 4))
+        hbox((self.why, 1), self.reconnect, of=self.lost, margins=(8, 4, 8, 4))
         self.lost.hide()
         return self.lost
 

@@ -260,22 +260,19 @@ class LensStep(ImageStep):
         self._views: dict[str, LensView] = {}
         self.model.captured.connect(self._on_captured)
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "lens",
-            tr("Lens"),
-            (Stage.LENS,),
-            tr(
-                "Use the camera alone. Hold the checkerboard in front of it. Tilt it by 15 to 40 "
-                "degrees in a new direction for each image, until its corners have covered the "
-                "whole image."
-            ),
-            "camera",
-            wanted=12,
-            least=MIN_VIEWS,
-        )
+    step = Step(
+        "lens",
+        tr("Lens"),
+        (Stage.LENS,),
+        tr(
+            "Use the camera alone. Hold the checkerboard in front of it. Tilt it by 15 to 40 "
+            "degrees in a new direction for each image, until its corners have covered the "
+            "whole image."
+        ),
+        "camera",
+        wanted=12,
+        least=MIN_VIEWS,
+    )
 
     def start(self) -> None:
         """Analyse the views that the session has."""

@@ -85,21 +85,18 @@ HANDLE = "mirror."
 class LightsStep(ImageStep):
     """Finds the spots; the user can drag each to its place."""
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "lights",
-            tr("Lights"),
-            (Stage.LIGHTS,),
-            tr(
-                "Replace the board with the mirror. Switch all three LEDs on and darken the room. "
-                "Shorten the exposure until the three spots are small and not saturated."
-            ),
-            "mirror",
-            frames=16,
-            wanted=1,
-        )
+    step = Step(
+        "lights",
+        tr("Lights"),
+        (Stage.LIGHTS,),
+        tr(
+            "Replace the board with the mirror. Switch all three LEDs on and darken the room. "
+            "Shorten the exposure until the three spots are small and not saturated."
+        ),
+        "mirror",
+        frames=16,
+        wanted=1,
+    )
 
     def detector(self, name: str) -> Detector:
         """Return the detection of the spots, with their positions in an earlier mirror image."""

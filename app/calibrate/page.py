@@ -55,14 +55,14 @@ class CalibratePage(QWidget):
         for view in (self.start, self.question, self.form, self.closed_form):
             self._stack.addWidget(view)
         self.setup_cameras = [self._prepare(form) for form in (self.form, self.closed_form)]
-        self.start.new_wanted.connect(self.begin)
-        self.start.open_wanted.connect(self.choose_folder)
-        self.start.demo_wanted.connect(self.begin_demo)
+        self.start.new.clicked.connect(self.begin)
+        self.start.open.clicked.connect(self.choose_folder)
+        self.start.demo.clicked.connect(self.begin_demo)
         self.start.recent_wanted.connect(lambda folder: self.open_path(Path(folder)))
         self._offer: ClosedSession | None = None
-        self.start.closed_wanted.connect(self._begin_closed)
+        self.start.closed.clicked.connect(self._begin_closed)
         self.question.answered.connect(self._on_answer)
-        self.question.back_wanted.connect(self._leave_session)
+        self.question.back.clicked.connect(self._leave_session)
         context.source.changed.connect(self._on_source)
         self.start.show_recent(context.settings.recent("sessions"))
 

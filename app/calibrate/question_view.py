@@ -20,12 +20,9 @@ class QuestionView(QWidget):
     -------
     answered(bool)
         Whether the sensor can be opened.
-    back_wanted()
-        Return to the start.
     """
 
     answered = Signal(bool)
-    back_wanted = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -63,10 +60,9 @@ class QuestionView(QWidget):
             column.addWidget(button)
             column.addWidget(label)
             column.addSpacing(10)
-        back = self._answer("back", tr("&Back"))
-        back.setFlat(True)
-        back.clicked.connect(self.back_wanted)
-        column.addWidget(back)
+        self.back = self._answer("back", tr("&Back"))
+        self.back.setFlat(True)
+        column.addWidget(self.back)
 
     def _answer(self, name: str, text: str) -> QPushButton:
         button = named(QPushButton(text), f"question.{name}", text.replace("&", ""))

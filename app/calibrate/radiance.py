@@ -115,22 +115,19 @@ def _refuse_membrane(small: Float, background: Float, area: Mask2) -> None:
 class RadianceStep(ImageStep):
     """Checks the light on the white board."""
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "radiance",
-            tr("Light intensity"),
-            (Stage.RADIANCE,),
-            tr(
-                "Insert the elastomer without the membrane. Press the white board onto it without "
-                "air bubbles. Set the exposure so that nothing is saturated, and do not change it "
-                "afterwards."
-            ),
-            "whiteboard",
-            frames=16,
-            wanted=1,
-        )
+    step = Step(
+        "radiance",
+        tr("Light intensity"),
+        (Stage.RADIANCE,),
+        tr(
+            "Insert the elastomer without the membrane. Press the white board onto it without "
+            "air bubbles. Set the exposure so that nothing is saturated, and do not change it "
+            "afterwards."
+        ),
+        "whiteboard",
+        frames=16,
+        wanted=1,
+    )
 
     def detector(self, name: str) -> Detector:
         """Return the check of the light."""

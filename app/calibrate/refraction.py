@@ -116,19 +116,16 @@ class RefractionStep(StepPresenter):
     has_image_tab = False
     only_shows = True
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "refraction",
-            tr("Refraction"),
-            (Stage.BALLS,),
-            tr(
-                "Compare a press near the edge of the field before and after the correction. The "
-                "ellipse of the contact must have become a circle."
-            ),
-            "ball",
-        )
+    step = Step(
+        "refraction",
+        tr("Refraction"),
+        (Stage.BALLS,),
+        tr(
+            "Compare a press near the edge of the field before and after the correction. The "
+            "ellipse of the contact must have become a circle."
+        ),
+        "ball",
+    )
 
     def captures(self) -> tuple[Capture, ...]:
         """Return the ball presses."""

@@ -47,14 +47,10 @@ class ResultView(QWidget):
 
     Signals
     -------
-    save_wanted(), report_wanted()
-        The buttons.
     step_wanted(str)
         Key of a step to go to.
     """
 
-    save_wanted = Signal()
-    report_wanted = Signal()
     step_wanted = Signal(str)
 
     def __init__(self, steps: Sequence[Step], parent: QWidget | None = None) -> None:
@@ -85,9 +81,8 @@ class ResultView(QWidget):
         self.report = named(
             QPushButton(tr("Write the &report…")), "result.report", tr("Write the report")
         )
-        for button, signal in ((self.save, self.save_wanted), (self.report, self.report_wanted)):
+        for button in (self.save, self.report):
             button.setMinimumHeight(38)
-            button.clicked.connect(signal)
             buttons.addWidget(button)
         self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -250,8 +245,8 @@ class Saving(QObject):
     def __init__(self, model: WizardModel, view: ResultView, *, context: AppContext) -> None:
         super().__init__(view)
         self._model, self._view, self._context = model, view, context
-        view.save_wanted.connect(self.save)
-        view.report_wanted.connect(self.report)
+        view.save.clicked.connect(self.save)
+        view.report.clicked.connect(self.report)
 
     def save(self) -> None:
         """Write the calibration into the library, and use it from now on unless it failed."""
@@ -323,16 +318,13 @@ class ResultStep(StepPresenter):
         self.view.step_wanted.connect(self.step_wanted)
         self.saving = Saving(self.model, self.view, context=self.context)
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "result",
-            tr("Calibration"),
-            (Stage.JOINT,),
-            tr("Check all figures together, then save the calibration."),
-            "complete",
-        )
+    step = Step(
+        "result",
+        tr("Calibration"),
+        (Stage.JOINT,),
+        tr("Check all figures together, then save the calibration."),
+        "complete",
+    )
 
     @property
     def centre(self) -> QWidget:

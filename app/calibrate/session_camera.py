@@ -39,7 +39,7 @@ class SetupCamera(QObject):
     def __init__(self, setup: FormPage, *, context: AppContext) -> None:
         super().__init__(setup)
         self._setup, self._context = setup, context
-        setup.camera_wanted.connect(self._set)
+        setup.camera_settings.clicked.connect(self._set)
         context.source.changed.connect(self.show)
         context.cameras.changed.connect(self.show)
         self.show()

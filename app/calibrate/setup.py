@@ -30,19 +30,16 @@ class SetupStep(StepPresenter):
         self.form.accepted.connect(self._on_stated)
         self._camera = SetupCamera(self.form, context=self.context)
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "setup",
-            tr("Set-up"),
-            (Stage.RESPONSE,),
-            tr(
-                "Enter what you know about the sensor, its housing and its parts. Every length "
-                "here scales the result."
-            ),
-            "complete",
-        )
+    step = Step(
+        "setup",
+        tr("Set-up"),
+        (Stage.RESPONSE,),
+        tr(
+            "Enter what you know about the sensor, its housing and its parts. Every length "
+            "here scales the result."
+        ),
+        "complete",
+    )
 
     @property
     def centre(self) -> QWidget:
@@ -91,16 +88,13 @@ class ClosedSetupStep(SetupStep):
 
     form_type = ClosedForm
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "setup",
-            tr("Set-up"),
-            (),
-            tr("State the scale and the ball diameter. Both scale the result."),
-            "complete",
-        )
+    step = Step(
+        "setup",
+        tr("Set-up"),
+        (),
+        tr("State the scale and the ball diameter. Both scale the result."),
+        "complete",
+    )
 
     def state(self) -> StepState:
         """Return that nothing is missing: a session is created with all values."""

@@ -21,16 +21,10 @@ class StartView(QWidget):
 
     Signals
     -------
-    new_wanted(), open_wanted(), demo_wanted(), closed_wanted()
-        The buttons.
     recent_wanted(str)
         Folder of a recent session.
     """
 
-    new_wanted = Signal()
-    open_wanted = Signal()
-    demo_wanted = Signal()
-    closed_wanted = Signal()
     recent_wanted = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -51,15 +45,17 @@ class StartView(QWidget):
         intro.setFixedWidth(460)
         column.addWidget(title)
         column.addWidget(intro)
-        for name, text, signal in (
-            ("new", tr("&New calibration"), self.new_wanted),
-            ("open", tr("&Open a session folder…"), self.open_wanted),
-            ("demo", tr("&Try the virtual sensor"), self.demo_wanted),
-        ):
-            button = named(QPushButton(text), f"start.{name}", text.replace("&", ""))
+        self.new, self.open, self.demo = (
+            named(QPushButton(text), f"start.{name}", text.replace("&", ""))
+            for name, text in (
+                ("new", tr("&New calibration")),
+                ("open", tr("&Open a session folder…")),
+                ("demo", tr("&Try the virtual sensor")),
+            )
+        )
+        for button in (self.new, self.open, self.demo):
             button.setMinimumHeight(40)
             button.setFixedWidth(460)
-            button.clicked.connect(signal)
             column.addWidget(button)
         self.problem = named(PlainLabel(), "start.problem", tr("Why it was not opened"))
         self.problem.setWordWrap(True)
@@ -75,7 +71,6 @@ class StartView(QWidget):
             tr("Start a new session with the background and the ball presses of this folder"),
         )
         self.closed.setFixedWidth(460)
-        self.closed.clicked.connect(self.closed_wanted)
         self.closed.hide()
         column.addWidget(self.closed)
         self._recent = QVBoxLayout()

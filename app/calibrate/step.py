@@ -68,6 +68,7 @@ class StepPresenter(QObject):
 
     step_wanted = Signal(str)
     lay_wanted = Signal()
+    step: Step
     uses_camera = False
     has_image_tab = True
     opens_slowly = False
@@ -81,10 +82,10 @@ class StepPresenter(QObject):
         self.model, self.context = parts.model, parts.context
         self.area, self.panel = parts.area, parts.panel
 
-    @staticmethod
-    def describe() -> Step:
+    @classmethod
+    def describe(cls) -> Step:
         """Return the data of the step."""
-        raise NotImplementedError
+        return cls.step
 
     # What is shown
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -47,31 +47,7 @@ class StepPanel(QWidget):
     finished : bool
         Whether the step is complete.
 
-    Signals
-    -------
-    lay_wanted()
-        Place the object for this step on the virtual bench.
-    capture_wanted()
-        Capture an image now.
-    import_wanted()
-        Choose image files.
-    next_wanted()
-        Go to the next step.
-    cancel_wanted()
-        Stop the running work.
-    recompute_wanted()
-        Compute the outdated stages.
-    help_wanted()
-        The user wants to read about this step.
     """
-
-    lay_wanted = Signal()
-    capture_wanted = Signal()
-    import_wanted = Signal()
-    next_wanted = Signal()
-    cancel_wanted = Signal()
-    recompute_wanted = Signal()
-    help_wanted = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -95,7 +71,6 @@ class StepPanel(QWidget):
         self.task = named(_wrapped(), "calibrate.task", tr("Task"))
         self.assembly = AssemblyDrawing()
         self.help = help_button("calibrate.help")
-        self.help.clicked.connect(self.help_wanted)
         head = hbox((self.title, 1), self.help)
         self._column.addLayout(head)
         for widget in (self.assembly, self.task):
@@ -114,7 +89,6 @@ class StepPanel(QWidget):
             "C",
         )
         self.capture.setMinimumHeight(38)
-        self.capture.clicked.connect(self.capture_wanted)
         self.automatic = named(
             QCheckBox(tr("&Automatic: capture and continue")),
             "calibrate.automatic",
@@ -126,11 +100,9 @@ class StepPanel(QWidget):
         self.import_files = named(
             QPushButton(tr("&Import…")), "calibrate.import", tr("Import image files")
         )
-        self.import_files.clicked.connect(self.import_wanted)
         buttons = hbox((self.capture, 2), (self.import_files, 1))
         self.capturing = QWidget()
         self.lay = lay_button("calibrate.lay")
-        self.lay.clicked.connect(self.lay_wanted)
         self._extra = QVBoxLayout()
         self.notice = named(
             _wrapped(lines=NOTICE_LINES), "calibrate.notice", tr("Result of the last action")
@@ -158,7 +130,6 @@ class StepPanel(QWidget):
             tr("Recompute"),
             tr("Compute this step again from the stored captures"),
         )
-        self.recompute.clicked.connect(self.recompute_wanted)
         row = hbox(self._sign, (self._word, 1), self.recompute)
         self.sentence = named(_wrapped(), "calibrate.sentence", tr("Message about the step"))
         self.quality = QualityTableWidget(
@@ -181,11 +152,9 @@ class StepPanel(QWidget):
         keep = self.cancel.sizePolicy()
         keep.setRetainSizeWhenHidden(True)
         self.cancel.setSizePolicy(keep)
-        self.cancel.clicked.connect(self.cancel_wanted)
         row = hbox((self.progress, 1), self.cancel)
         self.next = named(QPushButton(tr("&Next step")), "calibrate.next", tr("Next step"))
         self.next.setMinimumHeight(38)
-        self.next.clicked.connect(self.next_wanted)
         foot = vbox(row, self.next, margins=(12, 4, 12, 10), spacing=6)
         self.show_work("", 0.0)
         return foot

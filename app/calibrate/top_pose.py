@@ -61,21 +61,18 @@ def detect_top_pose(
 class TopPoseStep(ImageStep):
     """Finds the board with the lens of the step before."""
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "top_pose",
-            tr("Top surface"),
-            (Stage.TOP_POSE,),
-            tr(
-                "Mount the housing without the elastomer. Lay the small checkerboard flat on the "
-                "top opening, pattern facing down."
-            ),
-            "board",
-            frames=8,
-            wanted=1,
-        )
+    step = Step(
+        "top_pose",
+        tr("Top surface"),
+        (Stage.TOP_POSE,),
+        tr(
+            "Mount the housing without the elastomer. Lay the small checkerboard flat on the "
+            "top opening, pattern facing down."
+        ),
+        "board",
+        frames=8,
+        wanted=1,
+    )
 
     def detector(self, name: str) -> Detector:
         """Return the detection of the board, once the lens is known."""

@@ -72,10 +72,10 @@ class Validating(QObject):
         limits = context.settings.limits
         panel.size_limit.setValue(limits.size_percent)
         panel.height_limit.setValue(limits.height_percent)
-        panel.trial_wanted.connect(self.measure)
-        panel.import_wanted.connect(self.choose_press)
-        panel.keep_wanted.connect(self.keep)
-        panel.use_wanted.connect(self.put_into_use)
+        panel.measure.clicked.connect(self.measure)
+        panel.import_press.clicked.connect(self.choose_press)
+        panel.keep.clicked.connect(self.keep)
+        panel.use.clicked.connect(self.put_into_use)
         context.requests.calibrations_changed.connect(self._show_verdict)
         self._show_calibration()
         self._find_earlier()
@@ -305,24 +305,21 @@ class ValidationStep(StepPresenter):
         super().__init__(parts)
         self.form = ValidationPanel(self.step)
         self.validating = Validating(self.model, self.form, context=self.context)
-        self.form.lay_wanted.connect(self.lay_wanted)
+        self.form.lay.clicked.connect(self.lay_wanted)
         guide = self.context.requests.guide
-        self.form.help_wanted.connect(lambda: guide.emit("guide/validate", "Validate"))
+        self.form.help.clicked.connect(lambda: guide.emit("guide/validate", "Validate"))
         self.validating.tried.connect(self._on_tried)
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "validation",
-            tr("Validation"),
-            (),
-            tr(
-                "Press an indenter of known size into the membrane. The calibration is validated "
-                "only if the measured size is within the limits."
-            ),
-            "indenter",
-        )
+    step = Step(
+        "validation",
+        tr("Validation"),
+        (),
+        tr(
+            "Press an indenter of known size into the membrane. The calibration is validated "
+            "only if the measured size is within the limits."
+        ),
+        "indenter",
+    )
 
     @property
     def side(self) -> QWidget:
@@ -369,19 +366,16 @@ class ClosedValidationStep(ValidationStep):
         self._saving = Saving(self.model, self.view, context=self.context)
         self._shown = self.centre
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "validation",
-            tr("Validation"),
-            (),
-            tr(
-                "Save the calibration. Then press an object of known size into the membrane. The "
-                "calibration is validated only if the measured size is within the limits."
-            ),
-            "indenter",
-        )
+    step = Step(
+        "validation",
+        tr("Validation"),
+        (),
+        tr(
+            "Save the calibration. Then press an object of known size into the membrane. The "
+            "calibration is validated only if the measured size is within the limits."
+        ),
+        "indenter",
+    )
 
     @property
     def centre(self) -> QWidget:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
@@ -25,30 +24,7 @@ from gelpolight_core.translation import tr
 
 
 class ValidationPanel(QWidget):
-    """Asks for the known object, and shows the result of the trial.
-
-    Signals
-    -------
-    lay_wanted()
-        Place the object for this step on the virtual bench.
-    trial_wanted()
-        Capture and measure now.
-    import_wanted()
-        Measure a press from an image file.
-    keep_wanted()
-        Record the trial as the validation of this calibration.
-    use_wanted()
-        Put the validated calibration into use.
-    help_wanted()
-        The user wants to read about this step.
-    """
-
-    lay_wanted = Signal()
-    trial_wanted = Signal()
-    import_wanted = Signal()
-    keep_wanted = Signal()
-    use_wanted = Signal()
-    help_wanted = Signal()
+    """Asks for the known object, and shows the result of the trial."""
 
     def __init__(self, step: Step, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -60,7 +36,6 @@ class ValidationPanel(QWidget):
         title = PlainLabel(step.title)
         make_bold(title, size=1.35)
         self.help = help_button("validation.help")
-        self.help.clicked.connect(self.help_wanted)
         head = hbox((title, 1), self.help)
         assembly = AssemblyDrawing()
         assembly.show_assembly(step.assembly)
@@ -71,21 +46,18 @@ class ValidationPanel(QWidget):
         )
         self.calibration.setWordWrap(True)
         self.lay = lay_button("validation.lay")
-        self.lay.clicked.connect(self.lay_wanted)
         self.measure = named(
             QPushButton(tr("&Measure the press")),
             "validation.measure",
             tr("Measure the pressed object"),
         )
         self.measure.setMinimumHeight(38)
-        self.measure.clicked.connect(self.trial_wanted)
         self.import_press = named(
             QPushButton(tr("&Import…")),
             "validation.import",
             tr("Measure a press from an image file"),
             tr("The true size is read from a truth.csv file in the same folder, if there is one"),
         )
-        self.import_press.clicked.connect(self.import_wanted)
         row = hbox((self.measure, 2), (self.import_press, 1))
         self.blocked = named(PlainLabel(), "validation.blocked", tr("Why nothing can be measured"))
         self.blocked.setWordWrap(True)
@@ -103,7 +75,6 @@ class ValidationPanel(QWidget):
             tr("Record this validation"),
         )
         self.keep.setMinimumHeight(34)
-        self.keep.clicked.connect(self.keep_wanted)
         self.verdict = named(PlainLabel(), "validation.verdict", tr("Validated or not"))
         self.verdict.setWordWrap(True)
         make_bold(self.verdict)
@@ -113,7 +84,6 @@ class ValidationPanel(QWidget):
             tr("Use the validated calibration"),
             tr("Use this calibration on the Inspect and Measure pages"),
         )
-        self.use.clicked.connect(self.use_wanted)
         vbox(
             head,
             assembly,

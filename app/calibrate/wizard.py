@@ -127,14 +127,14 @@ class Wizard(QMainWindow):
         self.step_list.chosen.connect(lambda row: self.go_to(self.presenters[row].step.key))
         self._connect_open_step()
         panel, area, model = self.panel, self.area, self.model
-        panel.next_wanted.connect(self._next)
+        panel.next.clicked.connect(self._next)
         panel.automatic.setChecked(self.context.settings.preferences.captures_automatically)
         panel.automatic.toggled.connect(self._set_automatic)
-        panel.cancel_wanted.connect(model.jobs.cancel)
+        panel.cancel.clicked.connect(model.jobs.cancel)
         guide = self.context.requests.guide
-        panel.help_wanted.connect(lambda: guide.emit("guide/calibrate", self.open.step.title))
-        panel.recompute_wanted.connect(self._recompute)
-        area.reconnect_wanted.connect(self.live.open)
+        panel.help.clicked.connect(lambda: guide.emit("guide/calibrate", self.open.step.title))
+        panel.recompute.clicked.connect(self._recompute)
+        area.reconnect.clicked.connect(self.live.open)
         area.view.clicked.connect(self._on_clicked)
         area.view.dragged.connect(self.bench_dock.drag)
         area.view.refused.connect(self._refuse)
@@ -160,10 +160,10 @@ class Wizard(QMainWindow):
     def _connect_open_step(self) -> None:
         """Pass on to the open step what the user does with the shared widgets."""
         panel, area = self.panel, self.area
-        panel.capture_wanted.connect(lambda: self.open.capture())
-        panel.import_wanted.connect(lambda: self.open.choose_files())
-        panel.lay_wanted.connect(self._lay_on_bench)
-        area.live_wanted.connect(lambda: self.open.live())
+        panel.capture.clicked.connect(lambda: self.open.capture())
+        panel.import_files.clicked.connect(lambda: self.open.choose_files())
+        panel.lay.clicked.connect(self._lay_on_bench)
+        area.back_to_live.clicked.connect(lambda: self.open.live())
         area.strip.chosen.connect(self.show_capture)
         panel.residuals.chosen.connect(self._show_from_table)
         panel.residuals.repeat_wanted.connect(lambda name: self.open.repeat(name))

@@ -22,19 +22,16 @@ class ReflectanceStep(StepPresenter):
     opens_slowly = True
     only_shows = True
 
-    @staticmethod
-    def describe() -> Step:
-        """Return the data of the step."""
-        return Step(
-            "reflectance",
-            tr("Reflectance"),
-            (Stage.REFLECTANCE,),
-            tr(
-                "Check the curves that were fitted to the ball presses. Correct them by hand "
-                "where dirt or shadows have distorted them."
-            ),
-            "ball",
-        )
+    step = Step(
+        "reflectance",
+        tr("Reflectance"),
+        (Stage.REFLECTANCE,),
+        tr(
+            "Check the curves that were fitted to the ball presses. Correct them by hand "
+            "where dirt or shadows have distorted them."
+        ),
+        "ball",
+    )
 
     @cached_property
     def curves(self) -> Curves:
