@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.calibrate.detection import read_raw
-from app.calibrate.maps import Panel, depth_panel
-from app.calibrate.model import WizardModel
+from app.calibrate.maps import depth_panel
 from app.calibrate.result import ResultView, Saving
 from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
@@ -21,7 +19,6 @@ from app.calibrate.step_data import Step
 from app.calibrate.trial import KnownObject, Trial, run_trial
 from app.calibrate.validation_panel import ValidationPanel
 from app.context.calibration_status import put_into_use
-from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
 from app.sources.bench import Scene
 from app.workspace.entries import read_entry
@@ -38,67 +35,89 @@ FRAMES = 4
 TRUTH = "truth.csv"
 
 
-class Validating(QObject):
-    """Measures presses with the saved calibration, and records the result.
+class ValidationStep(StepPresenter):
+    """Measures presses with the saved calibration, and records the result."""
 
-    Parameters
-    ----------
-    model : WizardModel
-        Model of the wizard.
-    panel : ValidationPanel
-        Asks for the object, and shows the result.
-    context : AppContext
-        Context with the library.
+    uses_camera = True
 
-    Signals
-    -------
-    tried(object)
-        A Panel with the height map of a press.
-    """
+    step = Step(
+        "validation",
+        tr("Validation"),
+        (),
+        tr(
+            "Press an indenter of known size into the membrane. The calibration is validated "
+            "only if the measured size is within the limits."
+        ),
+        "indenter",
+    )
 
-    tried = Signal(object)
-
-    def __init__(self, model: WizardModel, panel: ValidationPanel, *, context: AppContext) -> None:
-        super().__init__(panel)
-        self._model, self._panel, self._context = model, panel, context
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts)
+        self.form = form = ValidationPanel(self.step)
         self._path: Path | None = None
         # Separate jobs: a press can be measured while the stages are recomputed.
         self.jobs = Jobs("validating", self)
-        self.jobs.progressed.connect(lambda title, share: panel.show_work(share if title else None))
-        self.jobs.refused.connect(model.refused)
+        self.jobs.progressed.connect(lambda title, share: form.show_work(share if title else None))
+        self.jobs.refused.connect(self.model.refused)
         self._reconstructor: Reconstructor | None = None
         self._trial: tuple[Trial, str] | None = None
         self._asked = object()  # identifies the newest trial; results of older ones are dropped
-        limits = context.settings.limits
-        panel.size_limit.setValue(limits.size_percent)
-        panel.height_limit.setValue(limits.height_percent)
-        panel.measure.clicked.connect(self.measure)
-        panel.import_press.clicked.connect(self.choose_press)
-        panel.keep.clicked.connect(self.keep)
-        panel.use.clicked.connect(self.put_into_use)
-        context.requests.calibrations_changed.connect(self._show_verdict)
+        limits, requests = self.context.settings.limits, self.context.requests
+        form.size_limit.setValue(limits.size_percent)
+        form.height_limit.setValue(limits.height_percent)
+        form.lay.clicked.connect(self.lay_wanted)
+        form.help.clicked.connect(lambda: requests.guide.emit("guide/validate", "Validate"))
+        form.measure.clicked.connect(self.measure)
+        form.import_press.clicked.connect(self.choose_press)
+        form.keep.clicked.connect(self.keep)
+        form.use.clicked.connect(self.put_into_use)
+        requests.calibrations_changed.connect(self._show_verdict)
         self._show_calibration()
         self._find_earlier()
-        model.changed.connect(self._show_calibration)
-        model.saved_as.connect(self.use_calibration)
+        self.model.changed.connect(self._show_calibration)
+        self.model.saved_as.connect(self.use_calibration)
 
     @property
-    def state(self) -> tuple[str, str]:
-        """State of the step, and the message about it."""
+    def side(self) -> QWidget:
+        """The form for the known object."""
+        return self.form
+
+    def focus(self) -> QWidget:
+        """Return the Measure button."""
+        return self.form.measure
+
+    def state(self) -> StepState:
+        """Return whether the saved calibration is validated."""
         found = self._recorded()
         if found is None:
             return "empty", tr("Not validated yet")
-        if not self._model.saved:
+        if not self.model.saved:
             return "stale", tr("The captures or corrections have changed since the validation")
         if found.passed:
             return "pass", tr("Validated")
         return "fail", tr("The last validation failed")
 
+    def show_bench(self, there: bool) -> None:
+        """Offer the virtual bench if there is one."""
+        self.form.lay.setVisible(there)
+        self.form.show_camera(self.model.live.stream is not None)
+
+    def on_bench(self, scene: Scene) -> None:
+        """Fill in the object on the virtual bench."""
+        self.form.show_known(KnownObject(scene.item, scene.size_mm, scene.depth_mm))
+
+    def close(self) -> None:
+        """Stop the measurement."""
+        self.jobs.close()
+
+    def refresh(self) -> None:
+        """Show nothing else: the form follows the model."""
+
     def use_calibration(self, path: str) -> None:
         """Use this saved calibration for the next trials."""
         self._path, self._reconstructor = Path(path), None
         summary = read_entry(self._path).summary
-        self._model.use_saved(self._path.stem, "" if summary is None else summary.inputs)
+        self.model.use_saved(self._path.stem, "" if summary is None else summary.inputs)
         self._show_calibration()
         self._drop_trial()
         self._show_verdict()
@@ -106,16 +125,16 @@ class Validating(QObject):
     def _drop_trial(self) -> None:
         """Drop the shown trial, and one that is still running."""
         self._asked, self._trial = object(), None
-        self._panel.show_trial(None)
+        self.form.show_trial(None)
 
     def _find_earlier(self) -> None:
         """Select the calibration of the present captures, or the newest one of the session."""
-        project = self._model.project
+        project = self.model.project
         session, present = project.session, project.all_inputs
         try:
-            entries = self._context.workspace.entries()
+            entries = self.context.workspace.entries()
         except InputError as error:
-            self._context.toasts.show(str(error), "warn")
+            self.context.toasts.show(str(error), "warn")
             return
         found = [
             (entry.summary.inputs != present, entry.path)
@@ -129,32 +148,24 @@ class Validating(QObject):
 
     def _show_calibration(self) -> None:
         name = "" if self._path is None else self._path.stem
-        self._panel.show_calibration(name, present=bool(self._model.saved))
-
-    def refresh(self) -> None:
-        """Update to the present camera."""
-        self._panel.show_camera(self._model.live.stream is not None)
-
-    def close(self) -> None:
-        """Stop the work and wait for nothing."""
-        self.jobs.close()
+        self.form.show_calibration(name, present=bool(self.model.saved))
 
     def measure(self) -> None:
         """Capture the press, then measure it."""
-        live = self._model.live
+        live = self.model.live
         if live.stream is not None and not live.capturing and self._path is not None:
             self._drop_trial()
-            self._panel.say(tr("Capturing: hold the object still."))
-            self._panel.show_work(0.0)
+            self.form.say(tr("Capturing: hold the object still."))
+            self.form.show_work(0.0)
             live.capture(FRAMES, self._measure, self._refuse)
 
     def choose_press(self) -> None:
         """Let the user choose the image of a press, and measure it."""
-        presses = self._model.project.session.folder / "presses"
-        settings = self._context.settings
+        presses = self.model.project.session.folder / "presses"
+        settings = self.context.settings
         folder = presses if presses.is_dir() else settings.folder("press")
         chosen, _ = QFileDialog.getOpenFileName(
-            self._panel,
+            self.form,
             tr("Import an image of a press"),
             str(folder),
             tr("Images (*.png *.tif *.tiff)"),
@@ -165,7 +176,7 @@ class Validating(QObject):
 
     def import_press(self, path: Path) -> None:
         """Measure a press from an image file, with the true size from its folder, if given."""
-        self._panel.show_work(0.0)
+        self.form.show_work(0.0)
         try:
             frame = read_raw(path)
             known = _known_in_folder(path)
@@ -173,12 +184,12 @@ class Validating(QObject):
             self._refuse(str(error))
             return
         if known is not None:
-            self._panel.show_known(known)
+            self.form.show_known(known)
         self._measure([frame])
 
     def _measure(self, frames: list[NDArray[Any]]) -> None:
         self._drop_trial()
-        panel, asked = self._panel, self._asked
+        panel, asked = self.form, self._asked
         known, path, present = panel.known(), self._path, self._reconstructor
         if path is None:
             return
@@ -208,21 +219,22 @@ class Validating(QObject):
             if self._asked is asked:
                 self._refuse(sentence)
 
-        self._panel.say(tr("Measuring."))
+        self.form.say(tr("Measuring."))
         self.jobs.submit(Job(tr("Measuring the press"), work, done, failed))
 
     def _show(self, reconstructor: Reconstructor, trial: Trial, text: str) -> None:
         self._reconstructor, self._trial = reconstructor, (trial, text)
-        self._panel.show_work(None)
-        self._panel.show_trial(trial)
+        self.form.show_work(None)
+        self.form.show_trial(trial)
         panel = depth_panel(tr("Measured depth"), trial.heightmap, trial.measurement.outline_mm)
-        self.tried.emit(panel)
+        if self.form.isVisibleTo(self.form.parentWidget()):
+            self.area.show_result(panel)
 
     def _refuse(self, sentence: str) -> None:
         self._trial = None
-        self._panel.show_work(None)
-        self._panel.show_trial(None)
-        self._panel.say(sentence, "warn")
+        self.form.show_work(None)
+        self.form.show_trial(None)
+        self.form.say(sentence, "warn")
 
     def keep(self) -> None:
         """Store the trial as the validation of the calibration."""
@@ -239,14 +251,14 @@ class Validating(QObject):
         try:
             write_validation(validation, self._path)
         except InputError as error:
-            self._context.toasts.show(str(error), "fail")
+            self.context.toasts.show(str(error), "fail")
             return
-        self._context.requests.calibrations_changed.emit()
-        self._model.changed.emit()
+        self.context.requests.calibrations_changed.emit()
+        self.model.changed.emit()
 
     def put_into_use(self) -> None:
         """Use the validated calibration on the other pages from now on."""
-        put_into_use(self._path, self._panel, context=self._context)
+        put_into_use(self._path, self.form, context=self.context)
 
     def _recorded(self) -> Validation | None:
         if self._path is None:
@@ -256,25 +268,25 @@ class Validating(QObject):
             if found is not None and found.identity != read_summary(self._path).identity:
                 return None  # it belongs to another calibration
         except InputError as error:
-            self._context.toasts.show(str(error), "warn")
+            self.context.toasts.show(str(error), "warn")
             return None
         return found
 
     def _show_verdict(self) -> None:
         found = self._recorded()
         if found is None:
-            self._panel.show_verdict(tr("Not validated."), passed=False)
+            self.form.show_verdict(tr("Not validated."), passed=False)
         elif found.passed:
-            used = self._context.workspace.in_use == self._path
+            used = self.context.workspace.in_use == self._path
             text = tr("Validated and in use: the Inspect and Measure pages measure with it.")
             if not used:
                 text = tr(
                     "This calibration is validated, but not in use. The Inspect and Measure pages "
                     "do not measure with it."
                 )
-            self._panel.show_verdict(text, passed=True, may_use=not used)
+            self.form.show_verdict(text, passed=True, may_use=not used)
         else:
-            self._panel.show_verdict(
+            self.form.show_verdict(
                 tr("Not validated: the errors of the recorded trial are beyond the limits."),
                 passed=False,
             )
@@ -294,65 +306,6 @@ def _known_in_folder(path: Path) -> KnownObject | None:
         if row.file == path.name:
             return KnownObject(row.truth.shape, row.truth.size_mm, row.truth.height_mm)
     return None
-
-
-class ValidationStep(StepPresenter):
-    """Shows the live image and the measured press."""
-
-    uses_camera = True
-
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
-        self.form = ValidationPanel(self.step)
-        self.validating = Validating(self.model, self.form, context=self.context)
-        self.form.lay.clicked.connect(self.lay_wanted)
-        guide = self.context.requests.guide
-        self.form.help.clicked.connect(lambda: guide.emit("guide/validate", "Validate"))
-        self.validating.tried.connect(self._on_tried)
-
-    step = Step(
-        "validation",
-        tr("Validation"),
-        (),
-        tr(
-            "Press an indenter of known size into the membrane. The calibration is validated "
-            "only if the measured size is within the limits."
-        ),
-        "indenter",
-    )
-
-    @property
-    def side(self) -> QWidget:
-        """The form for the known object."""
-        return self.form
-
-    def focus(self) -> QWidget:
-        """Return the Measure button."""
-        return self.form.measure
-
-    def state(self) -> StepState:
-        """Return whether the saved calibration is validated."""
-        return self.validating.state
-
-    def show_bench(self, there: bool) -> None:
-        """Offer the virtual bench if there is one."""
-        self.form.lay.setVisible(there)
-        self.validating.refresh()
-
-    def on_bench(self, scene: Scene) -> None:
-        """Fill in the object on the virtual bench."""
-        self.form.show_known(KnownObject(scene.item, scene.size_mm, scene.depth_mm))
-
-    def close(self) -> None:
-        """Stop the measurement."""
-        self.validating.close()
-
-    def refresh(self) -> None:
-        """Show nothing else: the form follows the model."""
-
-    def _on_tried(self, panel: Panel) -> None:
-        if self.form.isVisibleTo(self.form.parentWidget()):
-            self.area.show_result(panel)
 
 
 class ClosedValidationStep(ValidationStep):

@@ -50,7 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model", choices=MODELS, help=tr("model for the calibration of a session (default: full)")
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

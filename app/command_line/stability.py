@@ -31,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             names=", ".join(dict.fromkeys(case.subject for case in all_cases()))
         ),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

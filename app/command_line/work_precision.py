@@ -42,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help=tr("seed of the virtual sensor")
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

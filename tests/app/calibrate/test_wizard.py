@@ -381,7 +381,7 @@ def test_a_press_image_is_validated_with_its_truth_file(
     technician.click("calibrate.next")
     step = technician.wizard.at("validation")
     assert not step.form.measure.isEnabled()  # there is no camera
-    step.validating.import_press(small_session / "presses" / "cylinder_s5_d100.png")
+    step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
     technician.until(lambda: "Diameter" in step.form.result.text())
     known = step.form.known()
     assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
@@ -422,7 +422,7 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
         wizard.go_to("result")
         assert "You can validate it now" in wizard.at("result").view.headline.text()
         wizard.go_to("validation")
-        step.validating.import_press(small_session / "presses" / "cylinder_s5_d100.png")
+        step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
         technician.until(lambda: "Diameter" in step.form.result.text())
         assert wizard.model.jobs.busy
         wizard.model.exclude(Stage.BALLS, "ball_01.png", True)

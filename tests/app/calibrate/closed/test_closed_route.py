@@ -75,7 +75,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     step = wizard.at("validation")
     assert wizard.centre.currentWidget() is wizard.area
     step.form.show_known(KnownObject("ball", 2.0 * opened.ball_radius_mm(files[-1].name), None))
-    step.validating.import_press(files[-1])
+    step.import_press(files[-1])
     technician.until(step.form.keep.isEnabled)
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"

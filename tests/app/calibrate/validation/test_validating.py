@@ -54,7 +54,7 @@ def test_a_trial_of_an_earlier_calibration_is_dropped(
 ) -> None:  # fmt: skip
     path = save(technician, computed_project(), tmp_path / "workspace")
     step, panel = (
-        technician.wizard.at("validation").validating,
+        technician.wizard.at("validation"),
         technician.wizard.at("validation").form,
     )
     held = Held(validating.read_calibration)
@@ -75,7 +75,7 @@ def test_a_doubtful_trial_cannot_be_recorded(
     """A width within the limits says little where the program does not trust the measurement."""
     save(technician, computed_project(), tmp_path / "workspace")
     step, panel = (
-        technician.wizard.at("validation").validating,
+        technician.wizard.at("validation"),
         technician.wizard.at("validation").form,
     )
     step.import_press(small_session / PRESS)
