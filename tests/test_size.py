@@ -27,9 +27,9 @@ NO_CODE = {
 MOST = {
     "app/.": 171,
     "app/bench": 252,
-    "app/calibrate": 6573,
+    "app/calibrate": 6479,
     "app/cameras": 630,
-    "app/command_line": 2049,
+    "app/command_line": 2045,
     "app/context": 414,
     "app/inspect": 1943,
     "app/live": 2468,
