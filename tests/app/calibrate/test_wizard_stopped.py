@@ -31,7 +31,7 @@ def test_the_curves_appear_after_earlier_work_was_stopped(
     wizard.go_to("reflectance")
     curves = wizard.at("reflectance").curves
     assert "Collecting" in curves._message.text()
-    wizard.panel.cancel_wanted.emit()
+    wizard.panel.cancel.clicked.emit()
     hold.set()
     technician.until(lambda: curves.editor is not None)
     technician.rest()
