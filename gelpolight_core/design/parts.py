@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SHAPES = ("cylinder", "cuboid", "coin", "nut")
-RESPONSES = ("linear", "srgb", "gamma")
-
 
 def _within(default: Any, low: float, high: float) -> Any:
     """Return a dataclass field whose numbers must lie in [low, high]."""
     return field(default=default, metadata={"low": low, "high": high})
+
+
+def _one_of(*choices: Any) -> Any:
+    """Return a dataclass field that has one of these values; the first is the default."""
+    return field(default=choices[0], metadata={"choices": choices})
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +63,8 @@ class CameraDesign:
     blur_sigma_px: float = _within(0.5, 0.0, 20.0)
     shot_variance: float = _within(4e-5, 0.0, 0.1)
     read_sd: float = _within(0.0015, 0.0, 0.5)
-    bit_depth: int = _within(8, 8, 16)
-    response: str = "linear"
+    bit_depth: int = _one_of(8, 16)
+    response: str = _one_of("linear", "srgb", "gamma")
     gamma: float = _within(2.2, 0.2, 5.0)
 
 
@@ -263,7 +265,7 @@ class Press:
         Rounding of the edge of a cylinder or cuboid.
     """
 
-    shape: str = "cylinder"
+    shape: str = _one_of("cylinder", "cuboid", "coin", "nut")
     size_mm: float = _within(5.0, 0.05, 200.0)
     depth_mm: float = _within(1.0, 0.0, 50.0)
     x_mm: float = _within(0.0, -500.0, 500.0)

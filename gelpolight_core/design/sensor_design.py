@@ -7,15 +7,13 @@ guessed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gelpolight_core.design.parts import (
-    RESPONSES,
-    SHAPES,
     BallPress,
     CameraDesign,
     LayerDesign,
@@ -163,25 +161,6 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
             where=f"{where} [camera]",
             advice=tr("Use at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
         )
-    if design.camera.bit_depth not in (8, 16):
-        raise InputError(
-            tr("bit_depth is {n}").format(n=design.camera.bit_depth),
-            where=f"{where} [camera]",
-            advice=tr("Use 8 or 16"),
-        )
-    if design.camera.response not in RESPONSES:
-        raise InputError(
-            tr("The response {name} does not exist").format(name=brief(design.camera.response)),
-            where=f"{where} [camera]",
-            advice=tr("Use one of {names}").format(names=", ".join(RESPONSES)),
-        )
-    for press in design.presses:
-        if press.shape not in SHAPES:
-            raise InputError(
-                tr("The shape {shape} does not exist").format(shape=brief(press.shape)),
-                where=f"{where} [[presses]]",
-                advice=tr("Use one of {shapes}").format(shapes=", ".join(SHAPES)),
-            )
     return design
 
 
@@ -199,22 +178,19 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
                     where=where,
                     advice=tr("Use a number from {low} to {high}").format(low=low, high=high),
                 )
+        elif "choices" in item.metadata:
+            choices = item.metadata["choices"]
+            if value not in choices:
+                raise InputError(
+                    tr("{name} is {value}").format(name=name, value=brief(value)),
+                    where=where,
+                    advice=tr("Use one of {names}").format(names=", ".join(map(str, choices))),
+                )
         elif hasattr(value, "__dataclass_fields__"):
             _check_ranges(value, where=where, prefix=f"{name}.")
         elif isinstance(value, tuple):
             for number, entry in enumerate(value):
                 _check_ranges(entry, where=where, prefix=f"{name}[{number}].")
-
-
-_PARTS = {
-    "camera": CameraDesign,
-    "layers": LayerDesign,
-    "ring": LedRing,
-    "membrane": MembraneDesign,
-    "photometry": PhotometryDesign,
-    "session": SessionDesign,
-}
-_LISTS = {"leds": LedDesign, "balls": BallPress, "presses": Press}
 
 
 def read_design(path: Path) -> SensorDesign:
@@ -241,59 +217,41 @@ def read_design(path: Path) -> SensorDesign:
         of range.
     """
     path = Path(path)
-    table = read_toml(path)
-    return design_from_table(table, where=str(path))
+    design: SensorDesign = _read(SensorDesign(), read_toml(path), where=str(path), part="")
+    return validate_design(design, where=str(path))
 
 
-def design_from_table(table: dict[str, Any], *, where: str) -> SensorDesign:
-    """Build a checked design from nested plain values (see :func:`read_design`).
-
-    Parameters
-    ----------
-    table : dict
-        Content of a design file.
-    where : str
-        Name used in error messages.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown, a value has the wrong type, or the parts of the design do not fit
-        together.
-    """
-    _refuse_unknown(table, {"serial", *_PARTS, *_LISTS}, where=where)
-    values: dict[str, Any] = {}
-    if "serial" in table:
-        values["serial"] = _converted(table["serial"], "", where=f"{where} serial")
-    for name, kind in _PARTS.items():
-        if name in table:
-            values[name] = _part(kind, table[name], where=f"{where} [{name}]")
-    for name, kind in _LISTS.items():
-        if name in table:
-            entry_name = f"{where} [[{name}]]"
-            if not isinstance(table[name], list):
-                raise InputError(
-                    tr("The value is not a list of tables"),
-                    where=entry_name,
-                    advice=tr("Use double brackets"),
-                )
-            values[name] = tuple(_part(kind, entry, where=entry_name) for entry in table[name])
-    return validate_design(SensorDesign(**values), where=where)
-
-
-def _part(kind: type[Any], table: Any, *, where: str) -> Any:
+def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
+    """Return a part of a design with the values of a table instead of its defaults."""
+    where = f"{where} [{part}]" if part else where
     if not isinstance(table, dict):
         raise InputError(
             tr("The value is not a table"), where=where, advice=tr("Write keys and values")
         )
-    defaults = kind()
-    _refuse_unknown(table, {item.name for item in fields(kind)}, where=where)
-    return kind(
-        **{
-            name: _converted(value, getattr(defaults, name), where=f"{where} {name}")
-            for name, value in table.items()
-        }
-    )
+    known = {item.name for item in fields(default)}
+    if unknown := sorted(set(table) - known):
+        raise InputError(
+            tr("Unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
+            where=where,
+            advice=tr("Use only {known}").format(known=", ".join(sorted(known))),
+        )
+    values = {}
+    for name, value in table.items():
+        like = getattr(default, name)
+        if is_dataclass(like):
+            values[name] = _read(like, value, where=where, part=name)
+        elif isinstance(like, tuple) and is_dataclass(like[0]):
+            if not isinstance(value, list):
+                raise InputError(
+                    tr("The value is not a list of tables"),
+                    where=f"{where} [[{name}]]",
+                    advice=tr("Use double brackets"),
+                )
+            kind: Any = type(like[0])
+            values[name] = tuple(_read(kind(), v, where=where, part=f"[{name}]") for v in value)
+        else:
+            values[name] = _converted(value, like, where=f"{where} {name}")
+    return replace(default, **values)
 
 
 def _is_plain(text: str) -> bool:
@@ -301,16 +259,6 @@ def _is_plain(text: str) -> bool:
         return bool(plain_text(text, NAME_LIMIT))
     except ValueError:
         return False
-
-
-def _refuse_unknown(table: dict[str, Any], known: set[str], *, where: str) -> None:
-    unknown = sorted(set(table) - known)
-    if unknown:
-        raise InputError(
-            tr("Unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
-            where=where,
-            advice=tr("Use only {known}").format(known=", ".join(sorted(known))),
-        )
 
 
 def _converted(value: Any, like: Any, *, where: str) -> Any:
