@@ -23,7 +23,7 @@ from app.widgets.naming import named
 from app.workspace.indenters import FILE as INDENTERS
 from app.workspace.indenters import Indenter, read_indenters, write_indenters
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.session.known_files import KnownFiles
+from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.translation import tr
 
 

@@ -33,7 +33,7 @@ from gelpolight_core.session.decisions import (
 )
 from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
 from gelpolight_core.session.description import write_description
-from gelpolight_core.session.known_files import KnownFiles
+from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.session.session import ONE_IMAGE_STAGES, Session
 
 Described = TypeVar("Described", bound=Session | ClosedSession)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.npy import read_arrays
-from gelpolight_core.io.reading import brief
+from gelpolight_core.io.reading import refusing
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
@@ -115,8 +115,15 @@ def read_npz(path: Path) -> HeightMap:
     InputError
         If it cannot be read, or is not a height map.
     """
-    try:
-        stored = read_arrays(path, NPZ_NAMES)
+    advice = tr("Choose an .npz file exported by this program")
+    found = tr("The file is not a height map in npz format, or is damaged ({error})")
+    with refusing(found, path, advice=advice):
+        try:
+            stored = read_arrays(path, NPZ_NAMES)
+        except FileNotFoundError as error:
+            raise InputError(
+                tr("The file does not exist"), where=str(path), advice=advice
+            ) from error
         texts = {name: stored[name].tolist() for name in NPZ_TEXTS if name in stored}
         # Files of one earlier state of the program have the faults under another name.
         faults = [*texts.pop("faults", ()), *texts.pop("doubts", ())]
@@ -135,15 +142,6 @@ def read_npz(path: Path) -> HeightMap:
             **texts,
         )
         _refuse_contradictions(heightmap)
-    except FileNotFoundError as error:
-        raise _no_heightmap(path, tr("The file does not exist")) from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise _no_heightmap(
-            path,
-            tr("The file is not a height map in npz format, or is damaged ({error})").format(
-                error=brief(str(error), 200)
-            ),
-        ) from error
     return heightmap
 
 
@@ -163,12 +161,6 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
         values = getattr(heightmap, name)
         if values is not None and np.any(np.asarray(values) < 0.0):
             raise ValueError(f"{name} is negative")
-
-
-def _no_heightmap(path: Path, found: str) -> InputError:
-    return InputError(
-        found, where=str(path), advice=tr("Choose an .npz file exported by this program")
-    )
 
 
 def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:

@@ -1,4 +1,4 @@
-"""Hashes of captured files, and the check that no image occurs twice in a session."""
+"""Hashes of files: images that occur twice, and files that another program has changed."""
 
 from __future__ import annotations
 
@@ -64,3 +64,54 @@ class CachedHashes:
         if known is None or known[0] != mark:
             known = self._known[path] = mark, file_hash(path)
         return known[1]
+
+
+class KnownFiles:
+    """The content of small files when they were last read or written here.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The files; they need not exist.
+    """
+
+    def __init__(self, paths: Iterable[Path]) -> None:
+        self._known = {path: _hash_or_none(path) for path in paths}
+
+    def changed(self) -> tuple[Path, ...]:
+        """Return the files that have changed or are gone."""
+        return tuple(path for path, known in self._known.items() if _hash_or_none(path) != known)
+
+    def take(self, path: Path) -> None:
+        """Record the present content of a file as known."""
+        self._known[path] = _hash_or_none(path)
+
+    def refuse_changed(self, path: Path, *, advice: str = "") -> None:
+        """Refuse to overwrite a file that another program has changed.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        advice : str, optional
+            Advice for a file that does not belong to a session.
+
+        Raises
+        ------
+        InputError
+            If the file was changed or removed.
+        """
+        if path in self.changed():
+            raise InputError(
+                tr("Another program has changed the file since it was read; nothing was written"),
+                where=str(path),
+                advice=advice or tr("Reload the session and repeat your correction"),
+            )
+
+
+def _hash_or_none(path: Path) -> str | None:
+    """Return the hash of a file; None if there is no readable file."""
+    try:
+        return file_hash(path)
+    except InputError:
+        return None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.known_files import KnownFiles
+from gelpolight_core.session.file_hashes import KnownFiles
 
 
 @pytest.fixture

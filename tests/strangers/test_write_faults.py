@@ -26,7 +26,7 @@ from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.decisions import Decisions, write_decisions
-from gelpolight_core.session.known_files import KnownFiles
+from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.simulation.session import session_toml
 
 ROOT = Path(__file__).resolve().parents[2]
