@@ -38,8 +38,10 @@ from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.sensor_calibration import FullModel
 
 Array = NDArray[np.float64]
+Map = NDArray[np.float32]
 INTERREFLECTION = 12
 SIGNIFICANT = 3.0
 """Interreflection counts as present above this many standard deviations."""
@@ -55,30 +57,14 @@ class JointResult:
 
     Attributes
     ----------
-    led_positions_mm, led_sd_mm : (3, 3)
-        Sensor frame.
-    membrane : Membrane
-        With its reflectance for light from other parts of it.
-    membrane_sd : dict
-        Standard deviations of its parameters.
-    decay_mm : float
-        Decay length of the drape.
+    full : FullModel
+        LEDs, membrane and drape, without the uncertainty of lengths.
     balls : tuple of BallPose
         Refined.
-    misfit : float
-        Robust relative misfit over all pixels.
     ball_misfits : (balls,)
-        The same for each press; NaN if it has no usable pixels.
+        Robust relative misfit of each press; NaN if it has no usable pixels.
     ball_names : tuple of str
         Names of these presses.
-    held_out : tuple of 2 floats
-        Mean robust loss on held-out presses: with the LEDs from the mirror, and with refined ones.
-    kept : str
-        ``refined`` or ``mirror``: the LEDs that were better on held-out presses.
-    membrane_held_out : tuple of 2 floats
-        The same loss with the two-lobe membrane, and with the one-dimensional one.
-    membrane_kept : str
-        ``two-lobe`` or ``one-dimensional``: the form of `membrane`.
     covariance : (14, 14) or (26, 26)
         Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light and decay
         length and, if the membrane is one-dimensional, of the heights of its curves; from
@@ -87,19 +73,10 @@ class JointResult:
         All ball radii times this fit the images best. None if it was not looked for.
     """
 
-    led_positions_mm: Array
-    led_sd_mm: Array
-    membrane: Membrane
-    membrane_sd: dict[str, float]
-    decay_mm: float
+    full: FullModel
     balls: tuple[BallPose, ...]
-    misfit: float
     ball_misfits: Array
     ball_names: tuple[str, ...]
-    held_out: tuple[float, float]
-    kept: str
-    membrane_held_out: tuple[float, float]
-    membrane_kept: str
     covariance: Array
     radius_factor: float | None = None
 
@@ -109,6 +86,7 @@ def refine_jointly(
     pixels: Sequence[BallPixels],
     led_positions_mm: Array,
     slab: Slab,
+    background: Map,
     *,
     board: BesideBoard | None = None,
     check_radii: bool = False,
@@ -126,6 +104,8 @@ def refine_jointly(
         From the mirror spots.
     slab : Slab
         What is below the membrane.
+    background : (rows, columns, 3) float32
+        The contact-free membrane, which the full model holds.
     board : BesideBoard, optional
         The untouched membrane and the white board, which give the reflectance.
     check_radii : bool, optional
@@ -155,20 +135,24 @@ def refine_jointly(
         )
     x, sd = solved.x, solved.sd
     end = COMMON + 3 * len(pixels)
+    full = FullModel(
+        led_positions_mm=x[:9].reshape(3, 3),
+        led_sd_mm=sd[:9].reshape(3, 3),
+        membrane=_membrane_of(x, end),
+        background=background,
+        decay_mm=float(x[DECAY]),
+        misfit=solved.misfit,
+        held_out=held_out,
+        kept="refined" if refine else "mirror",
+        membrane_sd=dict(zip(_NAMES, sd[9:COMMON].tolist(), strict=True)),
+        membrane_held_out=membranes,
+        membrane_kept=MEMBRANES[int(curves)],
+    )
     return JointResult(
-        x[:9].reshape(3, 3),
-        sd[:9].reshape(3, 3),
-        _membrane_of(x, end),
-        dict(zip(_NAMES, sd[9:COMMON].tolist(), strict=True)),
-        float(x[DECAY]),
+        full,
         _balls_of(x, pixels),
-        solved.misfit,
         solved.ball_misfits,
         tuple(press.name for press in presses),
-        held_out,
-        "refined" if refine else "mirror",
-        membranes,
-        MEMBRANES[int(curves)],
         shared_covariance(solved.problem, x),
         _radius_factor(solved) if check_radii and len(presses) >= LEAST_PRESSES else None,
     )

@@ -72,21 +72,13 @@ def refine(session: Session, results: StageResults) -> StageResults:
     board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds)
     contacts_px = [press.indentation.contact_radius_px for press in results.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
-    joint = refine_jointly(results.presses, pixels, leds, slab, board=board, check_radii=large)
-    mirror_sd_mm = np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2))
-    full = FullModel(
-        joint.led_positions_mm,
-        joint.led_sd_mm if joint.kept == "refined" else mirror_sd_mm,
-        joint.membrane,
-        background,
-        joint.decay_mm,
-        joint.misfit,
-        joint.held_out,
-        joint.kept,
-        joint.membrane_sd,
-        joint.membrane_held_out,
-        joint.membrane_kept,
+    joint = refine_jointly(
+        results.presses, pixels, leds, slab, background, board=board, check_radii=large
     )
+    full = joint.full
+    if full.kept == "mirror":
+        variance = np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)
+        full = replace(full, led_sd_mm=np.sqrt(variance))
     lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
     full = replace(full, background=lit)
     refined = replace(results, factors=replace(factors, factors=known), joint=joint, full=full)
@@ -101,7 +93,7 @@ def _scale_sd(
     calibration = bare_calibration(session, replace(results, full=full))
     lens, pose = need(results.lens, "balls"), need(results.top_pose, "balls")
     covariance = joint.covariance.copy()
-    if joint.kept == "mirror":
+    if full.kept == "mirror":
         for k, own in enumerate(calibration.led_covariance_mm2):
             covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
     files = [ball.file for ball in results.balls if ball.press is not None]

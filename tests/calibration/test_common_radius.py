@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_joint import BALLS, MIRROR, SLAB, found_press, pixels_of, truth
+from test_joint import BALLS, MIRROR, NO_MAP, SLAB, found_press, pixels_of, truth
 
 from gelpolight_core.calibration.joint import refine_jointly
 from gelpolight_core.calibration.pipeline import judge_radii
@@ -25,7 +25,7 @@ def test_radii_that_are_all_stated_wrong_fail_a_calibration(
         replace(p, pose=replace(p.pose, radius_mm=stated * p.pose.radius_mm)) for p in presses
     ]
     pixels = [replace(p, radius_mm=stated * p.radius_mm) for p in pixels]
-    joint = refine_jointly(presses, pixels, MIRROR, SLAB, check_radii=True)
+    joint = refine_jointly(presses, pixels, MIRROR, SLAB, NO_MAP, check_radii=True)
     assert joint.radius_factor == pytest.approx(1.0 / stated, abs=0.02)
     (figure,) = judge_radii(joint)
     assert figure.key == "common_radius_percent"

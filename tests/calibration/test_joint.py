@@ -41,6 +41,7 @@ PIXELS = 120  # on the cap, and as many on the drape
 TOGETHER = 16
 # An index of 1 has no lower face that returns light.
 SLAB = Slab(14.0, 1.0)
+NO_MAP = np.zeros((1, 1, 3), np.float32)
 SIDE_MM, NODES = 0.2, 96
 AXIS = SIDE_MM * (np.arange(NODES) - 0.5 * (NODES - 1))
 FIELD = np.stack(np.meshgrid(AXIS, AXIS), axis=-1).reshape(-1, 2)
@@ -198,7 +199,7 @@ def refined(
     random = np.random.default_rng(seed)
     presses = [found_press(pose, random) for pose in BALLS[:count]]
     pixels = [pixels_of(pose, truth, noise, random) for pose in BALLS[:count]]
-    return refine_jointly(presses, pixels, MIRROR, SLAB)
+    return refine_jointly(presses, pixels, MIRROR, SLAB, NO_MAP)
 
 
 @pytest.fixture(scope="module")
@@ -214,8 +215,8 @@ def test_leds_that_are_not_at_the_housings_height_are_found(
     glossy: tuple[Truth, JointResult],
 ) -> None:
     known, result = glossy
-    assert result.kept == "refined"
-    left = np.linalg.norm(result.led_positions_mm - known.leds, axis=1)
+    assert result.full.kept == "refined"
+    left = np.linalg.norm(result.full.led_positions_mm - known.leds, axis=1)
     before = np.linalg.norm(MIRROR - known.leds, axis=1)
     # 0.1 mm of LED position costs 0.4 % of depth.
     assert (left < 0.1).all()
@@ -224,11 +225,11 @@ def test_leds_that_are_not_at_the_housings_height_are_found(
 
 def test_gloss_and_decay_length_are_found(glossy: tuple[Truth, JointResult]) -> None:
     known, result = glossy
-    assert result.membrane.gloss == pytest.approx(known.gloss, abs=0.06)
-    assert result.membrane.exponent == pytest.approx(known.exponent, abs=0.03)
-    assert result.membrane.roughness == pytest.approx(known.roughness, abs=0.08)
-    assert result.decay_mm == pytest.approx(known.decay_mm, abs=0.01)
-    assert result.membrane.interreflection < 0.1
+    assert result.full.membrane.gloss == pytest.approx(known.gloss, abs=0.06)
+    assert result.full.membrane.exponent == pytest.approx(known.exponent, abs=0.03)
+    assert result.full.membrane.roughness == pytest.approx(known.roughness, abs=0.08)
+    assert result.full.decay_mm == pytest.approx(known.decay_mm, abs=0.01)
+    assert result.full.membrane.interreflection < 0.1
 
 
 def test_the_balls_are_refined_to_their_positions(glossy: tuple[Truth, JointResult]) -> None:
@@ -242,18 +243,18 @@ def test_the_balls_are_refined_to_their_positions(glossy: tuple[Truth, JointResu
 def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share() -> None:
     known = truth(interreflection=0.3, decay_mm=0.8)
     result = refined(known, seed=1)
-    assert result.membrane.gloss < 0.08
-    assert result.membrane.interreflection == pytest.approx(0.3, abs=0.1)
-    assert result.decay_mm == pytest.approx(0.8, abs=0.02)
-    assert result.membrane.exponent == pytest.approx(1.0, abs=0.03)
+    assert result.full.membrane.gloss < 0.08
+    assert result.full.membrane.interreflection == pytest.approx(0.3, abs=0.1)
+    assert result.full.decay_mm == pytest.approx(0.8, abs=0.02)
+    assert result.full.membrane.exponent == pytest.approx(1.0, abs=0.03)
 
 
 def test_a_glossy_membrane_keeps_its_two_lobes(glossy: tuple[Truth, JointResult]) -> None:
     """No single curve of the light's cosine explains brightness that depends on the view."""
     _, result = glossy
-    assert result.membrane_kept == "two-lobe"
-    assert not result.membrane.diffuse
-    two_lobe, one_dimensional = result.membrane_held_out
+    assert result.full.membrane_kept == "two-lobe"
+    assert not result.full.membrane.diffuse
+    two_lobe, one_dimensional = result.full.membrane_held_out
     assert one_dimensional > 1.2 * two_lobe
 
 
@@ -268,22 +269,22 @@ def test_a_matt_membrane_that_is_not_lamberts_is_a_curve(
     grazed: tuple[Truth, JointResult],
 ) -> None:
     known, result = grazed
-    assert result.membrane_kept == "one-dimensional"
-    two_lobe, one_dimensional = result.membrane_held_out
+    assert result.full.membrane_kept == "one-dimensional"
+    two_lobe, one_dimensional = result.full.membrane_held_out
     assert one_dimensional < 0.9 * two_lobe
-    assert result.membrane.gloss == 0.0
+    assert result.full.membrane.gloss == 0.0
     # Over the cosines covered by the balls, except for its height, which is not observable.
     cosine = np.linspace(0.4, 0.95, 30)
     expected = cosine * (1.0 + known.grazing * (1.0 - cosine))
-    share = result.membrane.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
+    share = result.full.membrane.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
     ratio = share / expected[:, None]
     assert (np.ptp(ratio, axis=0) / ratio.mean(axis=0) < 0.04).all()
 
 
 def test_the_misfit_is_the_noise_of_the_pixels(glossy: tuple[Truth, JointResult]) -> None:
     _, result = glossy
-    assert result.misfit == pytest.approx(0.003, rel=0.2)
-    assert result.held_out[1] <= result.held_out[0]
+    assert result.full.misfit == pytest.approx(0.003, rel=0.2)
+    assert result.full.held_out[1] <= result.full.held_out[0]
 
 
 def test_the_stated_deviations_are_those_that_repeats_show() -> None:
@@ -292,17 +293,17 @@ def test_the_stated_deviations_are_those_that_repeats_show() -> None:
     known = truth(gloss=0.2)
     for seed in range(12, 20):
         result = refined(known, seed=seed, count=5)
-        if result.kept == "mirror":
+        if result.full.kept == "mirror":
             continue  # no uncertainty is stated for LEDs that were not refined
         errors.append(
             [
-                *(result.led_positions_mm - known.leds).ravel(),
-                result.decay_mm - known.decay_mm,
-                result.membrane.gloss - known.gloss,
+                *(result.full.led_positions_mm - known.leds).ravel(),
+                result.full.decay_mm - known.decay_mm,
+                result.full.membrane.gloss - known.gloss,
             ]
         )
-        sd = result.membrane_sd
-        stated.append([*result.led_sd_mm.ravel(), sd["decay_mm"], sd["gloss"]])
+        sd = result.full.membrane_sd
+        stated.append([*result.full.led_sd_mm.ravel(), sd["decay_mm"], sd["gloss"]])
         if len(errors) == 2:
             break
     assert len(errors) == 2
@@ -323,14 +324,14 @@ def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors(seed
         # Every press was made with its own LEDs: no common solution exists.
         own = replace(known, leds=MIRROR + random.normal(scale=0.6, size=(3, 3)))
         pixels.append(pixels_of(pose, own, 0.03, random))
-    result = refine_jointly(presses, pixels, MIRROR, SLAB)
-    before, after = result.held_out
-    if result.kept == "mirror":
+    result = refine_jointly(presses, pixels, MIRROR, SLAB, NO_MAP)
+    before, after = result.full.held_out
+    if result.full.kept == "mirror":
         assert after > before
-        np.testing.assert_array_equal(result.led_positions_mm, MIRROR, SLAB)
-        assert not result.led_sd_mm.any()
+        np.testing.assert_array_equal(result.full.led_positions_mm, MIRROR, SLAB)
+        assert not result.full.led_sd_mm.any()
     else:
-        assert result.kept == "refined"
+        assert result.full.kept == "refined"
         assert after <= before
 
 
@@ -341,9 +342,9 @@ def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
     pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:6]]
     dirt = random.uniform(0.3, 1.5, pixels[2].ratio[:60].shape)
     pixels[2].ratio[:60] = dirt
-    result = refine_jointly(presses, pixels, MIRROR, SLAB)
-    assert result.decay_mm == pytest.approx(0.6, abs=0.02)
-    assert result.membrane.gloss < 0.1
+    result = refine_jointly(presses, pixels, MIRROR, SLAB, NO_MAP)
+    assert result.full.decay_mm == pytest.approx(0.6, abs=0.02)
+    assert result.full.membrane.gloss < 0.1
     assert result.ball_misfits.argmax() == 2
     for index in (0, 1, 3, 4, 5):
         assert np.hypot(*np.subtract(result.balls[index].centre_mm, BALLS[index].centre_mm)) < 0.03
@@ -358,6 +359,6 @@ def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> Non
     presses[odd] = replace(presses[odd], pose=replace(presses[odd].pose, radius_mm=wrong))
     pixels[odd] = replace(pixels[odd], radius_mm=wrong)
     named = [replace(press, name=f"ball_{k}.png") for k, press in enumerate(presses)]
-    figure = judge_presses(refine_jointly(named, pixels, MIRROR, SLAB))[0]
+    figure = judge_presses(refine_jointly(named, pixels, MIRROR, SLAB, NO_MAP))[0]
     assert figure.verdict is Verdict.FAIL
     assert named[odd].name in figure.advice
