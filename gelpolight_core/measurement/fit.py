@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,10 @@ HUBER = 2.5
 MODEL_ERROR = 0.001
 """Error of the closed forms of the drape (near corners), as a share of the height. A finer scale of
 the residual would only exclude the edges, which determine the size."""
-BLUR_SD_MM = 0.1
-"""Root of the sd of the squared blur: camera, denoising and coarse nodes blur a map by 0.02 to
-0.12 mm. If a fit is allowed less blur than there is, it finds a rounder edge instead: with 0.2 mm
-instead of 0.1 mm, a press of 0.5 mm is measured 0.1 mm too wide."""
+EDGES_MM = (0.0, 0.1, 0.2, 0.35, 0.6, 1.0)
+"""Fillets that are compared with the fitted one; larger ones are not fitted."""
+HELD_MM, THINNED = 1e-4, 8
+"""For the comparison, one of so many points is enough."""
 CORNER_SD = 0.05
 """Strength of a corner's rounding, either sign: a sharp corner holds the membrane further out."""
 CORNER_MM = 0.6
@@ -41,6 +41,8 @@ CORRELATION_SIZE = 250
 FIT_TOLERANCE = 1e-4
 """Relative change of the cost at which the fit of a round ends. The next round starts from
 there."""
+SURE = 2.0
+"""Standard deviations by which another fillet must be more likely than a usual one."""
 SETTLED = 0.3
 """Rounds stop when no parameter moves by more than this share of its sd."""
 
@@ -50,21 +52,24 @@ class EdgePrior:
     """Prior knowledge of the rounding of an edge.
 
     The fillet of the object and the blur of the map both round the wall's upper end, but only the
-    fillet moves the wall inwards. If the map resolves the rounding, the map decides; otherwise this
-    prior does.
+    fillet moves the wall inwards. If the map tells them apart, the map decides; otherwise this
+    prior does, and the sizes are uncertain by all of `EDGES_MM` that fit as well.
 
     Attributes
     ----------
     edge_radius_mm, edge_radius_sd_mm : float
-        Fillet of the object.
-    blur_mm : float
-        Sigma of the map's blur if only the grid blurs it. The fit uses its square, in which the map
-        is linear.
+        Fillet of a usual object.
+    blur_mm2, blur_sd_mm2 : float
+        Variance of the map's blur, in which the map is linear, and what is not known of it.
+    blur_known : bool
+        Whether the blur follows from the nodes of the map, so that the fillet can be fitted freely.
     """
 
     edge_radius_mm: float
     edge_radius_sd_mm: float
-    blur_mm: float
+    blur_mm2: float
+    blur_sd_mm2: float
+    blur_known: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +166,9 @@ def fit_indenter(
     """Fit position, size, yaw, depth and drape of an indenter together.
 
     Weighted least squares with Huber weights. `edge` is the prior of the edge's fillet and the
-    map's blur. Its weight depends on the number of independent errors in the data.
+    map's blur. Its weight depends on the number of independent errors in the data. If another
+    of `EDGES_MM` is clearly more likely than a usual fillet, it is fitted freely.
+    The standard deviations include the fillets that explain the map as well.
 
     Parameters
     ----------
@@ -176,6 +183,56 @@ def fit_indenter(
     most_rounds : int, optional
         Rounds of reweighting; one is enough to see whether a shape fits at all.
     """
+    fit, others = _fit(model, window, start, edge, most_rounds)
+    if others is None:
+        return fit
+    best = int(np.argmin(others.excess))
+    if edge.blur_known and others.excess[best] + SURE**2 < others.usual:
+        moved = zip(fit.values.items(), others.changes[best], strict=True)
+        start = {name: value + float(change) for (name, value), change in moved}
+        fit, others = _fit(
+            model, window, start, replace(edge, edge_radius_sd_mm=EDGES_MM[-1]), most_rounds
+        )
+        assert others is not None
+    spread = zip(fit.sd.items(), others.spread, strict=True)
+    return replace(fit, sd={name: max(sd, float(size)) for (name, sd), size in spread})
+
+
+@dataclass(frozen=True, slots=True)
+class _Edges:
+    """What a fit becomes with other fillets.
+
+    Attributes
+    ----------
+    changes : (edges, parameters)
+        Of the parameters.
+    excess : (edges,)
+        Sums of squares beyond that of the fit, without the prior of the fillet.
+    usual : float
+        How far the fit's fillet is from a usual one, squared, in standard deviations.
+    """
+
+    changes: Array
+    excess: Array
+    usual: float
+
+    @property
+    def spread(self) -> Array:
+        """Root mean square change of each parameter over the fillets, by their likelihood."""
+        # The fit itself is one of them, without a change.
+        excess = np.append(self.excess, 0.0)
+        likely = np.exp(0.5 * (excess.min() - excess))
+        return np.asarray(np.sqrt(likely[:-1] @ self.changes**2 / likely.sum()))
+
+
+def _fit(
+    model: IndenterModel,
+    window: WindowData,
+    start: Mapping[str, float],
+    edge: EdgePrior,
+    most_rounds: int,
+) -> tuple[FitResult, _Edges | None]:
+    """Fit an indenter; also with other fillets, if it has one."""
     chosen, density = _chosen_points(window)
     names = (*model.names, *BASELINE)
     prior = _priors(model, edge)
@@ -215,7 +272,7 @@ def fit_indenter(
         settled = n > 0 and bool(np.all(np.abs(vector - before) <= SETTLED * sd + 1e-5))
         if settled:
             break
-    return FitResult(
+    fit = FitResult(
         values=dict(zip(names, map(float, vector), strict=True)),
         sd=dict(zip(names, map(float, sd), strict=True)),
         chosen=chosen,
@@ -225,6 +282,35 @@ def fit_indenter(
         correlated_pixels=together,
         converged=converged and settled,
     )
+    edged = most_rounds > 1 and "edge_radius_mm" in names
+    return fit, _other_edges(problem, vector, scale) if edged else None
+
+
+def _other_edges(problem: _Problem, vector: Array, scale: Array) -> _Edges:
+    """Fit again with each of `EDGES_MM`, and freely from the best, with the last weights."""
+    thin, place = np.s_[::THINNED], problem.names.index("edge_radius_mm")
+    scale = np.sqrt(THINNED) * scale[thin]
+    points = {name: getattr(problem, name)[thin] for name in ("x_mm", "y_mm", "depth_mm")}
+    known = {k: p for k, p in problem.prior.items() if k != "edge_radius_mm"}
+
+    def squares(vector: Array) -> float:
+        few = replace(problem, **points)
+        left = (few.depth(vector, few.x_mm, few.y_mm) - few.depth_mm) * scale
+        off = [(vector[problem.names.index(k)] - mean) / sd for k, (mean, sd) in known.items()]
+        return float(left @ left + np.square(off).sum())
+
+    def fitted(start: Array, edge_mm: float, sd_mm: float) -> Array:
+        prior = known | {"edge_radius_mm": (edge_mm, sd_mm)}
+        return _solve(replace(problem, prior=prior, **points), start, scale)[0]
+
+    # The few points have their own noise, also with the fillet of the fit.
+    own = fitted(vector, vector[place], HELD_MM)
+    vectors = [fitted(own, edge_mm, HELD_MM) for edge_mm in EDGES_MM]
+    best = min(vectors, key=squares)
+    vectors.append(fitted(best, best[place], EDGES_MM[-1]))
+    excess = np.array([squares(other) for other in vectors]) - squares(own)
+    mean, sd = problem.prior["edge_radius_mm"]
+    return _Edges(np.array(vectors) - own, excess, float(((vector[place] - mean) / sd) ** 2))
 
 
 def _clear_of_corners(problem: _Problem, vector: Array) -> Array:
@@ -295,7 +381,7 @@ def _priors(model: IndenterModel, edge: EdgePrior) -> dict[str, tuple[float, flo
         return {}
     return {
         "edge_radius_mm": (edge.edge_radius_mm, edge.edge_radius_sd_mm),
-        "blur_mm2": (edge.blur_mm**2, BLUR_SD_MM**2),
+        "blur_mm2": (edge.blur_mm2, edge.blur_sd_mm2),
     } | ({"corner_rounding": (0.0, CORNER_SD)} if "corner_rounding" in model.names else {})
 
 
@@ -310,7 +396,7 @@ def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
         elif name == "drape_decay_mm":
             low[k], high[k] = 0.05, 5.0
         elif name == "edge_radius_mm":
-            low[k], high[k] = 1e-3, 0.5
+            low[k], high[k] = 1e-3, EDGES_MM[-1]
         elif name == "blur_mm2":
             low[k], high[k] = 0.0, 0.25
     return low, high

@@ -87,9 +87,15 @@ def mode_error(heightmap: HeightMap) -> ModeError:
         return replace(MODE_ERRORS["paper"], lateral_per_mm=heightmap.lateral_per_mm)
     effort = "fast" if heightmap.trace is None else heightmap.trace.effort
     found, finer = MODE_ERRORS[effort], heightmap.pitch_mm / MODE_PITCH_MM
-    factor = SETTINGS[effort].factor if heightmap.model == "full" else 1
-    node_mm = factor * heightmap.pitch_mm
-    return replace(found, depth_per_slope=found.depth_per_slope * finer**2, node_mm=node_mm)
+    full = heightmap.model == "full"
+    node_mm = heightmap.pitch_mm * (SETTINGS[effort].factor if full else 1)
+    return replace(
+        found,
+        depth_per_slope=found.depth_per_slope * finer**2,
+        node_mm=node_mm,
+        # Of the mean over a node's pixels, and of linear interpolation between nodes.
+        blur_mm2=node_mm**2 / 3.0 if full else 0.0,
+    )
 
 
 @dataclass(frozen=True, slots=True)

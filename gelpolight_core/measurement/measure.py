@@ -53,6 +53,8 @@ DRAPE_MM = 1.5
 """Where the drape falls to a tenth of the height, about two decay lengths."""
 EDGE_RADIUS_MM = 0.08
 """Start value of the edge radius of an object."""
+UNKNOWN_BLUR_MM = 0.1
+"""Root of the sd of the squared blur where nothing is known of it."""
 SEED_REACH_MM = 1.0
 """How far beside an object's half-height outline a seed point may lie."""
 
@@ -125,6 +127,7 @@ def measure_object(
         depth_sd_mm=depth_sd_mm,
         reach_mm=reach_mm,
         edge_radius_mm=edge_radius_mm,
+        blur_mm2=0.0 if mode is None else mode.blur_mm2,
     )
     window, region, prior = found.window, found.region, found.edge
     fit = _fit(shape, window, region, prior)
@@ -175,6 +178,7 @@ def find_object(
     depth_sd_mm: NDArray[np.floating] | None = None,
     reach_mm: float = 0.0,
     edge_radius_mm: float = EDGE_RADIUS_MM,
+    blur_mm2: float = 0.0,
 ) -> FoundObject:
     """Find the object that is to be measured; parameters and errors as :func:`measure_object`.
 
@@ -182,6 +186,8 @@ def find_object(
     ----------
     depth_mm, x_mm, y_mm, seed_mm, flags, depth_sd_mm, reach_mm, edge_radius_mm
         As for :func:`measure_object`.
+    blur_mm2 : float, optional
+        Variance of the map's blur, known to one pixel squared; 0 if it is not known.
 
     Raises
     ------
@@ -200,9 +206,10 @@ def find_object(
             advice=tr("Press it nearer to the middle of the sensor"),
         )
     window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
-    return FoundObject(
-        window, region, EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, window.pitch_mm)
-    )
+    pixel_mm2 = window.pitch_mm**2
+    blur = (blur_mm2, pixel_mm2) if blur_mm2 else (pixel_mm2, UNKNOWN_BLUR_MM**2)
+    edge = EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, *blur, blur_known=blur_mm2 > 0.0)
+    return FoundObject(window, region, edge)
 
 
 def _checked(

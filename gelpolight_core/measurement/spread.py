@@ -51,12 +51,15 @@ class ModeError:
         Relative error of lengths across, for each mm of depth.
     node_mm : float
         Distance between the solved nodes: a large distance rounds the upper end of walls.
+    blur_mm2 : float
+        Variance of the map's blur by these nodes; 0 if it is not known.
     """
 
     depth: float
     depth_per_slope: float
     lateral_per_mm: float = 0.0
     node_mm: float = 0.0
+    blur_mm2: float = 0.0
 
 
 WIDTH_BY_NODES = 0.7

@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.spread import BALL_SLOPE, calibration_sd
+from gelpolight_core.measurement.spread import BALL_SLOPE, ModeError, calibration_sd
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cuboid, Cylinder, press
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane
@@ -22,13 +22,17 @@ from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt
 DECAY_MM = 0.7
 
 
-def measured(indenter: Cylinder | Cuboid, shape: str, *, blur_mm: float) -> Measurement:
+def measured(
+    indenter: Cylinder | Cuboid, shape: str, *, blur_mm: float, known: bool = False
+) -> Measurement:
     """Measure the true surface, blurred and with noise of 0.2 um."""
     surface = press(indenter, yaw_deg=20.0, decay_mm=DECAY_MM)
     depth = gaussian_filter(surface.depth_mm.astype(float), blur_mm / surface.pitch_mm)
     depth += 2e-4 * np.random.default_rng(0).standard_normal(depth.shape)
     # A reconstruction's errors hang together over the drape.
-    return measure_object(depth, surface.x_mm, surface.y_mm, shape=shape, reach_mm=DECAY_MM)
+    mode = ModeError(0.0, 0.0, blur_mm2=blur_mm**2) if known else None
+    x, y = surface.x_mm, surface.y_mm
+    return measure_object(depth, x, y, shape=shape, reach_mm=DECAY_MM, mode=mode)
 
 
 def sizes(measurement: Measurement) -> list[tuple[float, float]]:
@@ -48,7 +52,7 @@ def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide(
     for size, sd in sizes(found):
         assert abs(size - 5.0) < 0.065
         assert abs(size - 5.0) < 2.0 * sd
-        assert sd < 0.1
+        assert sd < 0.15
     assert found.height_mm == pytest.approx(depth_mm, abs=0.001)
 
 
@@ -59,6 +63,25 @@ def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm: float) -> None:
     assert found.diameter_mm == pytest.approx(5.0, abs=0.04)
     assert abs(found.size_mm - 5.0) < 2.0 * found.size_sd_mm
     assert found.blur_mm == pytest.approx(blur_mm, abs=0.01)
+
+
+@pytest.mark.parametrize("edge_mm", [0.0, 0.08, 0.15, 0.3, 0.5])
+@pytest.mark.parametrize("kind", [Cylinder, Cuboid])
+def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(
+    kind: type[Cylinder | Cuboid], edge_mm: float
+) -> None:
+    """Edges of 0.15 to 0.5 mm were measured 60 to 400 um too small, and called ok.
+
+    Where edge and blur cannot be told apart, the deviation says so; where they can, the size is
+    right.
+    """
+    shape = kind.__name__.lower()
+    for blur_mm, known in ((0.015, True), (0.07, True), (0.07, False)):
+        found = measured(kind(5.0, 1.0, edge_mm), shape, blur_mm=blur_mm, known=known)
+        for size, sd in sizes(found):
+            assert abs(size - 5.0) < 3.0 * sd or found.verdict == "doubtful"
+            if known and blur_mm < 0.02 and edge_mm > 0.1:
+                assert abs(size - 5.0) < 0.02
 
 
 @pytest.fixture(scope="module")
@@ -77,10 +100,18 @@ def departures(sensor: KnownSensor) -> dict[str, np.ndarray]:
     full = Reconstructor(sensor.calibration)
     of = {mode: full.at_effort(mode) for mode in MODES if mode != "paper"}
     of["paper"] = Reconstructor(sensor.calibration, model="paper")
-    for n, (shape, size, depth) in enumerate(
-        [("cylinder", 3.0, 0.5), ("cuboid", 4.0, 1.0), ("cuboid", 5.0, 0.3), ("cylinder", 5.0, 1.5)]
-    ):  # fmt: skip
-        indenter = Cylinder(size, depth) if shape == "cylinder" else Cuboid(size, depth, 0.1)
+    for n, indenter in enumerate(
+        [
+            Cylinder(3.0, 0.5),
+            Cuboid(4.0, 1.0, 0.1),
+            Cuboid(5.0, 0.3, 0.1),
+            Cylinder(5.0, 1.5),
+            Cylinder(5.0, 1.0, 0.3),
+            Cuboid(5.0, 1.0, 0.5),
+        ]
+    ):
+        shape, depth = type(indenter).__name__.lower(), indenter.depth_mm
+        size = 2.0 * indenter.reach_mm
         place = {"x_mm": 1.5 - n, "y_mm": 0.5 * n - 1.0, "yaw_deg": 13.0 * n}
         surface = press(indenter, **place, decay_mm=DECAY_MM)
         frame = sensor.sensor.frame(PressedMembrane(surface), stream=f"press {n}")
