@@ -122,15 +122,15 @@ def evaluation_errors(
             continue  # there is no press for this direction yet
         name = label(direction)
         mean = evaluation.overall(direction).mean_absolute_percent
-        key, text = f"{direction}_mean", title.format(direction=name)
-        figures.append(judge(key, text, mean, "%", fail=limit, advice=advice))
+        text = title.format(direction=name)
+        figures.append(judge(f"{direction}_mean", text, mean, "%", fail=limit, advice=advice))
         for group in evaluation.groups:
             overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
             mean = group.statistic.mean_absolute_percent
             if group.direction == direction and overall and math.isfinite(mean):
-                key = f"{direction}_{group.regions.replace(' ', '_')}"
+                regions = group.regions.replace(" ", "_")
                 text = title_in.format(direction=name, regions=label(group.regions))
-                figures.append(judge(key, text, mean, "%"))
+                figures.append(judge(f"{direction}_{regions}", text, mean, "%"))
     return QualityTable(tuple(figures))
 
 

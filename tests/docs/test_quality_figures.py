@@ -39,9 +39,7 @@ IN_WORDS = {
     "0.9 * radius_mm": "0.9 ball radii",
     "0.15 * contact_mm": "0.15 contact radii",
     "0.4 * contact_mm": "0.4 contact radii",
-    "limits[direction]": (
-        "{PAPER_PERCENT[planar]:g} % in the plane, {PAPER_PERCENT[depth]:g} % in depth"
-    ),
+    "limit": "{PAPER_LIMITS[0]:g} % in the plane, {PAPER_LIMITS[1]:g} % in depth",
 }
 NOTES = {
     "UNSOLVED_SHARE": "gelpolight_core/reconstruction/checks.py",
