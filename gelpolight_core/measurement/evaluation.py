@@ -6,13 +6,11 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.truth import PressTruth
-from gelpolight_core.measurement.variances import variance_between, variance_within
 from gelpolight_core.translation import tr
 
 PAPER_PERCENT = {"planar": 5.0, "depth": 8.0}
@@ -279,7 +277,7 @@ def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]
         All presses.
     """
     kinds: dict[str, list[PressResult]] = {ALL: list(results)}
-    for presses in _by_object(results).values():
+    for presses in by_object(results).values():
         regions: dict[str, list[PressResult]] = defaultdict(list)
         for result in presses:
             if result.press.region:
@@ -328,11 +326,11 @@ def _group(
     return Group(direction, shape, dimension, regions, statistic)
 
 
-def _by_object(results: Sequence[PressResult]) -> dict[tuple[Any, ...], list[PressResult]]:
-    objects: dict[tuple[Any, ...], list[PressResult]] = defaultdict(list)
+def by_object(results: Sequence[PressResult]) -> dict[Truth, list[PressResult]]:
+    """Return the presses of each object."""
+    objects: dict[Truth, list[PressResult]] = defaultdict(list)
     for result in results:
-        truth = result.press.truth
-        objects[truth.shape, truth.size_mm, truth.height_mm].append(result)
+        objects[result.press.truth].append(result)
     return objects
 
 
@@ -348,7 +346,7 @@ def _repeatability(results: Sequence[PressResult]) -> tuple[Repeatability, ...]:
 
 def _variances(results: Sequence[PressResult], direction: str) -> tuple[float, float]:
     """Return the variances (mm**2) within a region and between regions."""
-    objects = [lengths_by_region(own, direction) for own in _by_object(results).values()]
+    objects = [lengths_by_region(own, direction) for own in by_object(results).values()]
     within = variance_within([region for regions in objects for region in regions])
     moved = [regions for regions in objects if len(regions) > 1]
     if not moved:
@@ -357,6 +355,34 @@ def _variances(results: Sequence[PressResult], direction: str) -> tuple[float, f
     degrees = sum(len(regions) - 1 for regions in moved)
     between = sum((len(regions) - 1) * variance_between(regions, noise) for regions in moved)
     return within, max(between / degrees, 0.0)
+
+
+def variance_within(groups: Sequence[Sequence[float]]) -> float:
+    """Return the pooled variance (mm**2) of repeats at one position; NaN without repeats.
+
+    Parameters
+    ----------
+    groups : sequence of sequences of float
+        Lengths (mm) by place, of one object or of several.
+    """
+    freedom = sum(len(values) - 1 for values in groups)
+    squares = sum(float(np.var(values)) * len(values) for values in groups)
+    return squares / freedom if freedom else math.nan
+
+
+def variance_between(groups: Sequence[Sequence[float]], within: float) -> float:
+    """Return the variance (mm**2) between positions; below 0 if there is none.
+
+    Parameters
+    ----------
+    groups : sequence of sequences of float
+        Lengths (mm) of one object, for two or more positions.
+    within : float
+        Variance (mm**2) of repeats at one place.
+    """
+    # The means of few repeats scatter, too; only the excess is due to the position.
+    share = float(np.mean([1.0 / len(values) for values in groups]))
+    return float(np.var([np.mean(values) for values in groups], ddof=1)) - share * within
 
 
 def lengths_by_region(results: Iterable[PressResult], direction: str) -> list[list[float]]:

@@ -7,9 +7,10 @@ import io
 import json
 import math
 from collections.abc import Sequence
-from functools import partial
+from dataclasses import asdict
+from operator import methodcaller
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -35,22 +36,6 @@ from gelpolight_core.translation import tr
 COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}
 """Colours of Okabe and Ito, which colour-blind readers can distinguish."""
 BAR_WIDTH = 0.26
-CSV_COLUMNS = (
-    "file",
-    "shape",
-    "region",
-    "repeat",
-    "true_size_mm",
-    "size_mm",
-    "size_sd_mm",
-    "planar_error_percent",
-    "true_height_mm",
-    "height_mm",
-    "height_sd_mm",
-    "depth_error_percent",
-    "verdict",
-    "reason",
-)
 
 
 def evaluation_table(evaluation: Evaluation) -> str:
@@ -81,11 +66,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
             )
         )
     if evaluation.failed:
-        lines.append(
-            tr("{failed} of {all} presses could not be measured").format(
-                failed=len(evaluation.failed), all=len(evaluation.results)
-            )
-        )
+        lines.append(evaluation.failure)
     if evaluation.skipped:
         lines.append(
             tr("{count} skipped because this shape cannot be measured: {files}").format(
@@ -191,12 +172,8 @@ def write_evaluation(evaluation: Evaluation, folder: Path) -> tuple[Path, ...]:
         "evaluation.png": image.getvalue(),
     }
     for name, content in contents.items():
-        write_atomically(folder / name, partial(_write, content))
+        write_atomically(folder / name, methodcaller("write", content))
     return tuple(folder / name for name in contents)
-
-
-def _write(content: bytes, file: BinaryIO) -> None:
-    file.write(content)
 
 
 def _press_head(evaluation: Evaluation) -> str:
@@ -245,14 +222,7 @@ def _finite(value: float) -> float | None:
 
 
 def _statistic_json(statistic: Statistic) -> dict[str, Any]:
-    return {
-        "count": statistic.count,
-        "mean_absolute_percent": _finite(statistic.mean_absolute_percent),
-        "mean_percent": _finite(statistic.mean_percent),
-        "sd_percent": _finite(statistic.sd_percent),
-        "lowest_percent": _finite(statistic.lowest_percent),
-        "highest_percent": _finite(statistic.highest_percent),
-    }
+    return {name: _finite(value) for name, value in asdict(statistic).items()}
 
 
 def _press_values(result: PressResult) -> dict[str, Any]:
@@ -277,9 +247,10 @@ def _press_values(result: PressResult) -> dict[str, Any]:
 
 def _csv_text(evaluation: Evaluation) -> str:
     text = io.StringIO()
-    writer = csv.DictWriter(text, CSV_COLUMNS, lineterminator="\n")
+    rows = [_press_values(result) for result in evaluation.results]
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(_press_values(result) for result in evaluation.results)
+    writer.writerows(rows)
     return text.getvalue()
 
 

@@ -16,9 +16,9 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.edges import fit_circle
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
-from gelpolight_core.measurement.measured import Measured, map_errors, measured
+from gelpolight_core.measurement.measured import Measured, length, map_errors, measured
 from gelpolight_core.measurement.profile import Profile, take_profile
-from gelpolight_core.measurement.roughness import ERROR_NODES, fit_plane
+from gelpolight_core.measurement.roughness import ERROR_NODES, above_plane
 from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import joined, tr
@@ -73,14 +73,14 @@ class Pit:
         beside = np.arange(x.size) < count
 
         def height(depth: Array, stretch: float) -> float:
-            relief = _above_plane(x, y, depth, beside)[count:]
+            relief = above_plane(x, y, depth, beside)[count:]
             return sign * float((sign * _smooth(x[count:], y[count:], relief)).max())
 
         figure = measured("feature_height", "mm", height, depth, map_errors(heightmap, x, y))
         wide = ~around & (sign * relief > 0.5 * abs(figure.value))
         area = float(wide.sum()) * heightmap.pitch_mm**2
         diameter = 2.0 * math.sqrt(area / math.pi)
-        figures = (figure, _width(heightmap, diameter, "diameter"))
+        figures = (figure, length(heightmap, "diameter", diameter))
         found = tool_result(self, figures, (self.rectangle.outline_mm,), nodes.flags)
         return _judged(found, figure, diameter)
 
@@ -105,8 +105,8 @@ class Scratch:
         """Measure height against the surroundings, and width at half of it."""
         profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
         there = _complete(profile)
-        along, length = profile.along_mm[there], float(profile.along_mm[-1])
-        beside = (along < SURROUNDINGS * length) | (along > (1.0 - SURROUNDINGS) * length)
+        along, whole = profile.along_mm[there], float(profile.along_mm[-1])
+        beside = (along < SURROUNDINGS * whole) | (along > (1.0 - SURROUNDINGS) * whole)
 
         def relief_of(depth: Array) -> Array:
             return _above_line(along, depth[there], beside)
@@ -119,9 +119,9 @@ class Scratch:
 
         figure = measured("feature_height", "mm", height, profile.depth_mm, profile.errors)
         left, right = _half_crossings(along, relief, extreme)
-        figures = (figure, _width(heightmap, right - left, "width"))
+        figures = (figure, length(heightmap, "width", right - left))
         start, end = np.array(self.start_mm), np.array(self.end_mm)
-        ends = start + np.array([[left], [right]]) / length * (end - start)
+        ends = start + np.array([[left], [right]]) / whole * (end - start)
         lines = (np.stack([start, end]), ends)
         found = tool_result(self, figures, lines, profile.flags[there], profile=profile)
         return _judged(found, figure, right - left)
@@ -192,7 +192,7 @@ def _relief_of_area(nodes: AreaNodes, around: Mask, area: Rectangle) -> Array:
             ),
             advice=tr("Make it larger, or move it into the working area"),
         )
-    return _above_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm, around)
+    return above_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm, around)
 
 
 def _extreme(relief: Array) -> float:
@@ -210,12 +210,6 @@ def _smooth(x: Array, y: Array, relief: Array) -> Array:
     u, v = x - x.mean(), y - y.mean()
     terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
     return np.asarray(terms @ np.linalg.lstsq(terms, relief)[0])
-
-
-def _above_plane(x: Array, y: Array, depth: Array, around: Mask) -> Array:
-    level, slope_x, slope_y = fit_plane(x[around], y[around], depth[around])
-    plane = level + slope_x * (x - x[around].mean()) + slope_y * (y - y[around].mean())
-    return np.asarray(depth - plane)
 
 
 def _above_line(along: Array, depth: Array, beside: Mask) -> Array:
@@ -247,15 +241,6 @@ def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, f
         part = near / (near - far) if near > far else 1.0
         ends.append(float(along[k] + part * (along[k + step] - along[k])))
     return ends[0], ends[1]
-
-
-def _width(heightmap: HeightMap, width: float, name: str) -> Measured:
-    """Return a width between two edges, each with an uncertainty of one node."""
-    share = heightmap.lateral_scale_sd
-    if share is None or heightmap.noise_mm is None:
-        return Measured(width, None, "mm", name)
-    sd = math.hypot(math.sqrt(2.0) * heightmap.pitch_mm, share * width)
-    return Measured(width, sd, "mm", name)
 
 
 def _judged(found: ToolResult, height: Measured, width: float) -> ToolResult:

@@ -28,7 +28,7 @@ MODEL_ERROR = 0.001
 the residual would only exclude the edges, which determine the size."""
 EDGES_MM = (0.0, 0.1, 0.2, 0.35, 0.6, 1.0)
 """Fillets that are compared with the fitted one; larger ones are not fitted."""
-HELD_MM, THINNED = 1e-4, 8
+THINNED = 8
 """For the comparison, one of so many points is enough."""
 CORNER_SD = 0.05
 """Strength of a corner's rounding, either sign: a sharp corner holds the membrane further out."""
@@ -299,13 +299,13 @@ def _other_edges(problem: _Problem, vector: Array, scale: Array) -> _Edges:
         off = [(vector[problem.names.index(k)] - mean) / sd for k, (mean, sd) in known.items()]
         return float(left @ left + np.square(off).sum())
 
-    def fitted(start: Array, edge_mm: float, sd_mm: float) -> Array:
+    def fitted(start: Array, edge_mm: float, sd_mm: float = 1e-4) -> Array:
         prior = known | {"edge_radius_mm": (edge_mm, sd_mm)}
         return _solve(replace(problem, prior=prior, **points), start, scale)[0]
 
     # The few points have their own noise, also with the fillet of the fit.
-    own = fitted(vector, vector[place], HELD_MM)
-    vectors = [fitted(own, edge_mm, HELD_MM) for edge_mm in EDGES_MM]
+    own = fitted(vector, vector[place])
+    vectors = [fitted(own, edge_mm) for edge_mm in EDGES_MM]
     best = min(vectors, key=squares)
     vectors.append(fitted(best, best[place], EDGES_MM[-1]))
     excess = np.array([squares(other) for other in vectors]) - squares(own)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +12,13 @@ from gelpolight_core.measurement.evaluation import (
     RANDOM,
     SAME,
     Evaluation,
-    PressResult,
+    by_object,
     lengths_by_region,
     region_kinds,
+    variance_between,
+    variance_within,
 )
 from gelpolight_core.measurement.result import Truth
-from gelpolight_core.measurement.variances import variance_between, variance_within
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ def gauge_rows(evaluation: Evaluation) -> tuple[GaugeRow, ...]:
     rows = []
     for direction in DIRECTIONS:
         same, random = (
-            _by_object(evaluation.series(direction, kinds.get(kind, ()))) for kind in (SAME, RANDOM)
+            by_object(evaluation.series(direction, kinds.get(kind, ()))) for kind in (SAME, RANDOM)
         )
         objects = sorted({*same, *random}, key=lambda t: (t.shape, t.size_mm, t.height_mm))
         for truth in objects:
@@ -92,13 +92,6 @@ def gauge_rows(evaluation: Evaluation) -> tuple[GaugeRow, ...]:
             regions = lengths_by_region(random.get(truth, []), direction)
             rows.append(_row(direction, truth, repeated, regions))
     return tuple(rows)
-
-
-def _by_object(results: tuple[PressResult, ...]) -> dict[Truth, list[PressResult]]:
-    objects: dict[Truth, list[PressResult]] = defaultdict(list)
-    for result in results:
-        objects[result.press.truth].append(result)
-    return objects
 
 
 def _row(

@@ -99,8 +99,8 @@ def mode_error(heightmap: HeightMap) -> ModeError:
 
 
 @dataclass(frozen=True, slots=True)
-class Ball:
-    """A ball, fitted with the drape around it.
+class FittedIndenter:
+    """An indenter, fitted with the drape around it.
 
     Attributes
     ----------
@@ -108,54 +108,41 @@ class Ball:
         A point on it; None where nothing else is pressed.
     """
 
-    name: ClassVar[str] = "ball"
+    name: ClassVar[str]
     at_mm: Point | None = None
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
-        fit = measure_heightmap(heightmap, shape=self.name, seed_mm=self.at_mm)
-        return _fitted(self, fit)
+        return _fitted(self, measure_heightmap(heightmap, shape=self.name, seed_mm=self.at_mm))
 
 
-@dataclass(frozen=True, slots=True)
-class Cylinder:
-    """A flat cylinder, fitted with the drape around it; attributes as for :class:`Ball`."""
+class Ball(FittedIndenter):
+    """A ball; attributes as for :class:`FittedIndenter`."""
 
-    name: ClassVar[str] = "cylinder"
-    at_mm: Point | None = None
-
-    def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure."""
-        fit = measure_heightmap(heightmap, shape=self.name, seed_mm=self.at_mm)
-        return _fitted(self, fit)
+    name = "ball"
 
 
-@dataclass(frozen=True, slots=True)
-class Cuboid:
-    """A flat cuboid, fitted with the drape around it; attributes as for :class:`Ball`."""
+class Cylinder(FittedIndenter):
+    """A flat cylinder; attributes as for :class:`FittedIndenter`."""
 
-    name: ClassVar[str] = "cuboid"
-    at_mm: Point | None = None
-
-    def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure."""
-        fit = measure_heightmap(heightmap, shape=self.name, seed_mm=self.at_mm)
-        return _fitted(self, fit)
+    name = "cylinder"
 
 
-def _fitted(tool: Ball | Cylinder | Cuboid, fit: Measurement) -> ToolResult:
+class Cuboid(FittedIndenter):
+    """A flat cuboid; attributes as for :class:`FittedIndenter`."""
+
+    name = "cuboid"
+
+
+def _fitted(tool: FittedIndenter, fit: Measurement) -> ToolResult:
     """Return a fit as a tool's result."""
     sizes: tuple[Measured, ...]
     if fit.side_mm is None:
         assert fit.diameter_mm is not None
         sizes = (Measured(fit.diameter_mm, fit.sd["diameter_mm"], "mm", "diameter"),)
     else:
-        sizes = tuple(
-            Measured(side, sd, "mm", name)
-            for name, side, sd in zip(
-                ("side_a", "side_b"), fit.side_mm, fit.sd["side_mm"], strict=True
-            )
-        )
+        named = zip(fit.side_mm, fit.sd["side_mm"], ("side_a", "side_b"), strict=True)
+        sizes = tuple(Measured(side, sd, "mm", name) for side, sd, name in named)
     turned: tuple[Measured, ...] = ()
     if fit.yaw_deg is not None:
         turned = (Measured(fit.yaw_deg, fit.sd["yaw_deg"], "deg", "yaw"),)

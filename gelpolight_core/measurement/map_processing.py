@@ -12,7 +12,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.measured import depth_at
-from gelpolight_core.measurement.roughness import fit_plane
+from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
@@ -85,7 +85,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     there = usable(heightmap) if mask is None else usable(heightmap) & mask
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     depth = heightmap.depth_mm.astype(np.float64)
-    plane = np.zeros(depth.shape)
+    left = depth
     for _ in range(ROUNDS if mask is None else 1):
         if there.sum() < LEAST_NODES:
             raise InputError(
@@ -93,13 +93,11 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
                 where=tr("levelling"),
                 advice=tr("Choose a larger area inside the working area"),
             )
-        level, slope_x, slope_y = fit_plane(x[there], y[there], depth[there])
-        plane = level + slope_x * (x - x[there].mean()) + slope_y * (y - y[there].mean())
-        left = depth - plane
+        left = above_plane(x, y, depth, there)
         middle = float(np.median(left[there]))
         spread = 1.4826 * float(np.median(np.abs(left[there] - middle)))
         there &= np.abs(left - middle) <= max(FAR * spread, 1e-9)
-    return _without(heightmap, plane, tr("Levelled by a least-squares plane."))
+    return _without(heightmap, depth - left, tr("Levelled by a least-squares plane."))
 
 
 def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightMap:

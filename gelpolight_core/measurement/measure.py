@@ -34,14 +34,13 @@ from gelpolight_core.measurement.spread import (
     mode_sd,
     noise_of_fit,
 )
+from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.translation import joined, tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SHAPES = tuple(MODELS)
-OUTSIDE_FLAG = 1
-"""Bit of the flags for pixels outside the working area."""
 DOUBTFUL_WEIGHT = 0.1
 """Weight of a flagged pixel: an error about three times that of its neighbours."""
 MARGIN_MM = 3.0
@@ -235,8 +234,8 @@ def _checked(
         )
     weight = np.isfinite(depth).astype(np.float64)
     if flags is not None:
-        weight[(flags & OUTSIDE_FLAG) != 0] = 0.0
-        weight[(flags & ~np.uint8(OUTSIDE_FLAG)) != 0] *= DOUBTFUL_WEIGHT
+        weight[(flags & np.uint8(Flag.OUTSIDE)) != 0] = 0.0
+        weight[(flags & ~np.uint8(Flag.OUTSIDE)) != 0] *= DOUBTFUL_WEIGHT
     if not weight.any():
         raise InputError(
             tr("no pixel is usable"),

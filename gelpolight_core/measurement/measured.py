@@ -171,6 +171,27 @@ def measured(
     return Measured(value, math.hypot(noise, scaled, stretched), unit, name)
 
 
+def length(heightmap: HeightMap, name: str, value: float, sd: float | None = None) -> Measured:
+    """Return a length across; its standard deviation is that of the calibration, too.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        What was measured on. Without its noise, there is no standard deviation.
+    name : str
+        As in :class:`Measured`.
+    value : float
+        In mm.
+    sd : float, optional
+        Standard deviation of placing its ends, in mm. Default: one node for each of the two.
+    """
+    share = heightmap.lateral_scale_sd
+    if share is None or heightmap.noise_mm is None:
+        return Measured(value, None, "mm", name)
+    placing = math.sqrt(2.0) * heightmap.pitch_mm if sd is None else sd
+    return Measured(value, math.hypot(placing, share * value), "mm", name)
+
+
 def index_of(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
     """Return fractional (column, row) of places.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -16,7 +16,7 @@ from gelpolight_core.measurement.edges import (
     fit_circle,
     rectangle_at_steepest,
 )
-from gelpolight_core.measurement.measured import Measured, flags_at, map_errors, measured
+from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
 from gelpolight_core.measurement.roughness import ERROR_NODES, fit_plane, roughness
 from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -55,17 +55,10 @@ class Circle:
         circle = np.array(found.centre_mm) + found.radius_mm * np.stack(
             [np.cos(turns), np.sin(turns)], axis=1
         )
-        share = heightmap.lateral_scale_sd
-        stated = share is not None and heightmap.noise_mm is not None
-
-        def figure(name: str, value: float, spread: float) -> Measured:
-            sd = math.hypot(spread, (share or 0.0) * value) if stated else None
-            return Measured(value, sd, "mm", name)
-
         figures = (
-            figure("diameter", 2.0 * found.radius_mm, 2.0 * found.sd_mm[2]),
-            figure("centre_x", found.centre_mm[0], found.sd_mm[0]),
-            figure("centre_y", found.centre_mm[1], found.sd_mm[1]),
+            length(heightmap, "diameter", 2.0 * found.radius_mm, 2.0 * found.sd_mm[2]),
+            length(heightmap, "centre_x", found.centre_mm[0], found.sd_mm[0]),
+            length(heightmap, "centre_y", found.centre_mm[1], found.sd_mm[1]),
             Measured(found.rms_mm, None, "mm", "roundness"),
         )
         x, y = found.points_mm.T
@@ -92,26 +85,15 @@ class RectangleTool:
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         _check_edge(self.edge)
-        # A drawn side lies between two edges, each with an uncertainty of one node.
-        by_hand = math.sqrt(2.0) * heightmap.pitch_mm
-        area, spread = self.rectangle, (by_hand, by_hand)
+        area = self.rectangle
+        spread: tuple[float | None, float | None] = (None, None)
         if self.edge == "steepest":
             found = rectangle_at_steepest(heightmap, area)
             area, spread = found.rectangle, found.sides_sd_mm
         nodes = nodes_inside(heightmap, area)
-        share = heightmap.lateral_scale_sd
-        stated = share is not None and heightmap.noise_mm is not None
-        sides = tuple(
-            Measured(
-                side,
-                math.hypot(sd, (share or 0.0) * side) if stated else None,
-                "mm",
-                name,
-            )
-            for name, side, sd in zip(("side_a", "side_b"), area.sides_mm, spread, strict=True)
-        )
         figures = (
-            *sides,
+            length(heightmap, "side_a", area.sides_mm[0], spread[0]),
+            length(heightmap, "side_b", area.sides_mm[1], spread[1]),
             Measured(area.yaw_deg, None, "deg", "yaw"),
             *_depth_figures(heightmap, nodes),
             *roughness(heightmap, area),
@@ -128,28 +110,25 @@ def _depth_figures(heightmap: HeightMap, nodes: AreaNodes) -> tuple[Measured, ..
         return float(d.mean())
 
     def tilt(d: Array, stretch: float) -> float:
-        _, slope_x, slope_y = fit_plane(stretch * few.x_mm, stretch * few.y_mm, d)
-        return math.degrees(math.atan(math.hypot(slope_x, slope_y)))
+        return _tilt_deg(stretch * few.x_mm, stretch * few.y_mm, d)
 
-    _, slope_x, slope_y = fit_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm)
-    deepest = int(nodes.depth_mm.argmax())
-    at = nodes.x_mm[[deepest]], nodes.y_mm[[deepest]]
-    top_errors = map_errors(heightmap, *at)
+    top = np.argmax(nodes.depth_mm, keepdims=True)
+    top_errors = map_errors(heightmap, nodes.x_mm[top], nodes.y_mm[top])
     return (
-        Measured(
-            float(nodes.depth_mm.mean()),
-            measured("mean_depth", "mm", mean, few.depth_mm, errors).sd,
-            "mm",
-            "mean_depth",
+        replace(
+            measured("mean_depth", "mm", mean, few.depth_mm, errors),
+            value=float(nodes.depth_mm.mean()),
         ),
-        measured("deepest", "mm", mean, nodes.depth_mm[[deepest]], top_errors),
-        Measured(
-            math.degrees(math.atan(math.hypot(slope_x, slope_y))),
-            measured("tilt", "deg", tilt, few.depth_mm, errors).sd,
-            "deg",
-            "tilt",
+        measured("deepest", "mm", mean, nodes.depth_mm[top], top_errors),
+        replace(
+            measured("tilt", "deg", tilt, few.depth_mm, errors),
+            value=_tilt_deg(nodes.x_mm, nodes.y_mm, nodes.depth_mm),
         ),
     )
+
+
+def _tilt_deg(x_mm: Array, y_mm: Array, depth_mm: Array) -> float:
+    return math.degrees(math.atan(math.hypot(*fit_plane(x_mm, y_mm, depth_mm)[1:])))
 
 
 def _check_edge(edge: str) -> None:

@@ -44,37 +44,14 @@ class Distance:
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure; the depths are those of the surface at the two places."""
-        x, y = np.array([self.a_mm, self.b_mm]).T
-        depth = _known_depth(heightmap, x, y)
-        errors = map_errors(heightmap, x, y)
-        across = math.hypot(x[1] - x[0], y[1] - y[0])
 
-        def plane(d: Array, stretch: float) -> float:
-            return stretch * across
+        def compute(at: Array, depth: Array) -> tuple[float, ...]:
+            across, deeper = math.hypot(*(at[1] - at[0])), float(depth[1] - depth[0])
+            return across, math.hypot(across, deeper), deeper
 
-        def space(d: Array, stretch: float) -> float:
-            return math.hypot(stretch * across, float(d[1] - d[0]))
-
-        def deeper(d: Array, stretch: float) -> float:
-            return float(d[1] - d[0])
-
-        positions = np.stack([x, y], axis=1)
-
-        def by_positions(at: Array, d: Array) -> tuple[float, ...]:
-            away = math.hypot(*(at[1] - at[0]))
-            return away, math.hypot(away, float(d[1] - d[0])), float(d[1] - d[0])
-
-        figures = (
-            measured("distance", "mm", plane, depth, errors),
-            measured("distance_3d", "mm", space, depth, errors),
-            measured("depth_difference", "mm", deeper, depth, errors),
-        )
-        return tool_result(
-            self,
-            with_placing(figures, by_positions, positions, heightmap),
-            (positions,),
-            flags_at(heightmap, x, y),
-        )
+        names = ("distance", "distance_3d", "depth_difference")
+        positions = np.array([self.a_mm, self.b_mm])
+        return _between_points(self, heightmap, positions, names, "mm", compute)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,35 +127,41 @@ class Angle:
                 where=tr("angle"),
                 advice=tr("Place three different points, the apex second"),
             )
-        x, y = positions.T
-        depth = _known_depth(heightmap, x, y)
-        errors = map_errors(heightmap, x, y)
 
-        def plane(d: Array, stretch: float) -> float:
-            return _angle_deg(arms[0], arms[1])
-
-        def space(d: Array, stretch: float) -> float:
-            first, second = (
-                np.array([*(stretch * arm), rise])
-                for arm, rise in zip(arms, (d[0] - d[1], d[2] - d[1]), strict=True)
+        def compute(at: Array, depth: Array) -> tuple[float, ...]:
+            first, second = at[0] - at[1], at[2] - at[1]
+            rising = (
+                np.array([*first, depth[0] - depth[1]]),
+                np.array([*second, depth[2] - depth[1]]),
             )
-            return _angle_deg(first, second)
+            return _angle_deg(first, second), _angle_deg(*rising)
 
-        def by_positions(at: Array, d: Array) -> tuple[float, ...]:
-            to_first, to_second = at[0] - at[1], at[2] - at[1]
-            first, second = np.array([*to_first, d[0] - d[1]]), np.array([*to_second, d[2] - d[1]])
-            return _angle_deg(to_first, to_second), _angle_deg(first, second)
+        names = ("angle", "angle_3d")
+        return _between_points(self, heightmap, positions, names, "deg", compute)
 
-        figures = (
-            measured("angle", "deg", plane, depth, errors),
-            measured("angle_3d", "deg", space, depth, errors),
-        )
-        return tool_result(
-            self,
-            with_placing(figures, by_positions, positions, heightmap),
-            (positions,),
-            flags_at(heightmap, x, y),
-        )
+
+def _between_points(
+    tool: Distance | Angle,
+    heightmap: HeightMap,
+    positions_mm: Array,
+    names: tuple[str, ...],
+    unit: str,
+    compute: Callable[[Array, Array], tuple[float, ...]],
+) -> ToolResult:
+    """Return the figures that `compute` gives from places (N, 2) and depths (N,)."""
+    x, y = positions_mm.T
+    depth, errors = _known_depth(heightmap, x, y), map_errors(heightmap, x, y)
+
+    def figure(k: int) -> Callable[[Array, float], float]:
+        return lambda d, stretch: compute(stretch * positions_mm, d)[k]
+
+    figures = tuple(measured(name, unit, figure(k), depth, errors) for k, name in enumerate(names))
+    return tool_result(
+        tool,
+        with_placing(figures, compute, positions_mm, heightmap),
+        (positions_mm,),
+        flags_at(heightmap, x, y),
+    )
 
 
 def with_placing(

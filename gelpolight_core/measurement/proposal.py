@@ -10,9 +10,9 @@ import numpy as np
 from gelpolight_core.measurement.fit import fit_indenter
 from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.measure import OUTSIDE_FLAG, find_object
+from gelpolight_core.measurement.measure import find_object
 from gelpolight_core.measurement.segmentation import PressedRegion, find_pressed_regions
-from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 UNCLEAR = "unclear"
 
@@ -94,7 +94,7 @@ def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None)
 def _tallest(heightmap: HeightMap) -> PressedRegion | None:
     """Return the tallest object, cut by the border or not."""
     depth = heightmap.depth_mm.astype(np.float64)
-    valid = np.isfinite(depth) & ((heightmap.flags & OUTSIDE_FLAG) == 0)
+    valid = np.isfinite(depth) & ((heightmap.flags & np.uint8(Flag.OUTSIDE)) == 0)
     if not valid.any():
         return None
     x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))

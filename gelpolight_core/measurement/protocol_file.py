@@ -12,6 +12,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.reading import brief, parse_toml, read_file
 from gelpolight_core.measurement.protocol import Protocol, check_protocol
+from gelpolight_core.measurement.truth import LONGEST_MM
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 
@@ -19,7 +20,6 @@ FILE_NAME = "protocol.toml"
 FORMAT = "gelpolight-protocol"
 VERSION = 1
 SIZE_LIMIT = 100_000
-LONGEST_MM = 1000.0
 
 
 @dataclass(frozen=True, slots=True)

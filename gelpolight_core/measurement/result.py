@@ -116,24 +116,20 @@ class Measurement:
         comparison : Comparison, optional
             From :func:`compare`.
         """
-        size = (
-            ("diameter_mm", self.diameter_mm)
-            if self.side_mm is None
-            else ("side_mm", list(self.side_mm))
-        )
+        size: dict[str, Any] = {"diameter_mm": self.diameter_mm}
+        if self.side_mm is not None:
+            size = {"side_mm": list(self.side_mm)}
         return {
             "shape": self.shape,
-            size[0]: size[1],
+            **size,
             "height_mm": self.height_mm,
             "centre_mm": list(self.centre_mm),
             "yaw_deg": self.yaw_deg,
             "drape_decay_mm": self.drape_decay_mm,
             "sd": _plain(self.sd),
-            "noise_sd": None if self.noise_sd is None else _plain(self.noise_sd),
-            "calibration_sd": (
-                None if self.calibration_sd is None else _plain(self.calibration_sd)
-            ),
-            "mode_sd": None if self.mode_sd is None else _plain(self.mode_sd),
+            "noise_sd": _plain(self.noise_sd),
+            "calibration_sd": _plain(self.calibration_sd),
+            "mode_sd": _plain(self.mode_sd),
             "truth": None if comparison is None else comparison.truth.as_json(),
             "error_percent": None if comparison is None else dict(comparison.error_percent),
             "verdict": self.verdict,
@@ -144,7 +140,9 @@ class Measurement:
         }
 
 
-def _plain(spread: dict[str, Any]) -> dict[str, Any]:
+def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:
+    if spread is None:
+        return None
     return {k: list(v) if isinstance(v, tuple) else v for k, v in spread.items()}
 
 

@@ -49,11 +49,11 @@ def roughness(heightmap: HeightMap, rectangle: Rectangle) -> Parameters:
     nodes = nodes_inside(heightmap, rectangle)
     few = nodes.thinned(ERROR_NODES)
     errors = map_errors(heightmap, few.x_mm, few.y_mm)
-    height = _levelled(nodes.x_mm, nodes.y_mm, nodes.depth_mm)
+    height = above_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm)
 
     def figure(name: str, parameter: Callable[[Array], float]) -> Measured:
         def compute(depths: Array, stretch: float) -> float:
-            return UM * parameter(_levelled(few.x_mm, few.y_mm, depths))
+            return UM * parameter(above_plane(few.x_mm, few.y_mm, depths))
 
         of_few = measured(name, "um", compute, few.depth_mm, errors)
         return replace(of_few, value=UM * parameter(height))
@@ -131,10 +131,14 @@ def fit_plane(x_mm: Array, y_mm: Array, depth_mm: Array) -> tuple[float, float, 
     return level, slope_x, slope_y
 
 
-def _levelled(x_mm: Array, y_mm: Array, depth_mm: Array) -> Array:
-    level, slope_x, slope_y = fit_plane(x_mm, y_mm, depth_mm)
-    plane = level + slope_x * (x_mm - x_mm.mean()) + slope_y * (y_mm - y_mm.mean())
-    return np.asarray(depth_mm - plane)
+def above_plane(
+    x_mm: Array, y_mm: Array, depth_mm: Array, around: NDArray[np.bool_] | None = None
+) -> Array:
+    """Return the height of points above the least-squares plane of those `around` (all)."""
+    part = np.s_[:] if around is None else around
+    level, slope_x, slope_y = fit_plane(x_mm[part], y_mm[part], depth_mm[part])
+    x, y = x_mm - x_mm[part].mean(), y_mm - y_mm[part].mean()
+    return np.asarray(depth_mm - (level + slope_x * x + slope_y * y))
 
 
 def gaussian_mean_line(depth_mm: Array, step_mm: float, cutoff_mm: float) -> Array:

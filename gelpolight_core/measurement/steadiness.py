@@ -25,7 +25,6 @@ CONTACT_CHANGE = 0.06
 PRESSED_SHARE = 0.004
 """A cylinder of 3 mm and 0.5 mm height changes a hundredth of an image 30 mm wide."""
 LIFTED_SHARE = 0.001
-LEAST_FRAMES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +122,7 @@ def judge_press(
         Largest distance of the middle of the press from it.
     """
     nowhere = Contact(0.0, (math.nan, math.nan))
-    if len(frames) < LEAST_FRAMES:
+    if len(frames) < 2:
         return PressJudgement(
             False, tr("More than one frame is needed to detect movement."), math.nan, nowhere
         )
