@@ -133,9 +133,9 @@ def test_reports_of_the_window_and_of_the_command_state_the_validation(
 ) -> None:
     path = save(technician, computed_project(), tmp_path / "workspace")
     step = technician.wizard.at("validation")
-    step.validating.import_press(small_session / PRESS)
+    step.import_press(small_session / PRESS)
     technician.until(lambda: "Diameter" in step.form.result.text())
-    step.validating.keep()
+    step.keep()
     technician.wizard.at("result").saving.write_report(tmp_path / "window.pdf")
     technician.rest()
     assert main(["report", str(path), "-o", str(tmp_path / "command.pdf")]) == 0
