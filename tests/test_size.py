@@ -57,7 +57,7 @@ MOST = {
     "gelpolight_core/in_place": 1212,
     "gelpolight_core/io": 496,
     "gelpolight_core/lights": 581,
-    "gelpolight_core/measurement": 4720,
+    "gelpolight_core/measurement": 4625,
     "gelpolight_core/optics": 1651,
     "gelpolight_core/radiance": 224,
     "gelpolight_core/reconstruction": 5768,
