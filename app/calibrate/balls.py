@@ -38,8 +38,7 @@ from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.errors import InputError
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.optics.raw_positions import seen_at
-from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.optics.resampling import ResamplingTable, seen_at
 from gelpolight_core.reflectance.press import BallPress, find_ball
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr

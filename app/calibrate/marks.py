@@ -13,8 +13,7 @@ from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.raw_positions import boundary_px, seen_at
-from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.optics.resampling import ResamplingTable, boundary_px, seen_at
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.translation import tr
 

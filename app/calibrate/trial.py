@@ -15,7 +15,7 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.capture import average_frames
+from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
 
 

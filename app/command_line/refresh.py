@@ -9,7 +9,7 @@ from pathlib import Path
 from app.command_line.common import check_outputs, quality_lines
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.in_place_refresh import repaired, with_background
+from gelpolight_core.calibration.in_place_session import repaired, with_background
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration

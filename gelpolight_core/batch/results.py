@@ -16,8 +16,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gelpolight_core.io.appending import append_durably
-from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.atomic import append_durably, write_atomically
 from gelpolight_core.io.reading import open_file, parse_json, unreadable
 
 FILE = "batch.jsonl"

@@ -22,7 +22,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import read_image_file
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
-from gelpolight_core.session.capture import average_frames, write_image
 from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
 from gelpolight_core.session.decisions import (
@@ -34,6 +33,7 @@ from gelpolight_core.session.decisions import (
 from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.file_hashes import KnownFiles
+from gelpolight_core.session.images import average_frames, write_image
 from gelpolight_core.session.session import ONE_IMAGE_STAGES, Session
 
 Described = TypeVar("Described", bound=Session | ClosedSession)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
-from gelpolight_core.optics.raw_positions import working_area
-from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.optics.resampling import ResamplingTable, working_area
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 from gelpolight_core.translation import tr

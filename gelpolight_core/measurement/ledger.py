@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.appending import append_durably
+from gelpolight_core.io.atomic import append_durably
 from gelpolight_core.io.reading import parse_json, plain_text, read_file
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.measurement.result import Measurement

@@ -20,8 +20,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.appending import append_durably
-from gelpolight_core.io.atomic import cannot_write, make_folder, write_atomically
+from gelpolight_core.io.atomic import append_durably, cannot_write, make_folder, write_atomically
 from gelpolight_core.io.reading import brief, read_file
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.protocol import PressWanted, Protocol, check_protocol
@@ -31,7 +30,7 @@ from gelpolight_core.measurement.protocol_file import (
     read_protocol_file,
     write_protocol_file,
 )
-from gelpolight_core.session.capture import average_frames, write_image
+from gelpolight_core.session.images import average_frames, write_image
 from gelpolight_core.translation import tr
 
 PRESSES, DISCARDED, REFUSED = "presses", "discarded", "refused.csv"

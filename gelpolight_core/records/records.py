@@ -21,8 +21,7 @@ from gelpolight_core.io.closing import Closing
 from gelpolight_core.io.reading import refusing, written_text
 from gelpolight_core.records.database import connect, in_plain_words, is_damage, keep_aside
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of
-from gelpolight_core.records.table import write_csv
+from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of, write_csv
 from gelpolight_core.translation import tr
 
 NAME = "records.sqlite"

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.in_place_refresh import repaired, with_background
 from gelpolight_core.calibration.in_place_session import (
     InPlaceRun,
     calibrate_closed_session,
     expected_gain,
+    repaired,
+    with_background,
 )
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.appending import append_durably
+from gelpolight_core.io.atomic import append_durably
 
 
 def test_appended_lines_follow_the_existing_ones(tmp_path: Path) -> None:

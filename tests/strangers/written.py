@@ -27,14 +27,14 @@ from gelpolight_core.measurement.protocol_file import ProtocolFile, write_protoc
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
-from gelpolight_core.records.table import write_csv
+from gelpolight_core.records.rows import write_csv
 from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.file import write_report
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.capture import write_image
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import write_description
+from gelpolight_core.session.images import write_image
 from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.simulation.session import session_toml
 
