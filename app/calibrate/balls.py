@@ -207,15 +207,13 @@ class RadiusRow(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.box = named(
-            DoubleSpinBox(),
+            DoubleSpinBox(
+                minimum=0.1, maximum=1000.0, decimals=3, suffix=tr(" mm"), keyboardTracking=False
+            ),
             "calibrate.radius",
             tr("Diameter of the ball in mm"),
             tr("Diameter for the next press, or for the shown one"),
         )
-        self.box.setRange(0.1, 1000.0)
-        self.box.setDecimals(3)
-        self.box.setSuffix(tr(" mm"))
-        self.box.setKeyboardTracking(False)
         hbox(PlainLabel(tr("Ball diameter")), (self.box, 1), of=self, margins=0)
 
     @property

@@ -2,37 +2,61 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QDoubleSpinBox,
+    QFormLayout,
     QGroupBox,
-    QLineEdit,
     QPushButton,
     QScrollArea,
-    QVBoxLayout,
     QWidget,
 )
 
+from app.widgets.fields import text
+from app.widgets.forms import Form
 from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.translation import tr
 
 FORM_WIDTH, LEAST_WIDTH = 640, 320
+USUAL_RADIUS_MM = 3.0
+
+
+@dataclass(frozen=True)
+class Values:
+    """What is known about every sensor."""
+
+    serial: str = text(
+        "", tr("Serial number"), tr("Identifies the sensor in every file"),
+        example=tr("for example A-001"),
+    )  # fmt: skip
+    elastomer: str = text(
+        "", tr("Elastomer"),
+        tr("Tells elastomers apart: the presses are counted for each. May be empty"),
+        example=tr("for example gel 7"), length=REMARK_LENGTH,
+    )  # fmt: skip
 
 
 class FormPage(QScrollArea):
-    """A form for the description of a session. A form supplies its groups and their values.
+    """A form for the description of a session. A form supplies its values.
 
     Parameters
     ----------
     title, task : str
         Shown above the groups for a new session.
+    session : Session or ClosedSession
+        The new session.
+    values : Values
+        With the fields of the form.
+    *groups : QWidget
+        Other groups.
 
     Signals
     -------
@@ -42,56 +66,44 @@ class FormPage(QScrollArea):
 
     accepted = Signal(object)
 
-    def __init__(self, title: str, task: str) -> None:
+    def __init__(
+        self, title: str, task: str, session: Any, values: Values, *groups: QWidget
+    ) -> None:
         super().__init__()
         named(self, "setup", tr("Set-up"))
         self.setWidgetResizable(True)
-        inside = QWidget()
+        inside, holder = QWidget(), QWidget(maximumWidth=FORM_WIDTH, minimumWidth=LEAST_WIDTH)
         self.setWidget(inside)
-        column = QVBoxLayout()
-        holder = QWidget()
-        holder.setLayout(column)
-        holder.setMaximumWidth(FORM_WIDTH)
-        holder.setMinimumWidth(LEAST_WIDTH)
         hbox(None, holder, None, of=inside)
-        self._title, self._task = PlainLabel(title), PlainLabel(task)
+        self._title, self._task = PlainLabel(title), PlainLabel(task, wrap=True)
         make_bold(self._title, size=1.35)
-        self._task.setWordWrap(True)
-        column.addWidget(self._title)
-        column.addWidget(self._task)
-        column.addWidget(self._build_camera())
-        self.serial = named(QLineEdit(), "setup.serial", tr("Serial number"))
-        self.serial.setPlaceholderText(tr("for example A-001"))
-        self.elastomer = named(
-            QLineEdit(), "setup.elastomer", tr("Name or serial number of the elastomer"),
-            tr("Tells elastomers apart: the presses are counted for each. May be empty"),
-        )  # fmt: skip
-        self.elastomer.setMaxLength(REMARK_LENGTH)
-        self.elastomer.setPlaceholderText(tr("for example gel 7"))
-        for group in self.groups():
-            column.addWidget(group)
-        self.serial.textChanged.connect(self._check)
-        self.problem = named(PlainLabel(), "setup.problem", tr("What is missing"))
-        self.problem.setWordWrap(True)
-        column.addWidget(self.problem)
-        self.accept = named(QPushButton(), "setup.accept", tr("Start the calibration"))
-        self.accept.setMinimumHeight(38)
+        self.values = Form(values, "setup", at_once=True)
+        self.values.changed.connect(self._check)
+        self.serial = self.values.inputs["serial"]
+        sensor, balls = QGroupBox(tr("Sensor")), QGroupBox(tr("Balls"))
+        vbox(self.values, of=sensor)
+        self.ball = length_box("setup.ball", tr("Default ball diameter"), 0.1, 1000.0)
+        self.ball.setToolTip(tr("Diameter measured with a calliper; each press can have its own"))
+        QFormLayout(balls).addRow(tr("Default diameter"), self.ball)
+        self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
+        self.accept = named(
+            QPushButton(minimumHeight=38), "setup.accept", tr("Start the calibration")
+        )
         self.accept.clicked.connect(lambda: self.accepted.emit(self.stated()))
-        column.addWidget(self.accept)
-        column.addStretch(1)
+        vbox(
+            self._title, self._task, self._build_camera(), sensor, *groups,
+            balls, self.problem, self.accept, None, of=holder,
+        )  # fmt: skip
+        self.show_session(session, new=True)
 
     # Supplied by the form
 
-    def groups(self) -> tuple[QWidget, ...]:
-        """Create the groups of the form."""
+    def values_of(self, session: Any) -> Values:
+        """Return the values of a session, and show those that are not in the form."""
         raise NotImplementedError
 
-    def fill(self, session: Any) -> None:
-        """Show the values of a session."""
-        raise NotImplementedError
-
-    def stated(self) -> Any:
-        """Return the session with the values of the form."""
+    def session_of(self, values: Any) -> Any:
+        """Return the session shown last with other values."""
         raise NotImplementedError
 
     # The page
@@ -100,11 +112,21 @@ class FormPage(QScrollArea):
         """Show the values of a session; `new`: the session is not on disk yet."""
         self._title.setVisible(new)
         self._task.setVisible(new)
-        self.fill(session)
+        self.session = session
+        self.values.show_value(self.values_of(session))
+        self.ball.setValue(2.0 * (session.ball_default_radius_mm or USUAL_RADIUS_MM))
         self.accept.setText(tr("&Start the calibration") if new else tr("&Apply these values"))
         self._check()
         # The values of the fields, not of the session: the fields round them.
         self._known = self.stated()
+
+    def stated(self) -> Any:
+        """Return the session with the values of the form."""
+        values = self.values.value
+        serial, elastomer = values.serial.strip(), values.elastomer.strip()
+        session = self.session_of(replace(values, serial=serial))
+        radius = 0.5 * self.ball.value()
+        return replace(session, ball_default_radius_mm=radius, elastomer=elastomer)
 
     @property
     def edited(self) -> bool:
@@ -117,22 +139,20 @@ class FormPage(QScrollArea):
         show_meaning(self.problem, "fail")
 
     def _check(self) -> None:
-        missing = not self.serial.text().strip()
+        missing = not self.values.value.serial.strip()
         self.problem.setText(tr("Enter a serial number for the sensor.") if missing else "")
         self.accept.setEnabled(not missing)
 
     def _build_camera(self) -> QGroupBox:
         box = QGroupBox(tr("Camera"))
-        self.camera = named(PlainLabel(), "setup.camera", tr("Camera state"))
-        self.camera.setWordWrap(True)
+        self.camera = named(PlainLabel(wrap=True), "setup.camera", tr("Camera state"))
         self.camera_settings = named(
             QPushButton(tr("&Set and lock…")),
             "setup.camera.settings",
             tr("Set and lock the camera"),
             tr("Format, exposure, gain, white balance, focus, and a test of the image stability"),
         )
-        row = hbox((self.camera, 1), self.camera_settings, of=box)
-        self._camera_row = row
+        self._camera_row = hbox((self.camera, 1), self.camera_settings, of=box)
         self.show_camera(tr("No camera is selected."), "", settable=False)
         return box
 
@@ -149,9 +169,5 @@ class FormPage(QScrollArea):
 
 def length_box(name: str, accessible: str, low: float, high: float) -> QDoubleSpinBox:
     """Return an input for a length in mm."""
-    box = named(DoubleSpinBox(), name, tr("{what} in mm").format(what=accessible))
-    box.setDecimals(3)
-    box.setRange(low, high)
-    box.setSingleStep(0.1)
-    box.setSuffix(tr(" mm"))
-    return box
+    box = DoubleSpinBox(decimals=3, minimum=low, maximum=high, singleStep=0.1, suffix=tr(" mm"))
+    return named(box, name, tr("{what} in mm").format(what=accessible))

@@ -33,8 +33,7 @@ class ImageArea(QWidget):
         self.view = LiveView()
         self.maps = MapsView()
         self.strip = FilmStrip()
-        self.tabs = named(QTabWidget(), "calibrate.tabs", tr("Image or result"))
-        self.tabs.setDocumentMode(True)
+        self.tabs = named(QTabWidget(documentMode=True), "calibrate.tabs", tr("Image or result"))
         self.tabs.addTab(self.view, tr("Image"))
         self.tabs.addTab(self.maps, tr("Result"))
         # In the corner of the tabs, so that the image does not move.
@@ -50,8 +49,7 @@ class ImageArea(QWidget):
 
     def _build_lost(self) -> QWidget:
         self.lost = named(QWidget(), "calibrate.lost", tr("The camera is lost"))
-        self.why = named(PlainLabel(), "calibrate.lost.why", tr("Why no image arrives"))
-        self.why.setWordWrap(True)
+        self.why = named(PlainLabel(wrap=True), "calibrate.lost.why", tr("Why no image arrives"))
         show_meaning(self.why, "fail")
         make_bold(self.why)
         self.why.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)

@@ -50,8 +50,7 @@ class OutsideBar(QWidget):
         self.reload.clicked.connect(self._reload)
         self.overwrite.clicked.connect(self._overwrite)
         hbox((self.sentence, 1), self.reload, self.overwrite, of=self, margins=(8, 4, 8, 4))
-        self._timer = QTimer(self)
-        self._timer.setInterval(CHECK_MS)
+        self._timer = QTimer(self, interval=CHECK_MS)
         self._timer.timeout.connect(self.check)
         self.hide()
 

@@ -54,8 +54,7 @@ class QuestionView(QWidget):
                 ),
             ),
         ):
-            label = PlainLabel(text)
-            label.setWordWrap(True)
+            label = PlainLabel(text, wrap=True)
             label.setFixedWidth(WIDTH)
             column.addWidget(button)
             column.addWidget(label)

@@ -58,11 +58,9 @@ class ResultView(QWidget):
         named(self, "result", tr("Calibration"))
         self._rows: dict[Stage, _StageRow] = {}
         self._name = ""
-        self.headline = named(PlainLabel(), "result.headline", tr("Verdict"))
-        self.headline.setWordWrap(True)
+        self.headline = named(PlainLabel(wrap=True), "result.headline", tr("Verdict"))
         make_bold(self.headline, size=1.2)
-        scroll = named(QScrollArea(), "result.scroll", tr("All stages"))
-        scroll.setWidgetResizable(True)
+        scroll = named(QScrollArea(widgetResizable=True), "result.scroll", tr("All stages"))
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         inside = QWidget()
         rows = QVBoxLayout(inside)
@@ -203,13 +201,10 @@ class _StageRow(QWidget):
         self.more.setText(tr("Figures"))
         self.more.setCheckable(True)
         title = named(
-            QPushButton(step.title),
+            QPushButton(step.title, flat=True, minimumWidth=130, styleSheet="text-align: left;"),
             f"result.{step.key}",
             tr("Go to {title}").format(title=step.title),
         )
-        title.setFlat(True)
-        title.setMinimumWidth(130)
-        title.setStyleSheet("text-align: left;")
         title.clicked.connect(lambda: self.step_wanted.emit(step.key))
         row = hbox(self._sign, title, (self._word, 1), self.more)
         self.table = QualityTableWidget(

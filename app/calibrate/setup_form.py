@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 from PySide6.QtCore import QStandardPaths, QUrl
@@ -18,10 +18,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.form_page import FormPage, length_box
+from app.calibrate.form_page import USUAL_RADIUS_MM, FormPage, Values, length_box
+from app.widgets.fields import number
 from app.widgets.folding_row import FoldingRow
-from app.widgets.inputs import DoubleSpinBox, SpinBox
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.inputs import SpinBox
+from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
@@ -29,27 +30,64 @@ from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import DENSEST_INDEX, SensorData, Session
 from gelpolight_core.translation import tr
 
-DEFAULT_SENSOR = SensorData(
-    serial="",
-    led_height_mm=14.0,
-    elastomer_thickness_mm=14.0,
-    elastomer_refractive_index=1.41,
-    window_thickness_mm=0.0,
-    window_refractive_index=1.49,
-    working_diameter_mm=26.0,
-)
+MM = tr(" mm")
 
 
-def new_session(sensor: SensorData = DEFAULT_SENSOR) -> Session:
+@dataclass(frozen=True)
+class SensorValues(Values):
+    """What is known about a sensor that can be opened, as in :class:`SensorData`."""
+
+    led_height_mm: float = number(
+        14.0, tr("LED height"), 0.1, 500.0, MM, 3, step=0.1,
+        tip=tr(
+            "From the light-emitting points of the LEDs to the top surface; see the drawing of the "
+            "housing"
+        ),
+    )  # fmt: skip
+    elastomer_thickness_mm: float = number(
+        14.0, tr("Elastomer thickness"), 0.0, 500.0, MM, 3, step=0.1,
+        tip=tr("Layer of clear silicone below the membrane"),
+    )  # fmt: skip
+    elastomer_refractive_index: float = number(
+        1.41, tr("Elastomer refractive index"), 1.0, DENSEST_INDEX, decimals=4, step=0.01,
+        tip=tr("Silicone: about 1.41"),
+    )  # fmt: skip
+    window_thickness_mm: float = number(
+        0.0, tr("Window thickness"), 0.0, 100.0, MM, 3, step=0.1,
+        tip=tr("Rigid plate below the elastomer; 0 if there is none"),
+    )  # fmt: skip
+    window_refractive_index: float = number(
+        1.49, tr("Window refractive index"), 1.0, DENSEST_INDEX, decimals=4, step=0.01,
+        tip=tr("Acrylic: about 1.49"),
+    )  # fmt: skip
+    working_diameter_mm: float = number(
+        26.0, tr("Working diameter"), 0.5, 1000.0, MM, 3, step=0.1,
+        tip=tr("Diameter of the circle on the membrane in which the sensor measures"),
+    )  # fmt: skip
+
+    def sensor(self) -> SensorData:
+        """Return the data of the sensor."""
+        return SensorData(**{f.name: getattr(self, f.name) for f in fields(SensorData)})
+
+
+def new_session(sensor: SensorData | None = None) -> Session:
     """Return the default description of a new session; it has no folder yet."""
-    return Session(Path(), sensor, BoardSpec((9, 6), 3.0), BoardSpec((9, 6), 2.0), {}, 3.0)
+    boards = BoardSpec((9, 6), 3.0), BoardSpec((9, 6), 2.0)
+    return Session(Path(), sensor or SensorValues().sensor(), *boards, {}, USUAL_RADIUS_MM)
 
 
 class SetupForm(FormPage):
     """The form with the data of a sensor that can be opened."""
 
     def __init__(self) -> None:
-        self._session = new_session()
+        boards = QGroupBox(tr("Checkerboards (count inner corners)"))
+        form = QFormLayout(boards, rowWrapPolicy=QFormLayout.RowWrapPolicy.WrapLongRows)
+        self.lens_board = _BoardRow("setup.lens_board", tr("Lens views"))
+        self.top_board = _BoardRow("setup.top_board", tr("Top surface"))
+        for row in (self.lens_board, self.top_board):
+            row.print.clicked.connect(lambda _=False, row=row: self._save_board(row.board()))
+        form.addRow(tr("Lens views"), self.lens_board)
+        form.addRow(tr("Top surface"), self.top_board)
         super().__init__(
             tr("Sensor data"),
             tr(
@@ -57,111 +95,22 @@ class SetupForm(FormPage):
                 "parts. Every length here scales the result. You can change the values later. "
                 "Then click the button at the bottom."
             ),
+            new_session(),
+            SensorValues(),
+            boards,
         )
-        self.first = self.led_height
-        self.show_session(self._session, new=True)
+        self.first = self.values.inputs["led_height_mm"]
 
-    def groups(self) -> tuple[QWidget, ...]:
-        """Create the groups of the form."""
-        return self._build_sensor(), self._build_boards(), self._build_balls()
-
-    def _build_sensor(self) -> QGroupBox:
-        box = QGroupBox(tr("Sensor"))
-        form = QFormLayout(box)
-        self.led_height = length_box("setup.led_height", tr("LED height"), 0.1, 500.0)
-        self.thickness = length_box("setup.thickness", tr("Elastomer thickness"), 0.0, 500.0)
-        self.index = _plain("setup.index", tr("Refractive index of the elastomer"))
-        self.window_thickness = length_box("setup.window", tr("Window thickness"), 0.0, 100.0)
-        self.window_index = _plain("setup.window_index", tr("Refractive index of the window"))
-        self.diameter = length_box("setup.diameter", tr("Working diameter"), 0.5, 1000.0)
-        for label, widget, tip in (
-            (tr("Serial number"), self.serial, tr("Identifies the sensor in every file")),
-            (tr("Elastomer"), self.elastomer, self.elastomer.toolTip()),
-            (
-                tr("LED height"),
-                self.led_height,
-                tr(
-                    "From the light-emitting points of the LEDs to the top surface; see the "
-                    "drawing of the housing"
-                ),
-            ),
-            (
-                tr("Elastomer thickness"),
-                self.thickness,
-                tr("Layer of clear silicone below the membrane"),
-            ),
-            (tr("Elastomer refractive index"), self.index, tr("Silicone: about 1.41")),
-            (
-                tr("Window thickness"),
-                self.window_thickness,
-                tr("Rigid plate below the elastomer; 0 if there is none"),
-            ),
-            (tr("Window refractive index"), self.window_index, tr("Acrylic: about 1.49")),
-            (
-                tr("Working diameter"),
-                self.diameter,
-                tr("Diameter of the circle on the membrane in which the sensor measures"),
-            ),
-        ):
-            widget.setToolTip(plain_tip(tip))
-            form.addRow(label, widget)
-        return box
-
-    def _build_boards(self) -> QGroupBox:
-        box = QGroupBox(tr("Checkerboards (count inner corners)"))
-        form = QFormLayout(box)
-        form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
-        self.lens_board = _BoardRow("setup.lens_board", tr("Lens views"))
-        self.top_board = _BoardRow("setup.top_board", tr("Top surface"))
-        for row in (self.lens_board, self.top_board):
-            row.print.clicked.connect(lambda _=False, row=row: self._save_board(row.board()))
-        form.addRow(tr("Lens views"), self.lens_board)
-        form.addRow(tr("Top surface"), self.top_board)
-        return box
-
-    def _build_balls(self) -> QGroupBox:
-        box = QGroupBox(tr("Balls"))
-        form = QFormLayout(box)
-        self.ball = length_box("setup.ball", tr("Default ball diameter"), 0.1, 1000.0)
-        self.ball.setToolTip(tr("Diameter measured with a calliper; each press can have its own"))
-        form.addRow(tr("Default diameter"), self.ball)
-        return box
-
-    def fill(self, session: Session) -> None:
-        """Show the values of a session."""
-        self._session = session
-        sensor = session.sensor
-        self.serial.setText(sensor.serial)
-        self.elastomer.setText(session.elastomer)
-        self.led_height.setValue(sensor.led_height_mm)
-        self.thickness.setValue(sensor.elastomer_thickness_mm)
-        self.index.setValue(sensor.elastomer_refractive_index)
-        self.window_thickness.setValue(sensor.window_thickness_mm)
-        self.window_index.setValue(sensor.window_refractive_index)
-        self.diameter.setValue(sensor.working_diameter_mm)
+    def values_of(self, session: Session) -> SensorValues:
+        """Return the data of the sensor, and show the boards."""
         self.lens_board.show_board(session.checkerboard)
         self.top_board.show_board(session.top_pose)
-        self.ball.setValue(2.0 * (session.ball_default_radius_mm or 3.0))
+        return SensorValues(elastomer=session.elastomer, **asdict(session.sensor))
 
-    def stated(self) -> Session:
-        """Return the session with the values of the form."""
-        sensor = SensorData(
-            serial=self.serial.text().strip(),
-            led_height_mm=self.led_height.value(),
-            elastomer_thickness_mm=self.thickness.value(),
-            elastomer_refractive_index=self.index.value(),
-            window_thickness_mm=self.window_thickness.value(),
-            window_refractive_index=self.window_index.value(),
-            working_diameter_mm=self.diameter.value(),
-        )
-        return replace(
-            self._session,
-            sensor=sensor,
-            checkerboard=self.lens_board.board(),
-            top_pose=self.top_board.board(),
-            ball_default_radius_mm=0.5 * self.ball.value(),
-            elastomer=self.elastomer.text().strip(),
-        )
+    def session_of(self, values: SensorValues) -> Session:
+        """Return the session with this sensor and the boards."""
+        lens, top = self.lens_board.board(), self.top_board.board()
+        return replace(self.session, sensor=values.sensor(), checkerboard=lens, top_pose=top)
 
     def _save_board(self, board: BoardSpec) -> None:
         """Save a page with the board where the user chooses, and open it."""
@@ -239,11 +188,3 @@ def _beside(*widgets: QWidget) -> QWidget:
         row.addWidget(widget, int(isinstance(widget, QDoubleSpinBox)))
     row.addStretch()
     return part
-
-
-def _plain(name: str, accessible: str) -> QDoubleSpinBox:
-    box = named(DoubleSpinBox(), name, accessible)
-    box.setDecimals(4)
-    box.setRange(1.0, DENSEST_INDEX)
-    box.setSingleStep(0.01)
-    return box

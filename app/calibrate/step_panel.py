@@ -82,13 +82,12 @@ class StepPanel(QWidget):
         )
         self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.capture = named(
-            QPushButton(tr("&Capture")),
+            QPushButton(tr("&Capture"), minimumHeight=38),
             "calibrate.capture",
             tr("Capture"),
             tr("Capture this image"),
             "C",
         )
-        self.capture.setMinimumHeight(38)
         self.automatic = named(
             QCheckBox(tr("&Automatic: capture and continue")),
             "calibrate.automatic",
@@ -276,8 +275,7 @@ class _QuietBar(QScrollBar):
 
 def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
     """Return a vertical scroll area for a side panel, and the widget in it."""
-    scroll = named(QScrollArea(), name, accessible)
-    scroll.setWidgetResizable(True)
+    scroll = named(QScrollArea(widgetResizable=True), name, accessible)
     scroll.setFrameShape(QFrame.Shape.NoFrame)
     scroll.setVerticalScrollBar(_QuietBar())
     scroll.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
@@ -301,8 +299,7 @@ def lay_button(name: str) -> QPushButton:
 
 
 def _wrapped(*, lines: int = 0) -> PlainLabel:
-    label = PlainLabel()
-    label.setWordWrap(True)
+    label = PlainLabel(wrap=True)
     label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     if lines:

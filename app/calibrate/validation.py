@@ -17,7 +17,7 @@ from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from app.calibrate.trial import KnownObject, Trial, run_trial
-from app.calibrate.validation_panel import ValidationPanel
+from app.calibrate.validation_panel import SHAPES, ValidationPanel
 from app.context.calibration_status import put_into_use
 from app.services.jobs import Job, Jobs
 from app.sources.bench import Scene
@@ -53,7 +53,7 @@ class ValidationStep(StepPresenter):
 
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
-        self.form = form = ValidationPanel(self.step)
+        self.form = form = ValidationPanel(self.step, self.context.settings.limits)
         self._path: Path | None = None
         # Separate jobs: a press can be measured while the stages are recomputed.
         self.jobs = Jobs("validating", self)
@@ -62,9 +62,7 @@ class ValidationStep(StepPresenter):
         self._reconstructor: Reconstructor | None = None
         self._trial: tuple[Trial, str] | None = None
         self._asked = object()  # identifies the newest trial; results of older ones are dropped
-        limits, requests = self.context.settings.limits, self.context.requests
-        form.size_limit.setValue(limits.size_percent)
-        form.height_limit.setValue(limits.height_percent)
+        requests = self.context.requests
         form.lay.clicked.connect(self.lay_wanted)
         form.help.clicked.connect(lambda: requests.guide.emit("guide/validate", "Validate"))
         form.measure.clicked.connect(self.measure)
@@ -189,11 +187,10 @@ class ValidationStep(StepPresenter):
 
     def _measure(self, frames: list[NDArray[Any]]) -> None:
         self._drop_trial()
-        panel, asked = self.form, self._asked
-        known, path, present = panel.known(), self._path, self._reconstructor
+        stated, asked = self.form.asked, self._asked
+        known, path, present = stated.known, self._path, self._reconstructor
         if path is None:
             return
-        size_limit, height_limit = panel.size_limit.value(), panel.height_limit.value()
 
         def work(progress: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
             reconstructor = present or Reconstructor(read_calibration(path))
@@ -201,15 +198,13 @@ class ValidationStep(StepPresenter):
                 frames,
                 reconstructor,
                 known,
-                size_limit_percent=size_limit,
-                height_limit_percent=height_limit,
+                size_limit_percent=stated.size_limit,
+                height_limit_percent=stated.height_limit,
                 progress=progress,
             )
             return reconstructor, trial
 
-        text = tr("{shape}, {size:g} mm").format(
-            shape=panel.shape.currentText(), size=known.size_mm
-        )
+        text = tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm)
 
         def done(found: tuple[Reconstructor, Trial]) -> None:
             if self._asked is asked:

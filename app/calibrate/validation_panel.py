@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from PySide6.QtWidgets import (
-    QCheckBox,
-    QDoubleSpinBox,
-    QFormLayout,
     QProgressBar,
     QPushButton,
     QWidget,
@@ -15,19 +14,51 @@ from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.step_data import Step
 from app.calibrate.step_panel import WIDTH, help_button, lay_button, side_scroll
 from app.calibrate.trial import KnownObject, Trial
-from app.widgets.inputs import ComboBox, DoubleSpinBox
+from app.services.preferences import Limits
+from app.widgets.fields import choice, number, switch
+from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
+SHAPES = {
+    "cylinder": tr("Cylinder, flat end"),
+    "cuboid": tr("Cuboid, flat end"),
+    "ball": tr("Ball"),
+}
+MM, PERCENT = tr(" mm"), tr(" %")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The pressed object, and the largest errors with which it validates the calibration."""
+
+    shape: str = choice("cylinder", tr("Shape"), SHAPES)
+    size_mm: float = number(5.0, tr("True diameter or side"), 0.01, 500.0, MM, 3, step=0.1)
+    height_known: bool = switch(False, "", tr("Depth is known"))
+    height_mm: float = number(
+        1.0, tr("True depth of the press"), 0.01, 500.0, MM, 3, step=0.1,
+        when=lambda asked: asked.height_known,
+    )  # fmt: skip
+    size_limit: float = number(5.0, tr("Largest size error"), 0.1, 100.0, PERCENT, 1)
+    height_limit: float = number(8.0, tr("Largest depth error"), 0.1, 100.0, PERCENT, 1)
+
+    @property
+    def known(self) -> KnownObject:
+        """The object."""
+        height = self.height_mm if self.height_known else None
+        return KnownObject(self.shape, self.size_mm, height)
+
 
 class ValidationPanel(QWidget):
     """Asks for the known object, and shows the result of the trial."""
 
-    def __init__(self, step: Step, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, step: Step, limits: Limits) -> None:
+        super().__init__()
+        asked = Asked(size_limit=limits.size_percent, height_limit=limits.height_percent)
+        self.form = Form(asked, "validation", at_once=True)
         named(self, "validation", tr("Validation"))
         self.setFixedWidth(WIDTH)
         self._has_calibration = self._has_camera = False
@@ -39,19 +70,16 @@ class ValidationPanel(QWidget):
         head = hbox((title, 1), self.help)
         assembly = AssemblyDrawing()
         assembly.show_assembly(step.assembly)
-        task = PlainLabel(step.task)
-        task.setWordWrap(True)
+        task = PlainLabel(step.task, wrap=True)
         self.calibration = named(
-            PlainLabel(), "validation.calibration", tr("Calibration to validate")
+            PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
         )
-        self.calibration.setWordWrap(True)
         self.lay = lay_button("validation.lay")
         self.measure = named(
-            QPushButton(tr("&Measure the press")),
+            QPushButton(tr("&Measure the press"), minimumHeight=38),
             "validation.measure",
             tr("Measure the pressed object"),
         )
-        self.measure.setMinimumHeight(38)
         self.import_press = named(
             QPushButton(tr("&Import…")),
             "validation.import",
@@ -67,16 +95,13 @@ class ValidationPanel(QWidget):
         keep.setRetainSizeWhenHidden(True)
         self.progress.setSizePolicy(keep)
         self.progress.hide()
-        self.result = named(MarkupLabel(), "validation.result", tr("Result"))
-        self.result.setWordWrap(True)
+        self.result = named(MarkupLabel(wrap=True), "validation.result", tr("Result"))
         self.keep = named(
-            QPushButton(tr("&Record this validation")),
+            QPushButton(tr("&Record this validation"), minimumHeight=34),
             "validation.keep",
             tr("Record this validation"),
         )
-        self.keep.setMinimumHeight(34)
-        self.verdict = named(PlainLabel(), "validation.verdict", tr("Validated or not"))
-        self.verdict.setWordWrap(True)
+        self.verdict = named(PlainLabel(wrap=True), "validation.verdict", tr("Validated or not"))
         make_bold(self.verdict)
         self.use = named(
             QPushButton(tr("&Use it now")),
@@ -89,7 +114,7 @@ class ValidationPanel(QWidget):
             assembly,
             task,
             self.calibration,
-            self._build_form(),
+            self.form,
             self.lay,
             row,
             self.blocked,
@@ -104,45 +129,21 @@ class ValidationPanel(QWidget):
         )
         self.show_trial(None)
 
-    def _build_form(self) -> QFormLayout:
-        form = QFormLayout()
-        self.shape = named(ComboBox(), "validation.shape", tr("Shape"))
-        for name, text in (
-            ("cylinder", tr("Cylinder, flat end")),
-            ("cuboid", tr("Cuboid, flat end")),
-            ("ball", tr("Ball")),
-        ):
-            self.shape.addItem(text, name)
-        self.size = _length("validation.size", tr("True diameter or side"), 5.0)
-        self.height_known = named(
-            QCheckBox(tr("Depth is known")),
-            "validation.height_known",
-            tr("The depth of the press is known"),
-        )
-        self.height = _length("validation.height", tr("True depth of the press"), 1.0)
-        self.height.setEnabled(False)
-        self.height_known.toggled.connect(self.height.setEnabled)
-        self.size_limit = _percent("validation.size_limit", tr("Size limit"), 5.0)
-        self.height_limit = _percent("validation.height_limit", tr("Depth limit"), 8.0)
-        form.addRow(tr("Shape"), self.shape)
-        form.addRow(tr("True diameter or side"), self.size)
-        form.addRow(self.height_known, self.height)
-        form.addRow(tr("Largest size error"), self.size_limit)
-        form.addRow(tr("Largest depth error"), self.height_limit)
-        return form
-
-    def known(self) -> KnownObject:
-        """Return the object as entered."""
-        height = self.height.value() if self.height_known.isChecked() else None
-        return KnownObject(self.shape.currentData(), self.size.value(), height)
+    @property
+    def asked(self) -> Asked:
+        """The object and the limits as entered."""
+        return self.form.value
 
     def show_known(self, known: KnownObject) -> None:
         """Fill in an object, for example the one on the virtual bench."""
-        self.shape.setCurrentIndex(max(self.shape.findData(known.shape), 0))
-        self.size.setValue(known.size_mm)
-        self.height_known.setChecked(known.height_mm is not None)
-        if known.height_mm is not None:
-            self.height.setValue(known.height_mm)
+        shape = known.shape if known.shape in SHAPES else next(iter(SHAPES))
+        height = self.asked.height_mm if known.height_mm is None else known.height_mm
+        self.form.change(
+            shape=shape,
+            size_mm=known.size_mm,
+            height_known=known.height_mm is not None,
+            height_mm=height,
+        )
 
     def show_calibration(self, name: str, *, present: bool) -> None:
         """Show which calibration is validated.
@@ -233,22 +234,3 @@ class ValidationPanel(QWidget):
         self.use.setVisible(may_use)
         self.verdict.setText(text)
         show_meaning(self.verdict, "pass" if passed else "fail")
-
-
-def _length(name: str, accessible: str, value: float) -> QDoubleSpinBox:
-    box = named(DoubleSpinBox(), name, tr("{what} in mm").format(what=accessible))
-    box.setDecimals(3)
-    box.setRange(0.01, 500.0)
-    box.setSingleStep(0.1)
-    box.setSuffix(tr(" mm"))
-    box.setValue(value)
-    return box
-
-
-def _percent(name: str, accessible: str, value: float) -> QDoubleSpinBox:
-    box = named(DoubleSpinBox(), name, tr("{what} in percent").format(what=accessible))
-    box.setDecimals(1)
-    box.setRange(0.1, 100.0)
-    box.setSuffix(tr(" %"))
-    box.setValue(value)
-    return box

@@ -58,8 +58,7 @@ class CameraPanel(QWidget):
         self._test: SteadinessTest | None = None
         self._broken_off = False
         self._result, self._result_of = QualityTable(), tuple[Setting, ...]()
-        self._tick = QTimer(self)
-        self._tick.setInterval(UPDATE_MS)
+        self._tick = QTimer(self, interval=UPDATE_MS)
         self._tick.timeout.connect(self._update)
         self.formats, self.controls = FormatRows(), ControlRows()
         hbox((self._build_settings(), 1), (self._build_verdicts(), 1), of=self)
@@ -84,8 +83,7 @@ class CameraPanel(QWidget):
         return area
 
     def _build_verdicts(self) -> QWidget:
-        self.state = named(PlainLabel(), "camera.state", tr("State of the camera"))
-        self.state.setWordWrap(True)
+        self.state = named(PlainLabel(wrap=True), "camera.state", tr("State of the camera"))
         self.state.setMinimumHeight(3 * self.state.fontMetrics().height())
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.image = named(PlainLabel(), "camera.image", tr("Camera image"))

@@ -108,8 +108,7 @@ class RecordingsDialog(QDialog):
         self.image = named(PlainLabel(parent=self), "recordings.image", tr("First image"))
         self.image.setFixedSize(PREVIEW)
         self.image.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.text = named(PlainLabel(parent=self), "recordings.text", tr("Description"))
-        self.text.setWordWrap(True)
+        self.text = named(PlainLabel(parent=self, wrap=True), "recordings.text", tr("Description"))
         self.text.setFixedWidth(PREVIEW.width())
         if not recordings:
             self.text.setText(tr("There are no recordings yet. Inspect has a Record button."))

@@ -41,8 +41,7 @@ class Palette(QWidget):
 
     def _make_button(self, kind: Kind, owner: QWidget) -> QToolButton:
         tip = f"{kind.label} ({kind.key})"
-        button = named(QToolButton(), f"measure.tool.{kind.name}", kind.label, tip)
-        button.setAutoRaise(True)
+        button = named(QToolButton(autoRaise=True), f"measure.tool.{kind.name}", kind.label, tip)
         button.setIconSize(QSize(SIDE, SIDE))
         button.setIcon(icon(f"tool-{kind.name}"))
         button.setCheckable(True)

@@ -80,11 +80,10 @@ class PressViewFrame(QMainWindow):
             PlainLabel(), "measure.validated", tr("Validation state of the calibration")
         )
         self.auto = named(
-            QCheckBox(tr("Freeze when steady")),
+            QCheckBox(tr("Freeze when steady"), checked=True),
             "measure.auto",
             tr("Freeze the image and detect the object when a press is steady"),
         )
-        self.auto.setChecked(True)
         self._build()
 
     def _build(self) -> None:

@@ -45,8 +45,7 @@ class Fig13(QWidget):
         super().__init__()
         named(self, "protocol.figure", tr("Errors by size and height, as in the paper's Fig. 13"))
         self.legend = named(MarkupLabel(), "protocol.legend", tr("Legend"))
-        self._grid = QGridLayout()
-        self._grid.setSpacing(6)
+        self._grid = QGridLayout(spacing=6)
         vbox(self.legend, (self._grid, 1), of=self, margins=0, spacing=4)
         self._plots: list[pg.PlotWidget] = []
         self._evaluation: Evaluation | None = None

@@ -243,6 +243,5 @@ def _sentence(row: Judged) -> str:
 
 
 def _button(name: str, text: str, accessible: str, tip: str = "") -> QPushButton:
-    button = named(QPushButton(text), f"measure.truth.{name}", accessible, tip)
-    button.setAutoDefault(False)
+    button = named(QPushButton(text, autoDefault=False), f"measure.truth.{name}", accessible, tip)
     return button

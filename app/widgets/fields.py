@@ -35,6 +35,12 @@ def switch(
     return field(default=default, metadata=shown)
 
 
+def text(default: str, label: str, tip: str = "", *, example: str = "", length: int = 200) -> Any:
+    """Return a field with a line of text. The example is shown while it is empty."""
+    shown = {"label": label, "tip": tip, "example": example, "length": length}
+    return field(default=default, metadata=shown)
+
+
 def folder(default: str, label: str, tip: str = "") -> Any:
     """Return a field with the absolute path of a folder."""
     return field(default=default, metadata={"label": label, "tip": tip})

@@ -28,6 +28,8 @@ class Form(QWidget, Generic[V]):
         The first value.
     name : str
         Start of the object names of the inputs. The name of the field follows.
+    at_once : bool, optional
+        Whether a number counts while it is typed.
 
     Attributes
     ----------
@@ -46,8 +48,9 @@ class Form(QWidget, Generic[V]):
 
     changed = Signal(str, object)
 
-    def __init__(self, value: V, name: str) -> None:
+    def __init__(self, value: V, name: str, *, at_once: bool = False) -> None:
         super().__init__()
+        self._at_once = at_once
         self.inputs: dict[str, QWidget] = {}
         self._show: dict[str, Callable[[Any], object]] = {}
         self._when: dict[str, When] = {}
@@ -115,7 +118,7 @@ class Form(QWidget, Generic[V]):
             spin.setSingleStep(meta["step"])
             spin.setSuffix(meta["unit"])
             spin.setSpecialValueText(meta["none"])
-            spin.setKeyboardTracking(False)
+            spin.setKeyboardTracking(self._at_once)
             spin.valueChanged.connect(change)
             self._show[name] = spin.setValue
             return spin
@@ -124,6 +127,11 @@ class Form(QWidget, Generic[V]):
             check.toggled.connect(change)
             self._show[name] = check.setChecked
             return check
+        if "example" in meta:
+            words = QLineEdit(placeholderText=meta["example"], maxLength=meta["length"])
+            words.textChanged.connect(change)
+            self._show[name] = words.setText
+            return words
         return self._folder(name, change)
 
     def _folder(self, name: str, change: Callable[[str], None]) -> QLineEdit:

@@ -66,16 +66,14 @@ class LivePanel(QWidget):
         for name in presses:
             self.press.addItem(PurePath(name).name, name)
         self.press.currentIndexChanged.connect(self._ask)
-        self._words = named(PlainLabel(), "lut.effect", tr("Effect on the press"))
-        self._words.setWordWrap(True)
+        self._words = named(PlainLabel(wrap=True), "lut.effect", tr("Effect on the press"))
         self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._words.setMinimumHeight(5 * self.fontMetrics().lineSpacing())
         self._profile = named(_bare_plot(), "lut.profile", tr("Depth through the ball's centre"))
         self._residual = named(_bare_plot(), "lut.residual", tr("Depth minus ball"))
         self._lines = self._make_lines()
-        title = PlainLabel(tr("Effect of the edit on a press"))
+        title = PlainLabel(tr("Effect of the edit on a press"), wrap=True)
         title.setBuddy(self.press)
-        title.setWordWrap(True)
         vbox(
             title,
             self.press,

@@ -383,7 +383,7 @@ def test_a_press_image_is_validated_with_its_truth_file(
     assert not step.form.measure.isEnabled()  # there is no camera
     step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
     technician.until(lambda: "Diameter" in step.form.result.text())
-    known = step.form.known()
+    known = step.form.asked.known
     assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"

@@ -22,12 +22,12 @@ def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(
     wizard.go_to("lens")
     assert "set-up" not in caplog.text
     wizard.go_to("setup")
-    wizard.at("setup").form.led_height.setValue(before + 0.5)
+    wizard.at("setup").form.values.inputs["led_height_mm"].setValue(before + 0.5)
     wizard.go_to("lens")
     assert "set-up changes are not applied yet" in caplog.text
     assert read_session(technician.session).sensor.led_height_mm == before
     wizard.go_to("setup")
-    assert wizard.at("setup").form.led_height.value() == before + 0.5
+    assert wizard.at("setup").form.values.inputs["led_height_mm"].value() == before + 0.5
     wizard.at("setup").form.accept.click()
     assert read_session(technician.session).sensor.led_height_mm == before + 0.5
     assert not wizard.at("setup").form.edited
@@ -41,7 +41,7 @@ def test_unapplied_changes_give_a_warning_when_the_session_is_closed(
     technician.begin(computed_project(), "setup")
     folder, form = technician.session, technician.wizard.at("setup").form
     before = read_session(folder)
-    form.led_height.setValue(form.led_height.value() + 0.5)
+    form.values.inputs["led_height_mm"].setValue(before.sensor.led_height_mm + 0.5)
     technician.page.begin()
     assert technician.page.wizard is None
     assert "set-up changes were not applied" in caplog.text

@@ -34,7 +34,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     technician.click("question.closed")
     form = page.closed_form
     qtbot.keyClicks(form.serial, "closed-1")
-    form.scale.setValue(MM_PER_PX)
+    form.values.inputs["scale"].setValue(MM_PER_PX)
     technician.click("setup.accept")
     wizard = technician.wizard
     assert [one.step.key for one in wizard.presenters] == [
@@ -130,14 +130,13 @@ def test_a_preset_fills_in_the_scale_and_its_uncertainty(qtbot: QtBot) -> None:
     form = ClosedForm()
     qtbot.addWidget(form)
     digit = preset_named("digit")
-    form.kind.setCurrentIndex(form.kind.findData("digit"))
-    form.kind.activated.emit(form.kind.currentIndex())
+    form.values.change(preset="digit")
     stated = form.stated()
     assert stated.mm_per_px == pytest.approx(digit.mm_per_px)
     assert stated.mm_per_px_sd == pytest.approx(digit.mm_per_px_sd, rel=0.02)
     assert str(digit.image_px[0]) in form.facts.text()
     form.show_session(stated, new=False)
-    assert form.kind.currentData() == "digit"
+    assert form.values.value.preset == "digit"
     assert not form.edited
 
 
