@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -47,14 +47,8 @@ class DesignDialog(WorkDialog):
 
     def run(self) -> None:
         """Check the design in the background."""
-        if self.jobs.busy:
-            return
-        design = self._design
-
-        def work(_progress: Callable[[float], None]) -> DesignCheckResult:
-            return check_design(design)
-
-        self.submit(self.windowTitle(), work)
+        if not self.jobs.busy:
+            self.submit(self.windowTitle(), lambda _progress: check_design(self._design))
 
     def show_result(self, result: DesignCheckResult) -> None:
         """Show the figures, and the verdict of the design."""
@@ -70,10 +64,9 @@ class DesignDialog(WorkDialog):
 
 
 def _rows(result: DesignCheckResult) -> list[tuple[str, ...]]:
-    """Return one row for each figure."""
-    rows = []
-    for figure in result.quality.figures:
-        advice = "" if figure.verdict is Verdict.PASS else figure.advice
-        texts = value_text(figure), limit_text(figure), verdict_word(figure.verdict)
-        rows.append((figure.label, *texts, advice))
-    return rows
+    """Return one row for each figure; advice only where there is something to do."""
+    return [
+        (f.label, value_text(f), limit_text(f), verdict_word(f.verdict),
+         "" if f.verdict is Verdict.PASS else f.advice)
+        for f in result.quality.figures
+    ]  # fmt: skip

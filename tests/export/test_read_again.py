@@ -83,20 +83,17 @@ def test_numbers_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
             read_npz(path)
 
 
-@pytest.mark.parametrize("declared", [10**9, 10**11])
-def test_a_small_file_cannot_ask_for_large_memory(declared: int, tmp_path: Path) -> None:
+def test_a_small_file_cannot_ask_for_large_memory(tmp_path: Path) -> None:
     path = _written(_ramp(), tmp_path)
-    header = str({"descr": "<f4", "fortran_order": False, "shape": (declared // 4,)})
+    header = str({"descr": "<f4", "fortran_order": False, "shape": (10**10,)})
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     members["depth_mm.npy"] = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little")
     members["depth_mm.npy"] += header.encode()
-    zeros = zipfile.ZipInfo("normals.npy")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():
             archive.writestr(name, data)
-        with archive.open(zeros, "w", force_zip64=True) as stream:
-            stream.write(bytes(200_000_000))
+        archive.writestr("normals.npy", bytes(200_000_000))
     tracemalloc.start()
     try:
         with pytest.raises(InputError):

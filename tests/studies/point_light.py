@@ -97,32 +97,28 @@ def rows(
         leds = tuple(replace(led, height_mm=share * led.height_mm) for led in plain.leds)
         lit = replace(plain, leds=leds)
         places = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in leds])
-        name = f"point, LEDs at {-places[:, 2].mean():.1f} mm"
-        yield _row(name, VirtualSensor(lit, lamps=lamps_of(lit)), lamps_of(lit), places, surface)
+        yield _row(
+            f"point, {-places[:, 2].mean():.1f} mm", lit, lamps_of(lit), places, surface
+        )
     for elevation in elevations_deg:
         lamps = tuple(parallel_light(azimuth, elevation) for azimuth in AZIMUTHS_DEG)
         azimuth, rise = np.radians(AZIMUTHS_DEG), np.radians(elevation)
-        towards = np.column_stack(
-            [
-                np.cos(rise) * np.cos(azimuth),
-                np.cos(rise) * np.sin(azimuth),
-                np.full(3, -np.sin(rise)),
-            ]
-        )
+        flat = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+        towards = np.column_stack([np.cos(rise) * flat, np.full(3, -np.sin(rise))])
         # The near-light model has its LEDs in these directions, at the design's height.
         height = np.mean([led.height_mm for led in plain.leds])
         places = towards * (height / -towards[:, 2:])
-        name = f"directional, {elevation:.0f} degrees"
-        yield _row(name, VirtualSensor(plain, lamps=lamps), lamps, places, surface)
+        yield _row(f"directional, {elevation:.0f} degrees", plain, lamps, places, surface)
 
 
 def _row(
     name: str,
-    sensor: VirtualSensor,
+    design: SensorDesign,
     lamps: tuple[PointLamp, ...],
     leds_mm: np.ndarray,
     surface: PressedSurface,
 ) -> Row:
+    sensor = VirtualSensor(design, lamps=lamps)
     _, dark, two_dark = shadow_areas(surface, lamps)
     pressed = (surface.depth_mm > TOUCHED_MM).sum() * surface.pitch_mm**2
     far_mm = leds_mm * (FAR_MM / np.linalg.norm(leds_mm, axis=1, keepdims=True))
