@@ -100,7 +100,7 @@ MOST = {
     "tests/session": 434,
     "tests/simulation": 694,
     "tests/strangers": 1020,
-    "tests/studies": 1308,
+    "tests/studies": 1306,
 }
 
 

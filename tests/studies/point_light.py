@@ -97,9 +97,7 @@ def rows(
         leds = tuple(replace(led, height_mm=share * led.height_mm) for led in plain.leds)
         lit = replace(plain, leds=leds)
         places = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in leds])
-        yield _row(
-            f"point, {-places[:, 2].mean():.1f} mm", lit, lamps_of(lit), places, surface
-        )
+        yield _row(f"point, {-places[:, 2].mean():.1f} mm", lit, lamps_of(lit), places, surface)
     for elevation in elevations_deg:
         lamps = tuple(parallel_light(azimuth, elevation) for azimuth in AZIMUTHS_DEG)
         azimuth, rise = np.radians(AZIMUTHS_DEG), np.radians(elevation)
