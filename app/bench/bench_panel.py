@@ -151,13 +151,17 @@ class BenchPanel(QWidget):
         self._pose = named(SpinBox(), "bench.pose", tr("Pose of the checkerboard"))
         self._pose.valueChanged.connect(lambda number: self._show_pose(number - 1))
         back = tool_button(
-            "bench.previous_pose", tr("Back"), lambda: self._step_pose(-1),
+            "bench.previous_pose",
+            tr("Back"),
+            lambda: self._step_pose(-1),
             accessible=tr("Previous pose of the checkerboard"),
-        )  # fmt: skip
+        )
         on = tool_button(
-            "bench.next_pose", tr("Next"), lambda: self._step_pose(1),
+            "bench.next_pose",
+            tr("Next"),
+            lambda: self._step_pose(1),
             accessible=tr("Next pose of the checkerboard"),
-        )  # fmt: skip
+        )
         return _row(self._pose, back, on)
 
     def _number(self, key: str, accessible: str, unit: str, step: float) -> QDoubleSpinBox:

@@ -29,12 +29,18 @@ class ClosedValues(Values):
         {k: p.name for k, p in PRESETS.items()} | {OTHER: tr("Other")},
     )
     scale: float = number(
-        0.06, tr("Size of a pixel"), 0.0001, 10.0, tr(" mm"), 5, step=0.0001,
+        0.06,
+        tr("Size of a pixel"),
+        0.0001,
+        10.0,
+        tr(" mm"),
+        5,
+        step=0.0001,
         tip=tr(
             "A scale that is 1 % wrong makes every size 1 % wrong. Measure it with an object of "
             "known size"
         ),
-    )  # fmt: skip
+    )
     scale_sd: float = number(1.0, tr("Uncertainty"), 0.0, 50.0, tr(" %"), 1)
 
 

@@ -34,14 +34,18 @@ class Values:
     """What is known about every sensor."""
 
     serial: str = text(
-        "", tr("Serial number"), tr("Identifies the sensor in every file"),
+        "",
+        tr("Serial number"),
+        tr("Identifies the sensor in every file"),
         example=tr("for example A-001"),
-    )  # fmt: skip
+    )
     elastomer: str = text(
-        "", tr("Elastomer"),
+        "",
+        tr("Elastomer"),
         tr("Tells elastomers apart: the presses are counted for each. May be empty"),
-        example=tr("for example gel 7"), length=REMARK_LENGTH,
-    )  # fmt: skip
+        example=tr("for example gel 7"),
+        length=REMARK_LENGTH,
+    )
 
 
 class FormPage(QScrollArea):
@@ -91,9 +95,17 @@ class FormPage(QScrollArea):
         )
         self.accept.clicked.connect(lambda: self.accepted.emit(self.stated()))
         vbox(
-            self._title, self._task, self._build_camera(), sensor, *groups,
-            balls, self.problem, self.accept, None, of=holder,
-        )  # fmt: skip
+            self._title,
+            self._task,
+            self._build_camera(),
+            sensor,
+            *groups,
+            balls,
+            self.problem,
+            self.accept,
+            None,
+            of=holder,
+        )
         self.show_session(session, new=True)
 
     # Supplied by the form

@@ -38,32 +38,66 @@ class SensorValues(Values):
     """What is known about a sensor that can be opened, as in :class:`SensorData`."""
 
     led_height_mm: float = number(
-        14.0, tr("LED height"), 0.1, 500.0, MM, 3, step=0.1,
+        14.0,
+        tr("LED height"),
+        0.1,
+        500.0,
+        MM,
+        3,
+        step=0.1,
         tip=tr(
             "From the light-emitting points of the LEDs to the top surface; see the drawing of the "
             "housing"
         ),
-    )  # fmt: skip
+    )
     elastomer_thickness_mm: float = number(
-        14.0, tr("Elastomer thickness"), 0.0, 500.0, MM, 3, step=0.1,
+        14.0,
+        tr("Elastomer thickness"),
+        0.0,
+        500.0,
+        MM,
+        3,
+        step=0.1,
         tip=tr("Layer of clear silicone below the membrane"),
-    )  # fmt: skip
+    )
     elastomer_refractive_index: float = number(
-        1.41, tr("Elastomer refractive index"), 1.0, DENSEST_INDEX, decimals=4, step=0.01,
+        1.41,
+        tr("Elastomer refractive index"),
+        1.0,
+        DENSEST_INDEX,
+        decimals=4,
+        step=0.01,
         tip=tr("Silicone: about 1.41"),
-    )  # fmt: skip
+    )
     window_thickness_mm: float = number(
-        0.0, tr("Window thickness"), 0.0, 100.0, MM, 3, step=0.1,
+        0.0,
+        tr("Window thickness"),
+        0.0,
+        100.0,
+        MM,
+        3,
+        step=0.1,
         tip=tr("Rigid plate below the elastomer; 0 if there is none"),
-    )  # fmt: skip
+    )
     window_refractive_index: float = number(
-        1.49, tr("Window refractive index"), 1.0, DENSEST_INDEX, decimals=4, step=0.01,
+        1.49,
+        tr("Window refractive index"),
+        1.0,
+        DENSEST_INDEX,
+        decimals=4,
+        step=0.01,
         tip=tr("Acrylic: about 1.49"),
-    )  # fmt: skip
+    )
     working_diameter_mm: float = number(
-        26.0, tr("Working diameter"), 0.5, 1000.0, MM, 3, step=0.1,
+        26.0,
+        tr("Working diameter"),
+        0.5,
+        1000.0,
+        MM,
+        3,
+        step=0.1,
         tip=tr("Diameter of the circle on the membrane in which the sensor measures"),
-    )  # fmt: skip
+    )
 
     def sensor(self) -> SensorData:
         """Return the data of the sensor."""

@@ -39,9 +39,15 @@ class Asked:
     size_mm: float = number(5.0, tr("True diameter or side"), 0.01, 500.0, MM, 3, step=0.1)
     height_known: bool = switch(False, "", tr("Depth is known"))
     height_mm: float = number(
-        1.0, tr("True depth of the press"), 0.01, 500.0, MM, 3, step=0.1,
+        1.0,
+        tr("True depth of the press"),
+        0.01,
+        500.0,
+        MM,
+        3,
+        step=0.1,
         when=lambda asked: asked.height_known,
-    )  # fmt: skip
+    )
     size_limit: float = number(5.0, tr("Largest size error"), 0.1, 100.0, PERCENT, 1)
     height_limit: float = number(8.0, tr("Largest depth error"), 0.1, 100.0, PERCENT, 1)
 

@@ -104,12 +104,20 @@ def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
     """Return the scale and the balls of a closed sensor's calibration."""
     model = c.in_place
     return [
-        (tr("scale"), tr("{s:.5f} mm per px, sd {sd:.2g} %").format(
-            s=model.grid.mm_per_px, sd=100.0 * model.scale_sd)),
-        (tr("balls"), tr("{n}, slopes up to {deg:.1f} deg").format(
-            n=len(c.balls), deg=np.degrees(np.arctan(model.steepest)))),
+        (
+            tr("scale"),
+            tr("{s:.5f} mm per px, sd {sd:.2g} %").format(
+                s=model.grid.mm_per_px, sd=100.0 * model.scale_sd
+            ),
+        ),
+        (
+            tr("balls"),
+            tr("{n}, slopes up to {deg:.1f} deg").format(
+                n=len(c.balls), deg=np.degrees(np.arctan(model.steepest))
+            ),
+        ),
         (tr("not known"), ", ".join(UNKNOWN)),
-    ]  # fmt: skip
+    ]
 
 
 def _open_rows(c: Calibration) -> list[tuple[str, str]]:

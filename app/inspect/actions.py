@@ -109,9 +109,12 @@ class FileActions(QObject):
 
     def _ask_reference(self) -> None:
         path = ask_open(
-            self._owner, self._context.settings, "height_map", tr("Load a reference"),
+            self._owner,
+            self._context.settings,
+            "height_map",
+            tr("Load a reference"),
             tr("Height map (*.npz)"),
-        )  # fmt: skip
+        )
         if path is not None:
             self.load_reference(path)
 

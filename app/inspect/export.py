@@ -167,9 +167,12 @@ class ExportDialog(Dialog):
     def __init__(self, folder: Path, *, count: int = 0, at: int = 0, parent: QWidget) -> None:
         kinds = QDialogButtonBox.StandardButton
         super().__init__(
-            parent, "inspect.export.dialog", tr("Export the depth"), kinds.Save | kinds.Cancel,
+            parent,
+            "inspect.export.dialog",
+            tr("Export the depth"),
+            kinds.Save | kinds.Cancel,
             once=True,
-        )  # fmt: skip
+        )
         self._beside = folder.parent
         self._formats: dict[str, QCheckBox] = {}
         for name, words in format_words().items():

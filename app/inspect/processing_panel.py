@@ -47,10 +47,12 @@ class ProcessingPanel(QWidget):
         )
         self._subtract.toggled.connect(self._on_changed)
         hold = push_button(
-            "inspect.processing.hold", tr("Hold"), self.hold_wanted.emit,
+            "inspect.processing.hold",
+            tr("Hold"),
+            self.hold_wanted.emit,
             accessible=tr("Hold as the reference"),
             tip=tr("Use the current height map, as reconstructed, as the reference"),
-        )  # fmt: skip
+        )
         self.form.rows.addRow(tr("Reference"), hbox((self._subtract, 1), hold))
         self._state = named(
             PlainLabel(tr("Applies to a frozen image. Press Space to freeze it."), wrap=True),
@@ -59,9 +61,12 @@ class ProcessingPanel(QWidget):
         )
         show_meaning(self._state, "muted")
         self._reset = push_button(
-            "inspect.processing.reset", tr("Reset"), self.reset,
-            accessible=tr("Reset the processing"), tip=tr("Show the height map as reconstructed"),
-        )  # fmt: skip
+            "inspect.processing.reset",
+            tr("Reset"),
+            self.reset,
+            accessible=tr("Reset the processing"),
+            tip=tr("Show the height map as reconstructed"),
+        )
         vbox(self.form, self._state, self._reset, None, of=self)
         self.show_reference(None)
 
@@ -121,9 +126,11 @@ class ProcessedLine(QWidget):
         self._text = named(PlainLabel(), "inspect.processed.steps", tr("Steps of the processing"))
         self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         reset = push_button(
-            "inspect.processed.reset", tr("Reset"), self.reset_wanted.emit,
+            "inspect.processed.reset",
+            tr("Reset"),
+            self.reset_wanted.emit,
             accessible=tr("Reset the processing"),
-        )  # fmt: skip
+        )
         hbox((self._text, 1), reset, of=self, margins=(10, 2, 10, 2))
         self.hide()
 

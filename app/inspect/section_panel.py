@@ -52,9 +52,12 @@ class SectionPanel(QWidget):
         self.form.changed.connect(self.changed)
         self._plot.level_dragged.connect(lambda depth_mm: self.form.change(level_mm=depth_mm))
         save = push_button(
-            "inspect.section.save", tr("Save…"), self.save_wanted.emit,
-            accessible=tr("Save the profiles"), tip=tr("Save all lines as a table (CSV)"),
-        )  # fmt: skip
+            "inspect.section.save",
+            tr("Save…"),
+            self.save_wanted.emit,
+            accessible=tr("Save the profiles"),
+            tip=tr("Save all lines as a table (CSV)"),
+        )
         self._figures = named(MarkupLabel(wrap=True), "inspect.section.figures", tr("Measurements"))
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         scroll = QScrollArea(widgetResizable=True)
@@ -167,13 +170,21 @@ class LineChoice(QWidget):
         self._box.activated.connect(lambda at: self.chosen.emit(self._box.itemData(at)))
         add, remove = tr("Add a line"), tr("Remove this line")
         self._add = tool_button(
-            "inspect.section.line.add", "", self.add_wanted.emit, icon_name="add", accessible=add,
+            "inspect.section.line.add",
+            "",
+            self.add_wanted.emit,
+            icon_name="add",
+            accessible=add,
             tip=add,
-        )  # fmt: skip
+        )
         self._remove = tool_button(
-            "inspect.section.line.remove", "", self.remove_wanted.emit, icon_name="remove",
-            accessible=remove, tip=remove,
-        )  # fmt: skip
+            "inspect.section.line.remove",
+            "",
+            self.remove_wanted.emit,
+            icon_name="remove",
+            accessible=remove,
+            tip=remove,
+        )
         hbox((self._box, 1), self._add, self._remove, of=self, margins=0, spacing=2)
 
     def show_lines(self, lines: SectionLines) -> None:

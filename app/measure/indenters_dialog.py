@@ -47,9 +47,11 @@ class IndentersDialog(Dialog):
         )
         show_meaning(self.problem, "fail")
         add = push_button(
-            "measure.indenters.add", tr("&Add"),
-            lambda: self.add_row(Indenter(tr("New cylinder"), "cylinder", 5.0)), icon_name="add",
-        )  # fmt: skip
+            "measure.indenters.add",
+            tr("&Add"),
+            lambda: self.add_row(Indenter(tr("New cylinder"), "cylinder", 5.0)),
+            icon_name="add",
+        )
         remove = push_button(
             "measure.indenters.remove", tr("&Remove"), self.remove_rows, icon_name="remove"
         )

@@ -132,9 +132,12 @@ class PressViewFrame(QMainWindow):
         self.source = SourceButton(context=self.context, page="measure", none=tr("No camera"))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         groups = (
-            (self.source, open_action), (self.box, self.validated),
-            (self.freeze_action, self.auto), (undo, redo), (self._views_button(),),
-        )  # fmt: skip
+            (self.source, open_action),
+            (self.box, self.validated),
+            (self.freeze_action, self.auto),
+            (undo, redo),
+            (self._views_button(),),
+        )
         for number, group in enumerate(groups):
             if number:
                 bar.addSeparator()

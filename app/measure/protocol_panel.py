@@ -42,9 +42,14 @@ class RunPanel(QWidget):
     """
 
     def __init__(
-        self, *, on_bare: Slot, on_capture: Slot, on_take_back: Slot, on_leave: Slot,
+        self,
+        *,
+        on_bare: Slot,
+        on_capture: Slot,
+        on_take_back: Slot,
+        on_leave: Slot,
         on_evaluate: Slot,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__()
         named(self, "protocol.panel", tr("Next press"))
         self.setFixedWidth(WIDTH)
@@ -61,19 +66,25 @@ class RunPanel(QWidget):
         for label in (self.where, self.live):
             label.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.bare = push_button(
-            "protocol.bare", tr("Capture &bare membrane"), on_bare,
+            "protocol.bare",
+            tr("Capture &bare membrane"),
+            on_bare,
             accessible=tr("Capture the bare membrane and start"),
-        )  # fmt: skip
+        )
         self.bare.setMinimumHeight(38)
         self.capture = push_button(
-            "protocol.capture", tr("&Capture now"), on_capture,
+            "protocol.capture",
+            tr("&Capture now"),
+            on_capture,
             accessible=tr("Capture this press now"),
             tip=tr("A steady press is captured automatically. A press that moves is refused"),
-        )  # fmt: skip
+        )
         self.take_back = push_button(
-            "protocol.take_back", tr("&Repeat last press"), on_take_back,
+            "protocol.take_back",
+            tr("&Repeat last press"),
+            on_take_back,
             tip=tr('The old image is moved to the folder "discarded"'),
-        )  # fmt: skip
+        )
         self.bench = named(
             QCheckBox(tr("&Use virtual bench")),
             "protocol.bench",
@@ -86,18 +97,33 @@ class RunPanel(QWidget):
         )
         self.last = self._make_table()
         self.leave = push_button(
-            "protocol.leave", tr("Lea&ve"), on_leave, accessible=tr("Leave the run"),
+            "protocol.leave",
+            tr("Lea&ve"),
+            on_leave,
+            accessible=tr("Leave the run"),
             tip=tr("Every press is saved. You can continue here later"),
-        )  # fmt: skip
+        )
         self.evaluate = push_button(
-            "protocol.evaluate", tr("Show the &result"), on_evaluate,
+            "protocol.evaluate",
+            tr("Show the &result"),
+            on_evaluate,
             accessible=tr("Evaluate the presses so far"),
-        )  # fmt: skip
+        )
         vbox(
-            self.title, self.where, self.live, self.bare, hbox(self.capture, self.take_back),
-            self.bench, self.progress, self.counts, (self.last, 1),
-            hbox(self.leave, (self.evaluate, 1)), of=self, margins=(12, 10, 12, 10), spacing=8,
-        )  # fmt: skip
+            self.title,
+            self.where,
+            self.live,
+            self.bare,
+            hbox(self.capture, self.take_back),
+            self.bench,
+            self.progress,
+            self.counts,
+            (self.last, 1),
+            hbox(self.leave, (self.evaluate, 1)),
+            of=self,
+            margins=(12, 10, 12, 10),
+            spacing=8,
+        )
 
     @staticmethod
     def _make_table() -> QTableWidget:

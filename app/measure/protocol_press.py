@@ -105,9 +105,12 @@ class PressingView(QWidget):
         self._detection = LiveDetection(self.live)
         self.image = LiveView()
         self.panel = RunPanel(
-            on_bare=self.take_bare, on_capture=self.capture, on_take_back=self._take_back,
-            on_leave=on_leave, on_evaluate=on_result,
-        )  # fmt: skip
+            on_bare=self.take_bare,
+            on_capture=self.capture,
+            on_take_back=self._take_back,
+            on_leave=on_leave,
+            on_evaluate=on_result,
+        )
         hbox((self.image, 1), self.panel, of=self, margins=0, spacing=0)
         self._tick = QTimer(self, interval=HAND_MS)
         self._tick.timeout.connect(self._move_hand)

@@ -62,18 +62,23 @@ class ResultView(QWidget):
             "protocol.back", tr("&Continue pressing"), on_back, tip=tr("Return to the presses")
         )
         save = push_button(
-            "protocol.save", tr("&Save the report"),
+            "protocol.save",
+            tr("&Save the report"),
             lambda: self.save(work.run.folder / REPORT),
             tip=tr("Write CSV and PDF next to the run"),
-        )  # fmt: skip
+        )
         save_as = push_button(
-            "protocol.save_as", tr("Save &as…"), self._save_as,
+            "protocol.save_as",
+            tr("Save &as…"),
+            self._save_as,
             tip=tr("Write CSV and PDF into another folder"),
-        )  # fmt: skip
+        )
         leave = push_button(
-            "protocol.leave_result", tr("Lea&ve"), on_leave,
+            "protocol.leave_result",
+            tr("Lea&ve"),
+            on_leave,
             tip=tr("Leave the run. Everything is saved"),
-        )  # fmt: skip
+        )
         self.sentence = named(PlainLabel(wrap=True), "protocol.sentence", tr("Results"))
         self.figure = Fig13()
         self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
@@ -84,8 +89,13 @@ class ResultView(QWidget):
         self.progress.setSizePolicy(keep)
         vbox(
             hbox((self.verdict, 1), self._back, save, save_as, leave),
-            self.sentence, (split, 1), self.progress, of=self, margins=(12, 10, 12, 10), spacing=8,
-        )  # fmt: skip
+            self.sentence,
+            (split, 1),
+            self.progress,
+            of=self,
+            margins=(12, 10, 12, 10),
+            spacing=8,
+        )
         self.show_work("", 0.0)
 
     def wait(self) -> None:

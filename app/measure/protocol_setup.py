@@ -110,10 +110,11 @@ class ProtocolSetup(QScrollArea):
             PlainLabel(wrap=True), "protocol.summary", tr("Number of objects and presses, and time")
         )
         self.begin = push_button(
-            "protocol.begin", tr("&Start"),
+            "protocol.begin",
+            tr("&Start"),
             lambda: self._on_begin(Path(self.calibration.currentData())),
             accessible=tr("Start the run"),
-        )  # fmt: skip
+        )
         self.begin.setMinimumHeight(40)
         self.problem = named(
             PlainLabel(wrap=True), "protocol.problem", tr("Why the run was not started")
@@ -122,9 +123,19 @@ class ProtocolSetup(QScrollArea):
         for label in (explanation, self.problem):
             label.setFixedWidth(WIDTH)
         return vbox(
-            _heading(tr("Evaluate a sensor")), explanation, top, shapes, sizes, heights, counts,
-            self.summary, self.begin, self.problem, None, spacing=10,
-        )  # fmt: skip
+            _heading(tr("Evaluate a sensor")),
+            explanation,
+            top,
+            shapes,
+            sizes,
+            heights,
+            counts,
+            self.summary,
+            self.begin,
+            self.problem,
+            None,
+            spacing=10,
+        )
 
     def _choices(
         self, kind: str, title: str, choices: Mapping[T, str]
@@ -180,10 +191,12 @@ class ProtocolSetup(QScrollArea):
         self._no_runs.setVisible(not runs)
         for number, (folder, text) in enumerate(list(runs.items())[:MOST_RUNS]):
             button = push_button(
-                f"protocol.run.{number}", text, lambda folder=folder: self._on_run(folder),
+                f"protocol.run.{number}",
+                text,
+                lambda folder=folder: self._on_run(folder),
                 accessible=tr("Continue {run}").format(run=text.replace("\n", ", ")),
                 tip=str(folder),
-            )  # fmt: skip
+            )
             button.setFixedWidth(320)
             button.setStyleSheet("text-align: left; padding: 6px;")
             self._runs.addWidget(button)

@@ -131,9 +131,17 @@ class ResultsView(QWidget):
         self.stack.addWidget(empty)
         self.stack.addWidget(self.split)
         bar = hbox(
-            PlainLabel(tr("Sensor")), self.sensor, PlainLabel(tr("Object")), self.shape,
-            self.count, None, self.remove, self.export, margins=(8, 6, 8, 6), spacing=8,
-        )  # fmt: skip
+            PlainLabel(tr("Sensor")),
+            self.sensor,
+            PlainLabel(tr("Object")),
+            self.shape,
+            self.count,
+            None,
+            self.remove,
+            self.export,
+            margins=(8, 6, 8, 6),
+            spacing=8,
+        )
         vbox(bar, (self.stack, 1), of=self, margins=0, spacing=0)
 
     # What is shown

@@ -76,9 +76,19 @@ class SidePanel(QScrollArea):
         form.addRow(tr("Note"), self.note)
         inside = QWidget()
         vbox(
-            self.propose, (self.tools, 1), self.remove, self.figures, self.reason, self.truth,
-            form, self.keep, self.kept, None, of=inside, margins=(10, 8, 10, 8),
-        )  # fmt: skip
+            self.propose,
+            (self.tools, 1),
+            self.remove,
+            self.figures,
+            self.reason,
+            self.truth,
+            form,
+            self.keep,
+            self.kept,
+            None,
+            of=inside,
+            margins=(10, 8, 10, 8),
+        )
         self.setWidget(inside)
 
     def show_work(self, work: Work, *, known: bool) -> None:

@@ -69,9 +69,11 @@ class CalibrationActions:
         """Use this calibration from now on."""
         workspace, before = self._context.workspace, self._context.workspace.in_use
         use = partial(
-            self._push, tr("use of {name}").format(name=entry.path.stem),
-            lambda: workspace.use(entry.path), lambda: workspace.use(before),
-        )  # fmt: skip
+            self._push,
+            tr("use of {name}").format(name=entry.path.stem),
+            lambda: workspace.use(entry.path),
+            lambda: workspace.use(before),
+        )
         put_into_use(entry.path, self._page, context=self._context, use=use)
 
     def name_elastomer(self, entry: Entry, name: str) -> None:

@@ -49,9 +49,12 @@ class SensorsPage(QWidget):
         named(self, "sensors", tr("Sensors"))
         self._make_actions()
         self._table = CellsTable(
-            "sensors.table", tr("Calibrations"), library_titles(), self._cells,
+            "sensors.table",
+            tr("Calibrations"),
+            library_titles(),
+            self._cells,
             lambda entry: entry.path,
-        )  # fmt: skip
+        )
         self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
         self._table.selectionModel().selectionChanged.connect(self._show_chosen)
         self._table.doubleClicked.connect(lambda _: self.use.trigger())
@@ -73,9 +76,14 @@ class SensorsPage(QWidget):
         self.refresh()
 
     def _action(
-        self, name: str, text: str, slot: Callable[[], object], icon_name: str, tip: str = "",
+        self,
+        name: str,
+        text: str,
+        slot: Callable[[], object],
+        icon_name: str,
+        tip: str = "",
         *keys: str,
-    ) -> QAction:  # fmt: skip
+    ) -> QAction:
         return make_action(
             self, f"sensors.{name}", text, slot, keys=keys, icon_name=icon_name, tip=tip
         )
@@ -83,41 +91,69 @@ class SensorsPage(QWidget):
     def _make_actions(self) -> None:
         requests, library = self._context.requests, self._library
         self.new = self._action(
-            "new", tr("&New sensor"), requests.new_sensor.emit, "add",
+            "new",
+            tr("&New sensor"),
+            requests.new_sensor.emit,
+            "add",
             tr("Calibrate a sensor from its camera"),
-        )  # fmt: skip
+        )
         self.session = self._action(
-            "session", tr("Open &session folder"), requests.choose_session.emit, "folder",
+            "session",
+            tr("Open &session folder"),
+            requests.choose_session.emit,
+            "folder",
             tr("Calibrate from existing images"),
-        )  # fmt: skip
+        )
         self.import_ = self._action(
-            "import", tr("&Import calibration"), self.choose_calibrations, "import",
+            "import",
+            tr("&Import calibration"),
+            self.choose_calibrations,
+            "import",
             tr("Copy calibration files into the library"),
-        )  # fmt: skip
+        )
         self.demo = self._action(
-            "demo", tr("&Try the virtual sensor"), requests.begin_demo.emit, "demo",
+            "demo",
+            tr("&Try the virtual sensor"),
+            requests.begin_demo.emit,
+            "demo",
             tr("Use all functions without a camera"),
-        )  # fmt: skip
+        )
         self.use = self._action(
-            "use", tr("&Use"), lambda: self._with_chosen(library.use), "use",
-            tr("Use this calibration for measuring"), "Ctrl+U",
-        )  # fmt: skip
+            "use",
+            tr("&Use"),
+            lambda: self._with_chosen(library.use),
+            "use",
+            tr("Use this calibration for measuring"),
+            "Ctrl+U",
+        )
         self.report = self._action(
-            "report", tr("Re&port…"), self.choose_report, "report",
+            "report",
+            tr("Re&port…"),
+            self.choose_report,
+            "report",
             tr("Write a report of this calibration as PDF"),
-        )  # fmt: skip
+        )
         self.reveal = self._action(
-            "reveal", tr("Show in fol&der"),
-            lambda: self._with_chosen(lambda entry: _open_folder(entry.path.parent)), "folder",
-        )  # fmt: skip
+            "reveal",
+            tr("Show in fol&der"),
+            lambda: self._with_chosen(lambda entry: _open_folder(entry.path.parent)),
+            "folder",
+        )
         self.remove = self._action(
-            "remove", tr("&Remove"), lambda: self._with_chosen(library.remove), "remove",
-            tr("Move this calibration to the trash. It can be restored from there."), "Del",
-        )  # fmt: skip
+            "remove",
+            tr("&Remove"),
+            lambda: self._with_chosen(library.remove),
+            "remove",
+            tr("Move this calibration to the trash. It can be restored from there."),
+            "Del",
+        )
         self.trash = self._action(
-            "trash", tr("&Trash…"), self.show_trash, "remove",
+            "trash",
+            tr("&Trash…"),
+            self.show_trash,
+            "remove",
             tr("Show removed calibrations, and restore them"),
-        )  # fmt: skip
+        )
         stack = self._library.undo
         make_action(self, "sensors.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",))
         make_action(self, "sensors.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"))
@@ -174,9 +210,13 @@ class SensorsPage(QWidget):
         entry = self.chosen()
         if entry is not None:
             path = ask_save(
-                self, self._context.settings, "report", tr("Save the report"),
-                f"{entry.path.stem}-report.pdf", tr("PDF (*.pdf)"),
-            )  # fmt: skip
+                self,
+                self._context.settings,
+                "report",
+                tr("Save the report"),
+                f"{entry.path.stem}-report.pdf",
+                tr("PDF (*.pdf)"),
+            )
             if path is not None:
                 self._write_report(entry, path)
 

@@ -111,9 +111,13 @@ class CellsTable(QTableView, Generic[Item]):
     """
 
     def __init__(
-        self, name: str, accessible: str, titles: tuple[str, ...],
-        cells: Callable[[Item], tuple[Cell, ...]], place: Callable[[Item], Any],
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        accessible: str,
+        titles: tuple[str, ...],
+        cells: Callable[[Item], tuple[Cell, ...]],
+        place: Callable[[Item], Any],
+    ) -> None:
         super().__init__()
         named(self, name, accessible)
         self._cells, self._place = cells, place
@@ -261,16 +265,23 @@ class SessionsBox(QWidget):
         super().__init__(parent)
         named(self, "sensors.sessions", tr("Sessions"))
         self.table = CellsTable(
-            "sensors.sessions.table", tr("Sessions"), session_titles(), session_cells,
+            "sensors.sessions.table",
+            tr("Sessions"),
+            session_titles(),
+            session_cells,
             lambda session: session.folder,
-        )  # fmt: skip
+        )
         self.table.sortByColumn(0, Qt.SortOrder.AscendingOrder)
         self.table.doubleClicked.connect(lambda _: self._go_on())
         self.table.selectionModel().selectionChanged.connect(self._enable)
         self.go_on: QAction = make_action(
-            self, "sensors.go_on", tr("&Continue calibration"), self._go_on, icon_name="calibrate",
+            self,
+            "sensors.go_on",
+            tr("&Continue calibration"),
+            self._go_on,
+            icon_name="calibrate",
             tip=tr("Open the selected session with all its images and decisions"),
-        )  # fmt: skip
+        )
         button = named(QToolButton(self), "sensors.go_on.button", tr("Continue calibration"))
         button.setDefaultAction(self.go_on)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)

@@ -55,9 +55,12 @@ class TrashDialog(Dialog):
         self.table.doubleClicked.connect(lambda _: self.restore_chosen())
         self._empty = PlainLabel(tr("The trash is empty."), self)
         self.restore_button = push_button(
-            "trash.restore", tr("Restore"), self.restore_chosen, icon_name="undo",
+            "trash.restore",
+            tr("Restore"),
+            self.restore_chosen,
+            icon_name="undo",
             accessible=tr("Restore the selected calibration"),
-        )  # fmt: skip
+        )
         self.fill(self._empty, (self.table, 1), add=(self.restore_button,))
 
     def refresh(self) -> None:

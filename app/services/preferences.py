@@ -17,13 +17,16 @@ class Preferences:
 
     theme: str = choice("system", tr("&Theme"), THEMES)
     first_page: str = choice(
-        "start", tr("At &start, show"),
+        "start",
+        tr("At &start, show"),
         {"start": tr("Start page"), "last": tr("Page that was shown last")},
-    )  # fmt: skip
+    )
     language: str = choice(
-        "", tr("&Language"), {"": tr("Same as the system"), **LANGUAGES},
+        "",
+        tr("&Language"),
+        {"": tr("Same as the system"), **LANGUAGES},
         tr("Applies at the next start of the program"),
-    )  # fmt: skip
+    )
     reconstruction: str = choice(
         "full/fast", tr("&Live depth"), {f"{m.model}/{m.effort}": m.label for m in MODES},
         tr("Accuracy or speed of live images, as on the Inspect page. Frozen images always "
@@ -39,9 +42,14 @@ class Preferences:
     )
     # About ten minutes of a fast camera.
     recording_limit_gb: float = number(
-        20.0, tr("Largest recording"), 0.1, 10_000.0, tr(" GB"), 1,
+        20.0,
+        tr("Largest recording"),
+        0.1,
+        10_000.0,
+        tr(" GB"),
+        1,
         tip=tr("A recording stops at this size. Cameras need 2 GB a minute"),
-    )  # fmt: skip
+    )
     captures_automatically: bool = True
     last_page: str = ""
 

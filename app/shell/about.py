@@ -84,13 +84,18 @@ class AboutDialog(Dialog):
         for text in (what, licences):
             text.setWordWrap(True)
         copy = push_button(
-            "about.copy", tr("Copy"), self.copy, icon_name="copy",
+            "about.copy",
+            tr("Copy"),
+            self.copy,
+            icon_name="copy",
             accessible=tr("Copy the version numbers"),
-        )  # fmt: skip
+        )
         texts = push_button(
-            "about.licences", tr("Licences…"), self.show_licences,
+            "about.licences",
+            tr("Licences…"),
+            self.show_licences,
             accessible=tr("Licences of all parts"),
-        )  # fmt: skip
+        )
         top = hbox((sign, 0, Qt.AlignmentFlag.AlignTop), (vbox(title, what), 1))
         self.fill(top, table, licences, add=(copy, texts) if LICENCES.is_file() else (copy,))
 

@@ -47,11 +47,13 @@ class LogWindow(Dialog):
             "log.copy", tr("Copy"), self.copy, icon_name="copy", accessible=tr("Copy the log")
         )
         folder = push_button(
-            "log.folder", tr("Open folder"),
+            "log.folder",
+            tr("Open folder"),
             lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log.folder))),
-            icon_name="folder", accessible=tr("Open the folder of the log files"),
+            icon_name="folder",
+            accessible=tr("Open the folder of the log files"),
             tip=str(log.folder),
-        )  # fmt: skip
+        )
         self.fill(hbox(PlainLabel(tr("Show")), self._levels, None, copy, folder), (self._text, 1))
         self._timer = QTimer(self, interval=REFRESH_MS)
         self._timer.timeout.connect(self._show_new)

@@ -69,9 +69,14 @@ class Menus:
         self._add(menu, "help.about", tr("&About"), window.show_about)
 
     def _add(
-        self, menu: QMenu, name: str, text: str, slot: Callable[[], object], *keys: str,
+        self,
+        menu: QMenu,
+        name: str,
+        text: str,
+        slot: Callable[[], object],
+        *keys: str,
         icon_name: str = "",
-    ) -> None:  # fmt: skip
+    ) -> None:
         action = make_action(self._window, name, text, slot, keys=keys, icon_name=icon_name)
         menu.addAction(action)
 

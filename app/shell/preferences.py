@@ -25,9 +25,13 @@ class PreferencesDialog(Dialog):
     """
 
     def __init__(
-        self, preferences: Preferences, keep: Callable[[str, Any], object], limits: Limits,
-        keep_limits: Callable[[str, Any], object], parent: QWidget,
-    ) -> None:  # fmt: skip
+        self,
+        preferences: Preferences,
+        keep: Callable[[str, Any], object],
+        limits: Limits,
+        keep_limits: Callable[[str, Any], object],
+        parent: QWidget,
+    ) -> None:
         super().__init__(parent, "preferences", tr("Preferences"), once=True)
         self.setMinimumWidth(520)
         self.preferences = Form(preferences, "preferences")

@@ -66,7 +66,12 @@ class DesignDialog(WorkDialog):
 def _rows(result: DesignCheckResult) -> list[tuple[str, ...]]:
     """Return one row for each figure; advice only where there is something to do."""
     return [
-        (f.label, value_text(f), limit_text(f), verdict_word(f.verdict),
-         "" if f.verdict is Verdict.PASS else f.advice)
+        (
+            f.label,
+            value_text(f),
+            limit_text(f),
+            verdict_word(f.verdict),
+            "" if f.verdict is Verdict.PASS else f.advice,
+        )
         for f in result.quality.figures
-    ]  # fmt: skip
+    ]

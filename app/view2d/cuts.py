@@ -69,13 +69,26 @@ class Section:
     lines: tuple[Line, ...] = (Line(),)
     chosen: int = 1
     width_mm: float = number(
-        0.2, tr("Width"), 0.0, 5.0, tr(" mm"), 2, step=0.1,
+        0.2,
+        tr("Width"),
+        0.0,
+        5.0,
+        tr(" mm"),
+        2,
+        step=0.1,
         tip=tr("Depth is averaged over this width across the line"),
-    )  # fmt: skip
+    )
     level_mm: float = number(
-        0.0, tr("Width at"), 0.0, 5.0, tr(" mm"), 3, step=0.01, none=tr("half height"),
+        0.0,
+        tr("Width at"),
+        0.0,
+        5.0,
+        tr(" mm"),
+        3,
+        step=0.01,
+        none=tr("half height"),
         tip=tr("Depth at which the width is measured. 0: half of the height"),
-    )  # fmt: skip
+    )
     cutoff_mm: float = choice(
         0.0, tr("Ra, Rq, Rz"),
         {0.0: tr("none"), **{c: tr("at {c:g} mm").format(c=c) for c in CUTOFFS_MM}},

@@ -63,9 +63,15 @@ class Processing:
            "levelling, filter, histogram and export"),
     )  # fmt: skip
     deeper_mm: float = number(
-        0.1, tr("Deeper than"), -5.0, 5.0, tr(" mm"), 3, step=0.05,
+        0.1,
+        tr("Deeper than"),
+        -5.0,
+        5.0,
+        tr(" mm"),
+        3,
+        step=0.05,
         when=lambda p: p.mask == "deeper",
-    )  # fmt: skip
+    )
     level: str = choice(
         "none", tr("Levelling"), {
             "none": tr("none"), "plane": tr("plane"), "rectangle": tr("plane of the rectangle"),
@@ -80,13 +86,24 @@ class Processing:
         tr("Smooth the height map. The uncertainty of a smoothed map is not known"),
     )  # fmt: skip
     sigma_mm: float = number(
-        0.1, tr("Sigma"), 0.01, 2.0, tr(" mm"), 2, step=0.05,
+        0.1,
+        tr("Sigma"),
+        0.01,
+        2.0,
+        tr(" mm"),
+        2,
+        step=0.05,
         when=lambda p: p.filter == "gaussian",
-    )  # fmt: skip
+    )
     nodes: int = number(
-        3, tr("Size"), 3, LARGEST_MEDIAN, tr(" points"), step=2,
+        3,
+        tr("Size"),
+        3,
+        LARGEST_MEDIAN,
+        tr(" points"),
+        step=2,
         when=lambda p: p.filter == "median",
-    )  # fmt: skip
+    )
     reference: Reference | None = None
     rectangle: Rectangle | None = None
     points_mm: tuple[Point, ...] = ()

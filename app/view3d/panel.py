@@ -146,8 +146,10 @@ class SurfacePanel(QWidget):
 
     def _make_hint(self) -> QWidget:
         bar = QWidget()
-        text = PlainLabel(tr("Drag: rotate   Shift+drag: pan   Wheel: zoom   Click: pin   "
-                         "Right click: menu"), wrap=True)  # fmt: skip
+        text = PlainLabel(
+            tr("Drag: rotate   Shift+drag: pan   Wheel: zoom   Click: pin   Right click: menu"),
+            wrap=True,
+        )
         button = named(QToolButton(), "view3d.hint_seen", tr("Hide the hint"))
         button.setText(tr("Got it"))
         button.clicked.connect(self._hide_hint)

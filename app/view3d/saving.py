@@ -88,9 +88,10 @@ class ViewSaving(QObject):
 
         assert self._panel.view is not None
         rgb = image_of(
-            self._panel.view.scene, (choice.width_px, choice.height_px),
+            self._panel.view.scene,
+            (choice.width_px, choice.height_px),
             transparent=choice.transparent,
-        )  # fmt: skip
+        )
         try:
             write_atomically(path, lambda file: Image.fromarray(np.asarray(rgb)).save(file, "PNG"))
         except InputError as error:
@@ -163,9 +164,10 @@ class ImageChoice:
     """Which image to save: the surface in any size, or all views, as shown on the screen."""
 
     what: str = choice(
-        "surface", tr("Save"),
+        "surface",
+        tr("Save"),
         {"surface": tr("The surface in 3D"), "views": tr("All views, as on the screen")},
-    )  # fmt: skip
+    )
     width_px: int = number(
         800, tr("Width"), 64, LARGEST_PX, tr(" px"), when=lambda c: c.what == "surface"
     )
@@ -182,19 +184,24 @@ class MovieChoice:
     """Which movie to save: one turn of the surface, or the open recording."""
 
     what: str = choice(
-        "turntable", tr("Save"),
+        "turntable",
+        tr("Save"),
         {
             "turntable": tr("Turntable: one full turn of the surface"),
             "recording": tr("The recording, frame by frame"),
         },
-    )  # fmt: skip
+    )
     width_px: int = number(800, tr("Width"), 64, LARGEST_MOVIE_PX, tr(" px"))
     height_px: int = number(600, tr("Height"), 64, LARGEST_MOVIE_PX, tr(" px"))
     rate_hz: float = number(15.0, tr("Frames per second"), 1.0, 60.0)
     seconds: float = number(
-        8.0, tr("Duration of one turn"), 1.0, 120.0, tr(" s"),
+        8.0,
+        tr("Duration of one turn"),
+        1.0,
+        120.0,
+        tr(" s"),
         when=lambda c: c.what == "turntable",
-    )  # fmt: skip
+    )
 
 
 class ChoiceDialog(Dialog):

@@ -46,9 +46,13 @@ def tool_button(
 
 
 def _finish(
-    button: QPushButton | QToolButton, name: str, accessible: str, slot: Slot, icon_name: str,
+    button: QPushButton | QToolButton,
+    name: str,
+    accessible: str,
+    slot: Slot,
+    icon_name: str,
     tip: str,
-) -> QPushButton | QToolButton:  # fmt: skip
+) -> QPushButton | QToolButton:
     if icon_name:
         button.setIcon(icon(icon_name))
     button.clicked.connect(lambda _checked=False: slot())

@@ -36,9 +36,14 @@ class Dialog(QDialog):
     """
 
     def __init__(
-        self, parent: QWidget | None, name: str, title: str, kinds: Kinds = Kinds.Close, *,
+        self,
+        parent: QWidget | None,
+        name: str,
+        title: str,
+        kinds: Kinds = Kinds.Close,
+        *,
         once: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(parent)
         named(self, name, title)
         self.setWindowTitle(title)

@@ -17,10 +17,19 @@ def choice(default: Any, label: str, choices: Mapping[Any, str], tip: str = "") 
 
 
 def number(
-    default: float, label: str, low: float, high: float, unit: str = "", decimals: int = 0, *,
-    step: float = 1.0, tip: str = "", none: str = "", slider: bool = False,
+    default: float,
+    label: str,
+    low: float,
+    high: float,
+    unit: str = "",
+    decimals: int = 0,
+    *,
+    step: float = 1.0,
+    tip: str = "",
+    none: str = "",
+    slider: bool = False,
     when: When | None = None,
-) -> Any:  # fmt: skip
+) -> Any:
     """Return a field with a number. `none` is the text of the lowest value."""
     span = {"span": (low, high), "unit": unit, "decimals": decimals, "step": step}
     more = {"label": label, "tip": tip, "none": none, "slider": slider, "when": when}

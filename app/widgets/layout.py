@@ -10,14 +10,22 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QSplitter, QVBox
 Margins = int | tuple[int, int, int, int]
 
 
-def hbox(*parts: Any, of: QWidget | None = None, margins: Margins | None = None,
-        spacing: int | None = None) -> QHBoxLayout:  # fmt: skip
+def hbox(
+    *parts: Any,
+    of: QWidget | None = None,
+    margins: Margins | None = None,
+    spacing: int | None = None,
+) -> QHBoxLayout:
     """Return a row of widgets, see :func:`vbox`."""
     return _fill(QHBoxLayout(), parts, of, margins, spacing)
 
 
-def vbox(*parts: Any, of: QWidget | None = None, margins: Margins | None = None,
-           spacing: int | None = None) -> QVBoxLayout:  # fmt: skip
+def vbox(
+    *parts: Any,
+    of: QWidget | None = None,
+    margins: Margins | None = None,
+    spacing: int | None = None,
+) -> QVBoxLayout:
     """Return a column of widgets.
 
     Parameters
@@ -36,9 +44,12 @@ def vbox(*parts: Any, of: QWidget | None = None, margins: Margins | None = None,
 
 
 def _fill(
-    box: QBoxLayout, parts: tuple[Any, ...], of: QWidget | None, margins: Margins | None,
+    box: QBoxLayout,
+    parts: tuple[Any, ...],
+    of: QWidget | None,
+    margins: Margins | None,
     spacing: int | None,
-) -> Any:  # fmt: skip
+) -> Any:
     if of is not None:
         of.setLayout(box)
     if margins is not None:

@@ -340,12 +340,26 @@ def _view_figures(
         if not view.used
     ]
     figures = [
-        judge("reprojection_rms", tr("Reprojection error"), rms, "px", warn=0.3, fail=1.0,
-              advice=tr("Use a flat board and check its square size; calibrate the lens again")),
-        judge("view_spread", tr("Largest angle between a view and the average"), spread_deg, "deg",
-              warn=0.25, fail=1.0, advice=tr("Press the board flat onto the surface in each view")),
+        judge(
+            "reprojection_rms",
+            tr("Reprojection error"),
+            rms,
+            "px",
+            warn=0.3,
+            fail=1.0,
+            advice=tr("Use a flat board and check its square size; calibrate the lens again"),
+        ),
+        judge(
+            "view_spread",
+            tr("Largest angle between a view and the average"),
+            spread_deg,
+            "deg",
+            warn=0.25,
+            fail=1.0,
+            advice=tr("Press the board flat onto the surface in each view"),
+        ),
         judge_left_out("views_left_out", tr("Views left out"), refused),
-    ]  # fmt: skip
+    ]
     if decision is not Decision.SINGLE:
         figures.append(
             judge("mirrored_margin", tr("Certainty against the mirrored pose"),

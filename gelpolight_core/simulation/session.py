@@ -167,9 +167,13 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
     # The slowest first, so that the last image does not keep a single thread busy.
     for name, item in zip(press_names(design.presses), design.presses, strict=True):
         pressed = partial(
-            pressed_membrane, design, indenter_of(item),
-            x_mm=item.x_mm, y_mm=item.y_mm, yaw_deg=item.yaw_deg,
-        )  # fmt: skip
+            pressed_membrane,
+            design,
+            indenter_of(item),
+            x_mm=item.x_mm,
+            y_mm=item.y_mm,
+            yaw_deg=item.yaw_deg,
+        )
         yield _Shot("presses", f"{name}.png", pressed, keeps_truth=True)
     for number, ball in enumerate(design.balls):
         shape = Ball(ball.radius_mm, ball.depth_mm)

@@ -95,9 +95,13 @@ def test_a_press_is_measured_against_its_truth(
 
 
 def test_a_calibration_that_failed_is_reported_by_every_command(
-    session: Path, calibration: Path, press: Path, tmp_path: Path,
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    session: Path,
+    calibration: Path,
+    press: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     failed = scene.failed(read_calibration(calibration))
     file, result = tmp_path / "failed.gplcal", tmp_path / "m.json"
     write_calibration(failed, file)

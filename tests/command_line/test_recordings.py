@@ -73,9 +73,17 @@ def test_a_range_of_frames_needs_a_recording(
 
 @pytest.mark.parametrize(
     ("text", "frames"),
-    [("", range(5)), ("1:3", range(1, 3)), (":2", range(2)), ("3:", range(3, 5)),
-     (":", range(5)), ("0:99", range(5)), ("4", range(4, 5)), ("1::2", range(1, 5, 2))],
-)  # fmt: skip
+    [
+        ("", range(5)),
+        ("1:3", range(1, 3)),
+        (":2", range(2)),
+        ("3:", range(3, 5)),
+        (":", range(5)),
+        ("0:99", range(5)),
+        ("4", range(4, 5)),
+        ("1::2", range(1, 5, 2)),
+    ],
+)
 def test_a_range_of_frames_reads_like_a_slice(text: str, frames: range) -> None:
     assert frame_range(text, 5, where="a") == frames
 

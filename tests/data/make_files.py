@@ -155,8 +155,12 @@ def make_open(out: Path, scratch: Path) -> None:
                   "balls/ball_00.png", "checkerboard/view_00.png"]  # fmt: skip
     keep_session(session, path.parent / "sessions/unfinished", unfinished)
     excluded = frozenset({"balls/ball_00.png", "checkerboard/view_03.png"})
-    decide(path.parent / "sessions/unfinished", excluded=excluded, spots_px={1: (40.5, 60.25)},
-           curves={2: ((0.2, 0.15), (0.6, 0.55), (1.0, 1.0))})  # fmt: skip
+    decide(
+        path.parent / "sessions/unfinished",
+        excluded=excluded,
+        spots_px={1: (40.5, 60.25)},
+        curves={2: ((0.2, 0.15), (0.6, 0.55), (1.0, 1.0))},
+    )
     write_recording(session, path.parent / "recordings/press.gplrec", calibration.identity)
     measurement = write_records(workspace, calibration, session)
     write_lab_files(workspace, calibration, measurement, path)
@@ -185,8 +189,11 @@ def make_closed(out: Path, scratch: Path) -> None:
     ]
     keep_session(session, sensor / "sessions/closed", kept)
     circle = named("gelpolight_core.session.decisions:PlacedCircle")(96.5, 80.25, 14.0)
-    decide(sensor / "sessions/closed", excluded=frozenset({"balls/ball_02.png"}),
-           balls={"ball_01.png": circle})  # fmt: skip
+    decide(
+        sensor / "sessions/closed",
+        excluded=frozenset({"balls/ball_02.png"}),
+        balls={"ball_01.png": circle},
+    )
     run("calibrate", session, "-o", sensor / "closed.gplcal")
 
 

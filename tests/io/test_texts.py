@@ -85,9 +85,18 @@ def test_a_forged_template_can_neither_fill_the_memory_nor_read_anything(templat
 
 @pytest.mark.parametrize(
     "value",
-    [1, None, [], {"text": "a"}, {"text": "a", "values": []}, {"text": 1, "values": {}},
-     {"text": "a", "values": {}, "more": 1}, '{"text":1}', '{"text":'],
-)  # fmt: skip
+    [
+        1,
+        None,
+        [],
+        {"text": "a"},
+        {"text": "a", "values": []},
+        {"text": 1, "values": {}},
+        {"text": "a", "values": {}, "more": 1},
+        '{"text":1}',
+        '{"text":',
+    ],
+)
 def test_what_is_no_text_is_refused(value: object) -> None:
     with pytest.raises(ValueError):
         text_of_file(value)

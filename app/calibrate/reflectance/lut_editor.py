@@ -162,33 +162,76 @@ class LutEditor(QWidget):
     def _make_actions(self) -> dict[str, QAction]:
         """Return the tools; each is (key, text, tool tip, shortcut, what it does)."""
         table: list[tuple[str, str, str, str, Callable[[], object]]] = [
-            (f"channel.{key}", channel_name(k).capitalize(),
-             tr("Show the curve of the {name} channel").format(name=channel_name(k)),
-             f"{k + 1}", partial(self.choose_channel, k))
+            (
+                f"channel.{key}",
+                channel_name(k).capitalize(),
+                tr("Show the curve of the {name} channel").format(name=channel_name(k)),
+                f"{k + 1}",
+                partial(self.choose_channel, k),
+            )
             for k, key in enumerate(CHANNEL_KEYS)
-        ]  # fmt: skip
+        ]
         table += [
-            ("lasso", tr("Lasso"),
-             tr("Draw around points to exclude them; the curve is then fitted again"),
-             "L", self._on_lasso),
-            ("reset", tr("Reset channel"), tr("Reset this channel to its initial curve"), "",
-             partial(self._do, tr("reset channel"), model.reset_channel, self._start, keep=False)),
-            ("compare", tr("Compare"), tr("Show the previous version of the curve as well"), "C",
-             self._refresh),
-            ("view", tr("Whole curve"), tr("Show the whole curve"), "Home",
-             lambda: self.plot.whole(self._state, self.channel)),
-            ("add", tr("Add node"), tr("Add a node in the wider gap next to the selected node"),
-             "Ins", self._on_add),
+            (
+                "lasso",
+                tr("Lasso"),
+                tr("Draw around points to exclude them; the curve is then fitted again"),
+                "L",
+                self._on_lasso,
+            ),
+            (
+                "reset",
+                tr("Reset channel"),
+                tr("Reset this channel to its initial curve"),
+                "",
+                partial(
+                    self._do, tr("reset channel"), model.reset_channel, self._start, keep=False
+                ),
+            ),
+            (
+                "compare",
+                tr("Compare"),
+                tr("Show the previous version of the curve as well"),
+                "C",
+                self._refresh,
+            ),
+            (
+                "view",
+                tr("Whole curve"),
+                tr("Show the whole curve"),
+                "Home",
+                lambda: self.plot.whole(self._state, self.channel),
+            ),
+            (
+                "add",
+                tr("Add node"),
+                tr("Add a node in the wider gap next to the selected node"),
+                "Ins",
+                self._on_add,
+            ),
             ("remove", tr("Remove node"), tr("Remove the selected node"), "Del", self._on_remove),
-            ("thin", tr("Fewer nodes"),
-             tr("Keep only the nodes that are needed to draw the same curve"), "F",
-             partial(self._do, tr("fewer nodes"), model.thin_nodes, keep=False)),
-            ("snap", tr("Snap to fit"),
-             tr("Move the selected node, or all nodes, onto the fitted curve"), "S",
-             lambda: self._do(tr("snap to fit"), model.snap_to_fit, self.chosen)),
-            ("smooth", tr("Smooth"), tr("Reduce the bumps of the curve by half"), "M",
-             partial(self._do, tr("smooth"), model.smooth)),
-        ]  # fmt: skip
+            (
+                "thin",
+                tr("Fewer nodes"),
+                tr("Keep only the nodes that are needed to draw the same curve"),
+                "F",
+                partial(self._do, tr("fewer nodes"), model.thin_nodes, keep=False),
+            ),
+            (
+                "snap",
+                tr("Snap to fit"),
+                tr("Move the selected node, or all nodes, onto the fitted curve"),
+                "S",
+                lambda: self._do(tr("snap to fit"), model.snap_to_fit, self.chosen),
+            ),
+            (
+                "smooth",
+                tr("Smooth"),
+                tr("Reduce the bumps of the curve by half"),
+                "M",
+                partial(self._do, tr("smooth"), model.smooth),
+            ),
+        ]
         group = QActionGroup(self)
         actions = {}
         for key, text, tip, shortcut, act in table:

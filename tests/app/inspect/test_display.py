@@ -11,9 +11,17 @@ from app.services.jobs import Jobs
 from app.view2d.display import Display, display_as_text, display_from_text
 
 CHOSEN = Display(
-    "magma", "slope", locked=True, low_mm=0.0, high_mm=1.5, contour_mm=0.25, relief=False,
-    exaggeration=3.0, azimuth_deg=90.0, elevation_deg=60.0,
-)  # fmt: skip
+    "magma",
+    "slope",
+    locked=True,
+    low_mm=0.0,
+    high_mm=1.5,
+    contour_mm=0.25,
+    relief=False,
+    exaggeration=3.0,
+    azimuth_deg=90.0,
+    elevation_deg=60.0,
+)
 
 
 @pytest.mark.parametrize(

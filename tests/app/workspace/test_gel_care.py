@@ -27,11 +27,14 @@ def test_a_file_of_version_1_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["{", '{"format": "other"}', '{"format": "gelpolight-gel-care", "version": 1}',
-     '{"format": "gelpolight-gel-care", "version": 3, "calibrations": {}}',
-     '{"format": "gelpolight-gel-care", "version": 1, "calibrations": '
-     '{"S": {"presses": -1}}}'],
-)  # fmt: skip
+    [
+        "{",
+        '{"format": "other"}',
+        '{"format": "gelpolight-gel-care", "version": 1}',
+        '{"format": "gelpolight-gel-care", "version": 3, "calibrations": {}}',
+        '{"format": "gelpolight-gel-care", "version": 1, "calibrations": {"S": {"presses": -1}}}',
+    ],
+)
 def test_a_damaged_or_newer_file_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE).write_text(text)
     with pytest.raises(InputError, match=r"list of presses|has version 3"):
