@@ -123,7 +123,7 @@ def judged(
     Parameters
     ----------
     known, press
-        The sensor, and what is pressed into it.
+        The sensor, and the object pressed into it.
     bound_um : float
         Largest accepted error of the best mode (root mean square). The others may exceed it by
         their own error (:func:`own_share`).
