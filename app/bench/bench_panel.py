@@ -76,8 +76,8 @@ class BenchPanel(QWidget):
 
     _bench_changed = Signal()
 
-    def __init__(self, *, bench: Bench, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, *, bench: Bench) -> None:
+        super().__init__()
         self._bench = bench
         named(self, "bench", tr("Virtual bench"))
         self._form = QFormLayout()

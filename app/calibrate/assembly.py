@@ -48,8 +48,8 @@ def assembly_words(name: str) -> str:
 class AssemblyDrawing(QWidget):
     """Shows one cross-section."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._name = "complete"
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(BOX.height())

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from PySide6.QtCore import QPoint, QSize, Qt, Signal
 from PySide6.QtGui import QIcon, QImage, QKeyEvent, QPainter, QPaintEvent, QPixmap
-from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu, QWidget
+from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu
 
 from app.calibrate.states import state_icon, state_word
 from app.theme import theme
@@ -21,7 +21,6 @@ from gelpolight_core.image.file import decode_image
 from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
-HEIGHT = 136
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +62,8 @@ class FilmStrip(QListWidget):
     chosen = Signal(str)
     excluded = Signal(str, bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "calibrate.captures", tr("Captures of this step"))
         self.setViewMode(QListView.ViewMode.IconMode)
         self.setFlow(QListView.Flow.LeftToRight)
@@ -73,7 +72,7 @@ class FilmStrip(QListWidget):
         self.setUniformItemSizes(True)
         self.setIconSize(THUMB)
         self.setGridSize(QSize(THUMB.width() + 12, THUMB.height() + 36))
-        self.setFixedHeight(HEIGHT)
+        self.setFixedHeight(136)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)

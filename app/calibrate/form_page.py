@@ -25,7 +25,6 @@ from app.widgets.naming import named
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.translation import tr
 
-FORM_WIDTH, LEAST_WIDTH = 640, 320
 USUAL_RADIUS_MM = 3.0
 
 
@@ -76,7 +75,7 @@ class FormPage(QScrollArea):
         super().__init__()
         named(self, "setup", tr("Set-up"))
         self.setWidgetResizable(True)
-        inside, holder = QWidget(), QWidget(maximumWidth=FORM_WIDTH, minimumWidth=LEAST_WIDTH)
+        inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
         self.setWidget(inside)
         hbox(None, holder, None, of=inside)
         self._title, self._task = PlainLabel(title), PlainLabel(task, wrap=True)

@@ -85,7 +85,7 @@ class ImageArea(QWidget):
         self.show_capture_name("")
         self.view.set_overlay(None)
         self.view.set_stream(stream)
-        self.view.say(tr("Waiting for the first image of the camera."))
+        self.view.image.say(tr("Waiting for the first image of the camera."))
 
     def show_capture(self, name: str, rgb: Rgb) -> None:
         """Show a capture instead of the live image."""

@@ -145,7 +145,7 @@ class ImageStep(StepPresenter):
         """Without a camera, say how to show a capture."""
         there = self.model.live.stream is not None or self.model.shown
         if not there and self.model.project.session.found(self.step.folder):
-            self.area.view.say(no_camera() + "\n" + tr("Click an image below to show it."))
+            self.area.view.image.say(no_camera() + "\n" + tr("Click an image below to show it."))
 
     def camera_changed(self) -> None:
         """Show the images of another camera, unless a capture is shown."""

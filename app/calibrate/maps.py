@@ -12,13 +12,14 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 
 from app.view2d import shading
 from app.view2d.display import SURROUND, Display, colour_table
-from app.view2d.map_view import Extent, Grid, MapView, extent_of
+from app.view2d.map_view import Extent, MapView, extent_of
 from app.view2d.shading import map_image
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.widgets.units import per_mm, unit_word
+from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
@@ -82,7 +83,7 @@ class Panel:
 def three_maps(
     maps: NDArray[np.float32],
     known: NDArray[np.bool_],
-    grid: Grid,
+    grid: MembraneGrid,
     caption: str,
     *,
     unit: str = "",
@@ -132,8 +133,8 @@ def depth_panel(
 class MapsView(QWidget):
     """Images side by side, each as large as possible."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "calibrate.maps", tr("Result as images"))
         self._grid = QGridLayout(self)
         self._shown: list[_PanelView] = []

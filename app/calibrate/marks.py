@@ -19,7 +19,6 @@ from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 LED_ROLES: tuple[Role, Role, Role] = ("led0", "led1", "led2")
-CIRCLE_POINTS = 72
 
 
 def board_outline(view: BoardView, role: Role) -> Line:
@@ -98,7 +97,7 @@ def working_circle(table: ResamplingTable) -> Line:
 def ball_contour(press: BallPress, table: ResamplingTable) -> tuple[Line, ...]:
     """Return the detected edge of the contact, and the circle fitted to it."""
     found = press.indentation
-    angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE_POINTS, endpoint=False)
+    angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     fitted = np.asarray(found.centre) + found.contact_radius_px * ring
     return (

@@ -13,8 +13,6 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
-CHECK_MS = 1000
-
 
 class OutsideBar(QWidget):
     """A bar with two buttons, visible only if files were changed.
@@ -50,7 +48,7 @@ class OutsideBar(QWidget):
         self.reload.clicked.connect(self._reload)
         self.overwrite.clicked.connect(self._overwrite)
         hbox((self.sentence, 1), self.reload, self.overwrite, of=self, margins=(8, 4, 8, 4))
-        self._timer = QTimer(self, interval=CHECK_MS)
+        self._timer = QTimer(self, interval=1000)
         self._timer.timeout.connect(self.check)
         self.hide()
 

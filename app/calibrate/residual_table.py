@@ -29,7 +29,6 @@ from gelpolight_core.translation import tr
 NAME_COLUMN, RESIDUAL_COLUMN = range(2)
 SHARE = Qt.ItemDataRole.UserRole + 1
 ROW_HEIGHT = 22
-MOST_ROWS = 6
 LEAST_CAPTURES = 2
 """With fewer captures there is nothing to compare."""
 
@@ -48,8 +47,8 @@ class ResidualTable(QWidget):
     chosen = Signal(str)
     repeat_wanted = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "calibrate.residuals", tr("Residuals of the captures"))
         self._captures: tuple[Capture, ...] = ()
         self._heading = ""
@@ -120,7 +119,7 @@ class ResidualTable(QWidget):
                 item.setToolTip(plain_tip(capture.sentence))
                 self._table.setItem(row, column, item)
         self.select(shown)
-        rows = min(len(self._captures), MOST_ROWS)
+        rows = min(len(self._captures), 6)
         head = self._table.horizontalHeader().sizeHint().height()
         self._table.setFixedHeight(head + rows * ROW_HEIGHT + 2 * self._table.frameWidth())
 

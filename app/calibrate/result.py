@@ -53,8 +53,8 @@ class ResultView(QWidget):
 
     step_wanted = Signal(str)
 
-    def __init__(self, steps: Sequence[Step], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, steps: Sequence[Step]) -> None:
+        super().__init__()
         named(self, "result", tr("Calibration"))
         self._rows: dict[Stage, _StageRow] = {}
         self._name = ""

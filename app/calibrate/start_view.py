@@ -13,8 +13,6 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-MOST_RECENT = 6
-
 
 class StartView(QWidget):
     """Offers the buttons to start or continue a calibration.
@@ -27,8 +25,8 @@ class StartView(QWidget):
 
     recent_wanted = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "start", tr("Start a calibration"))
         column = QVBoxLayout(self)
         column.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -98,7 +96,7 @@ class StartView(QWidget):
                 old.deleteLater()
         if folders:
             self._recent.addWidget(PlainLabel(tr("Continue a recent session")))
-        for number, folder in enumerate(folders[:MOST_RECENT]):
+        for number, folder in enumerate(folders[:6]):
             text = f"{folder.parent.parent.name} / {folder.name}"
             button = named(
                 QPushButton(text), f"start.recent.{number}", tr("Continue {s}").format(s=text)

@@ -186,7 +186,7 @@ class StepPresenter(QObject):
         stream = self.model.live.stream
         self.area.show_stream(stream)
         if stream is None:
-            self.area.view.say(no_camera())
+            self.area.view.image.say(no_camera())
         self.model.live_detection.set_detector(None)
 
     def camera_changed(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
+from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
 from app.calibrate.states import state_icon, state_word
 from app.calibrate.step_data import Step
@@ -27,8 +27,8 @@ class StepList(QListWidget):
 
     chosen = Signal(int)
 
-    def __init__(self, steps: Sequence[Step], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, steps: Sequence[Step]) -> None:
+        super().__init__()
         named(self, "calibrate.steps", tr("Steps of the calibration"))
         self._steps = steps
         self.setFixedWidth(WIDTH)

@@ -36,7 +36,6 @@ from gelpolight_core.translation import tr
 WIDTH = 372
 # This space is always reserved, so that nothing below moves when a message changes.
 LIVE_LINES = 4
-NOTICE_LINES = 2
 
 
 class StepPanel(QWidget):
@@ -49,8 +48,8 @@ class StepPanel(QWidget):
 
     """
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "calibrate.panel", tr("This step"))
         self.setFixedWidth(WIDTH)
         self.finished = False
@@ -103,9 +102,7 @@ class StepPanel(QWidget):
         self.capturing = QWidget()
         self.lay = lay_button("calibrate.lay")
         self._extra = QVBoxLayout()
-        self.notice = named(
-            _wrapped(lines=NOTICE_LINES), "calibrate.notice", tr("Result of the last action")
-        )
+        self.notice = named(_wrapped(lines=2), "calibrate.notice", tr("Result of the last action"))
         self.notice.setAlignment(Qt.AlignmentFlag.AlignTop)
         vbox(
             self.lay,

@@ -344,7 +344,7 @@ class Wizard(QMainWindow):
 
     def _signal_capture(self, _stage: str) -> None:
         """Flash and beep: the user looks at the sensor and may now move it."""
-        self.area.view.flash()
+        self.area.view.image.flash()
         if self.panel.automatic.isChecked():
             QApplication.beep()
 
@@ -365,7 +365,7 @@ class Wizard(QMainWindow):
     def _follow_bench(self) -> None:
         """Let drags move the object on the bench, if it is visible next to the live image."""
         live = not self.model.shown and self.bench_dock.in_use
-        self.area.view.hand_drags_on(live and not self.bench_dock.isHidden())
+        self.area.view.image.hand_drags_on(live and not self.bench_dock.isHidden())
 
     def _on_clicked(self, u: float, v: float) -> None:
         if not self.model.shown:

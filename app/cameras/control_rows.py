@@ -35,8 +35,8 @@ class ControlRows(QWidget):
 
     changed = Signal(str, float)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "camera.controls", tr("Camera settings"))
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
 from app.sources.camera.camera import Camera
-from app.widgets.layout import vbox
+from app.widgets.dialog import Dialog, Kinds
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-WIDTH, HEIGHT = 860, 690
 
-
-class CameraDialog(QDialog):
+class CameraDialog(Dialog):
     """Shows the panel of one camera.
 
     Parameters
@@ -30,17 +27,13 @@ class CameraDialog(QDialog):
     def __init__(
         self, manager: CameraManager, camera: Camera, parent: QWidget | None = None
     ) -> None:
-        super().__init__(parent)
-        named(self, "camera", tr("Camera settings"))
-        self.setWindowTitle(tr("Camera settings: {name}").format(name=camera.device.name))
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        title = tr("Camera settings: {name}").format(name=camera.device.name)
+        super().__init__(parent, "camera", title, once=True)
         self.panel = CameraPanel(manager, camera)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        close = buttons.button(QDialogButtonBox.StandardButton.Close)
-        named(close, "camera.close", tr("Close the camera settings"))
-        buttons.rejected.connect(self.close)
-        vbox((self.panel, 1), buttons, of=self)
-        self.resize(WIDTH, HEIGHT)
+        close = tr("Close the camera settings")
+        named(self.buttons.button(Kinds.Close), "camera.close", close)
+        self.fill((self.panel, 1))
+        self.resize(860, 690)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Open the camera."""

@@ -24,8 +24,8 @@ class FormatRows(QWidget):
 
     chosen = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "camera.formats", tr("Image format"))
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)

@@ -5,14 +5,9 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QImage, QPixmap
 from PySide6.QtWidgets import (
-    QFrame,
     QGroupBox,
-    QHBoxLayout,
     QProgressBar,
-    QPushButton,
-    QScrollArea,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,16 +20,14 @@ from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.steadiness import SteadinessTest
 from app.sources.source import Rgb, Setting
 from app.sources.stream import Stream
+from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
-
-UPDATE_MS = 200
-IMAGE_HEIGHT = 180
 
 
 class CameraPanel(QWidget):
@@ -58,29 +51,21 @@ class CameraPanel(QWidget):
         self._test: SteadinessTest | None = None
         self._broken_off = False
         self._result, self._result_of = QualityTable(), tuple[Setting, ...]()
-        self._tick = QTimer(self, interval=UPDATE_MS)
+        self._tick = QTimer(self, interval=200)
         self._tick.timeout.connect(self._update)
         self.formats, self.controls = FormatRows(), ControlRows()
         hbox((self._build_settings(), 1), (self._build_verdicts(), 1), of=self)
         self.formats.chosen.connect(lambda chosen: manager.choose_format(camera, chosen))
         self.controls.changed.connect(lambda key, value: manager.set(camera, {key: value}))
-        self.lock.clicked.connect(lambda: manager.lock(camera))
-        self.test.clicked.connect(self._begin_test)
-        self.restore.clicked.connect(lambda: manager.restore(camera))
         self._show()
 
     def _build_settings(self) -> QWidget:
         formats, controls = QGroupBox(tr("Image")), QGroupBox(tr("Settings"))
-        QVBoxLayout(formats).addWidget(self.formats)
-        QVBoxLayout(controls).addWidget(self.controls)
+        vbox(self.formats, of=formats)
+        vbox(self.controls, of=controls)
         inside = QWidget()
         vbox(formats, controls, None, of=inside)
-        area = named(QScrollArea(), "camera.settings", tr("Format and settings"))
-        area.setWidgetResizable(True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setWidget(inside)
-        return area
+        return named(scroll_area(inside), "camera.settings", tr("Format and settings"))
 
     def _build_verdicts(self) -> QWidget:
         self.state = named(PlainLabel(wrap=True), "camera.state", tr("State of the camera"))
@@ -88,50 +73,48 @@ class CameraPanel(QWidget):
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.image = named(PlainLabel(), "camera.image", tr("Camera image"))
         self.image.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.image.setFixedHeight(IMAGE_HEIGHT)
+        self.image.setFixedHeight(180)
         self.image.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.restore = named(
-            QPushButton(tr("&Restore")),
+        self.restore = push_button(
             "camera.restore",
-            tr("Restore the settings of the calibration or session"),
+            tr("&Restore"),
+            lambda: self._manager.restore(self.camera),
+            accessible=tr("Restore the settings of the calibration or session"),
         )
-        self.lock = named(
-            QPushButton(tr("&Lock")),
+        self.lock = push_button(
             "camera.lock",
-            tr("Lock the settings"),
-            tr("Fix everything that the camera sets automatically, at its present value"),
+            tr("&Lock"),
+            lambda: self._manager.lock(self.camera),
+            accessible=tr("Lock the settings"),
+            tip=tr("Fix everything that the camera sets automatically, at its present value"),
         )
-        self.test = named(
-            QPushButton(tr("&Test stability")),
+        self.test = push_button(
             "camera.test",
-            tr("Test whether the image is stable"),
-            tr("Analyses the images for some seconds; do not touch the sensor meanwhile"),
+            tr("&Test stability"),
+            self._begin_test,
+            accessible=tr("Test whether the image is stable"),
+            tip=tr("Analyses the images for some seconds; do not touch the sensor meanwhile"),
         )
         self.bar = named(QProgressBar(), "camera.test.progress", tr("Progress of the test"))
         self.bar.setTextVisible(False)
-        buttons = QHBoxLayout()
-        for button in (self.lock, self.test, self.restore):
+        buttons = self.lock, self.test, self.restore
+        for button in buttons:
             button.setAutoDefault(False)  # Enter in a field applies its value and nothing else
-            buttons.addWidget(button)
         self.locks = QualityTableWidget(
             "camera.lock.quality", tr("Results of the lock"), narrow=True
         )
         self.steady = QualityTableWidget("camera.test.quality", tr("Stability"), narrow=True)
         tables = QWidget()
-        column = QVBoxLayout(tables)
-        column.setContentsMargins(0, 0, 0, 0)
+        column = vbox(of=tables, margins=0)
         for title, table in ((tr("Lock"), self.locks), (tr("Stability"), self.steady)):
             heading = PlainLabel(title)
             make_bold(heading)
             column.addWidget(heading)
             column.addWidget(table)
         column.addStretch(1)
-        area = named(QScrollArea(), "camera.verdicts", tr("Lock and stability"))
-        area.setWidgetResizable(True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setWidget(tables)
+        area = named(scroll_area(tables), "camera.verdicts", tr("Lock and stability"))
         side = QWidget()
-        vbox(self.image, self.state, buttons, self.bar, (area, 1), of=side)
+        vbox(self.image, self.state, hbox(*buttons), self.bar, (area, 1), of=side)
         return side
 
     # Camera access

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import StageProgress, check_outputs, quality_lines
+from app.command_line.common import check_outputs, quality_lines, stage_progress
 from app.command_line.reconstructing import add_model, report_failure
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
     session = read_any_session(options.session)
     check_outputs([options.output, options.json], session_files(session))
-    with StageProgress() as progress:
+    with stage_progress() as progress:
         result = calibrate_any(session, model=options.model, progress=progress)
     write_calibration(result.calibration, options.output)
     if isinstance(result, InPlaceRun):

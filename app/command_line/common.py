@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from tqdm import tqdm
@@ -15,24 +16,17 @@ from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
-class StageProgress:
-    """A progress bar on stderr for stage functions, which report their name and progress."""
+@contextmanager
+def stage_progress() -> Iterator[Callable[[str, float], None]]:
+    """Show a progress bar on stderr. Yield the function that gets a stage and its progress."""
+    with tqdm(total=100, file=sys.stderr, bar_format="{desc:<24}{bar:30}{n:4.0f} %") as bar:
 
-    def __init__(self) -> None:
-        self._bar = tqdm(total=100, file=sys.stderr, bar_format="{desc:<24}{bar:30}{n:4.0f} %")
+        def report(stage: str, share: float) -> None:
+            bar.set_description_str(stage)
+            bar.n = round(100 * share)
+            bar.refresh()
 
-    def __enter__(self) -> Callable[[str, float], None]:
-        """Return the function that receives the progress."""
-        return self._report
-
-    def __exit__(self, *_: object) -> None:
-        """Close the bar."""
-        self._bar.close()
-
-    def _report(self, stage: str, share: float) -> None:
-        self._bar.set_description_str(stage)
-        self._bar.n = round(100 * share)
-        self._bar.refresh()
+        yield report
 
 
 def numbers(text: str) -> list[float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from app.command_line.common import StageProgress
+from app.command_line.common import stage_progress
 from app.command_line.reconstructing import add_model, load_reconstructor
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     crossing = crossing_of(presses)
     make_folder(options.output)
     ledger = open_ledger(None, reconstructor)
-    with StageProgress() as progress:
+    with stage_progress() as progress:
         if options.workers > 1:
             measure_folder(
                 presses,

@@ -72,7 +72,8 @@ class Inputs:
                 if is_recording(path):
                     self._add_recording(path, frames)
                 else:
-                    self.items.append(_of_file(path))
+                    read = partial(_read_file, path)
+                    self.items.append(Input(path.name, path.stem, str(path), read))
             if frames and not self.recordings:
                 raise InputError(
                     tr("None of the inputs is a recording"),
@@ -168,10 +169,6 @@ def frame_slice(text: str) -> slice:
     first, colon, end, step = match.groups()
     last = int(end) if end else int(first) + 1 if first and not colon else None
     return slice(int(first or 0), last, int(step or 1))
-
-
-def _of_file(path: Path) -> Input:
-    return Input(path.name, path.stem, str(path), partial(_read_file, path))
 
 
 def _read_file(path: Path, response: CameraResponse | None) -> LinearImage:

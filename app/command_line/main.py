@@ -11,7 +11,7 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TextIO
 
@@ -158,7 +158,8 @@ def _log_warning(
 def _write_log(text: str) -> Path | None:
     """Append to the log, in the temporary folder if necessary, and return its path."""
     entry = f"{datetime.now(UTC).isoformat()} gelpolight {__version__}\n{text}\n"
-    for make_folder in (_log_folder, _private_folder):
+    usual = partial(platformdirs.user_log_path, "gelpolight", ensure_exists=True)
+    for make_folder in (usual, _private_folder):
         try:
             log = make_folder() / LOG
             with log.open("a", encoding="utf-8") as stream:
@@ -167,10 +168,6 @@ def _write_log(text: str) -> Path | None:
             continue
         return log
     return None
-
-
-def _log_folder() -> Path:
-    return platformdirs.user_log_path("gelpolight", ensure_exists=True)
 
 
 @cache

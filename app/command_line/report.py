@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import StageProgress, refuse_overwriting
+from app.command_line.common import refuse_overwriting, stage_progress
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
 from app.workspace.entries import read_entry
@@ -93,7 +93,7 @@ def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report
     refuse_overwriting([options.output], [options.source])
     refuse_unwritable(options.output)
     calibration = read_calibration(options.source)
-    with StageProgress() as progress:
+    with stage_progress() as progress:
         validation = _validate(calibration, presses, progress)
     if validation is None:
         validation = stated_validation(read_entry(options.source))
@@ -104,7 +104,7 @@ def _of_session(options: argparse.Namespace, presses: Path | None) -> Report:
     session = read_any_session(options.source)
     refuse_overwriting([options.output], session_files(session))
     refuse_unwritable(options.output)
-    with StageProgress() as progress:
+    with stage_progress() as progress:
         result = calibrate_any(session, model=options.model, progress=progress)
         validation = _validate(result.calibration, presses, progress)
         progress(tr("report"), 1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from app.command_line.common import StageProgress
+from app.command_line.common import stage_progress
 from app.command_line.terminal import say
 from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.simulation.session import simulate_session
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Render the session."""
     design = read_design(options.design) if options.design else SensorDesign()
-    with StageProgress() as progress:
+    with stage_progress() as progress:
         simulate_session(design, options.output, closed=options.closed, progress=progress)
     say(tr("Session saved to {folder}").format(folder=options.output))
     return 0

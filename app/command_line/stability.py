@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from app.command_line.common import StageProgress
+from app.command_line.common import stage_progress
 from app.command_line.terminal import say
 from gelpolight_core.io.atomic import make_folder, refuse_unwritable
 from gelpolight_core.studies.stability import (
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     make_folder(options.output)
     refuse_unwritable(options.output / "stability.csv")
     results = []
-    with StageProgress() as progress:
+    with stage_progress() as progress:
         for number, case in enumerate(cases):
             progress(case.name, number / len(cases))
             results.append(run_case(case))

@@ -13,8 +13,6 @@ from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
 from gelpolight_core.translation import tr
 
-JSON_LIMIT = 50_000_000
-
 
 def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
     """Add the tool to a group of alternatives, and its geometry to the parser."""
@@ -132,7 +130,7 @@ def _refuse_options(options: argparse.Namespace, *names: str) -> None:
 def _read(path: Path) -> Any:
     """Read a JSON file."""
     try:
-        return parse_json(read_file(path, JSON_LIMIT))
+        return parse_json(read_file(path, 50_000_000))
     except (FileNotFoundError, ValueError) as error:
         raise InputError(
             tr("This is neither a measuring tool nor a JSON file"),

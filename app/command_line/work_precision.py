@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from app.command_line.common import StageProgress
+from app.command_line.common import stage_progress
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_open_calibration
 from gelpolight_core.calibration.pipeline import calibrate_session
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     make_folder(options.output)
     refuse_unwritable(options.output / "work-precision.csv")
     repeats = max(options.repeats, 1)
-    with StageProgress() as progress:
+    with stage_progress() as progress:
         if session is None:
             points = measure_virtual(
                 SensorDesign(), calibration, repeats=repeats, seed=options.seed, progress=progress

@@ -141,7 +141,6 @@ def export_recording(
 
 
 FIRST_FORMATS = ("npz", "tif")
-FOLDER_WIDTH = 360
 
 
 class ExportDialog(Dialog):
@@ -188,7 +187,7 @@ class ExportDialog(Dialog):
         )
         form.addRow(tr("Mesh: every n-th node"), self._stride)
         self._folder = named(QLineEdit(str(folder)), "inspect.export.folder", tr("Folder"))
-        self._folder.setMinimumWidth(FOLDER_WIDTH)
+        self._folder.setMinimumWidth(360)
         self._folder.textChanged.connect(self._check)
         browse = push_button(
             "inspect.export.browse", tr("Browse…"), self._browse, accessible=tr("Choose folder")

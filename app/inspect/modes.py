@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from statistics import median
 
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QComboBox, QWidget
+from PySide6.QtWidgets import QComboBox
 
 from app.context.context import AppContext
 from app.live.frame_results import Shown
@@ -27,7 +27,6 @@ from gelpolight_core.reconstruction.modes import (
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
-WIDTH_CHARACTERS = 32
 TIMED = 15
 """Number of frames for the median time."""
 
@@ -35,8 +34,8 @@ TIMED = 15
 class ModeBox(ComboBox):
     """The modes of reconstruction, each with its error and its time."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(
             self,
             "inspect.mode",
@@ -50,7 +49,7 @@ class ModeBox(ComboBox):
             ),
         )
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.setMinimumContentsLength(WIDTH_CHARACTERS)
+        self.setMinimumContentsLength(32)
         self.setEnabled(False)
 
     def show_modes(self, modes: tuple[Mode, ...], chosen: Mode | None) -> None:

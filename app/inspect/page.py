@@ -37,8 +37,6 @@ from app.widgets.naming import named
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
 
-TEXT_MS = 250
-
 
 class InspectPage(QWidget):
     """Shows the depth of the pressed membrane.
@@ -138,7 +136,7 @@ class InspectPage(QWidget):
         self.recorder.reported.connect(self._on_recorded)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self.banner.act_wanted.connect(self._on_act)
-        self._texts = QTimer(self, interval=TEXT_MS)
+        self._texts = QTimer(self, interval=250)
         self._texts.timeout.connect(self._show_texts)
 
     # Called by the main window

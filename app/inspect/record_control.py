@@ -15,8 +15,6 @@ from app.widgets.actions import make_action
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
-POLL_MS = 300
-
 
 class RecordControl(QObject):
     """Records the frames of the source.
@@ -48,7 +46,7 @@ class RecordControl(QObject):
             icon_name="record", tip=tr("Record every frame without loss"),
         )  # fmt: skip
         self.action.setCheckable(True)
-        self._timer = QTimer(self, interval=POLL_MS)
+        self._timer = QTimer(self, interval=300)
         self._timer.timeout.connect(self._poll)
         depth.live.switched.connect(self._on_switched)
 

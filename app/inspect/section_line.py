@@ -18,7 +18,6 @@ from app.widgets.plots import own_handle_menus
 from gelpolight_core.measurement.area import Rectangle
 
 REGION_INK = "#ff5c2e"
-BAND_ALPHA = 60
 LEAST_MM = 0.05
 APART_MM = 1.5
 """Distance of a new line from the chosen one."""
@@ -137,7 +136,7 @@ class _LineItem(QObject):
         own_handle_menus(self._roi, view)
         self._roi.setAcceptedMouseButtons(Qt.MouseButton.LeftButton)
         band = QColor(self._colour)
-        band.setAlpha(BAND_ALPHA)
+        band.setAlpha(60)
         self._band = QGraphicsPolygonItem()
         self._band.setBrush(band)
         self._band.setPen(pg.mkPen(None))

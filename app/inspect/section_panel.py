@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pyqtgraph as pg
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QIcon, QPixmap
-from PySide6.QtWidgets import QFrame, QScrollArea, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.inspect.section_line import SectionLines
 from app.view2d.cuts import Cut, Section
@@ -16,7 +16,7 @@ from app.widgets.buttons import push_button, tool_button
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.units import figure_in_unit
 from gelpolight_core.measurement.measured import Measured
@@ -24,7 +24,6 @@ from gelpolight_core.translation import tr
 
 FIRST, SECOND = QColor(11, 92, 173, 60), QColor(23, 138, 70, 60)
 DEG = "deg"
-SIDE_WIDTH = 170
 
 
 class SectionPanel(QWidget):
@@ -60,13 +59,10 @@ class SectionPanel(QWidget):
         )
         self._figures = named(MarkupLabel(wrap=True), "inspect.section.figures", tr("Measurements"))
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
-        scroll = QScrollArea(widgetResizable=True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(self._figures)
+        scroll = scroll_area(self._figures)
         side = vbox(self.choice, self.form, save, (scroll, 1), margins=0, spacing=2)
         for widget in (self.choice, self.form, save, scroll):
-            widget.setFixedWidth(SIDE_WIDTH)
+            widget.setFixedWidth(170)
         hbox((self._plot, 1), side, of=self, margins=(2, 2, 2, 4), spacing=2)
 
     def _make_plot(self) -> None:
@@ -143,9 +139,6 @@ def figure_text(figure: Measured, where: str = "") -> str:
     return f"{escaped(figure.label + where)}: <b>{value:.{digits}f}{sd}{unit}</b>"
 
 
-SAMPLE_PX = 12
-
-
 class LineChoice(QWidget):
     """The list of the lines in their colours, with buttons to add and remove one.
 
@@ -192,7 +185,7 @@ class LineChoice(QWidget):
         with QSignalBlocker(self._box):
             self._box.clear()
             for line in lines:
-                sample = QPixmap(SAMPLE_PX, SAMPLE_PX)
+                sample = QPixmap(12, 12)
                 sample.fill(QColor(line_colour(line.number)))
                 text = tr("Line {n}").format(n=line.number)
                 self._box.addItem(QIcon(sample), text, line.number)

@@ -23,7 +23,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.export.live_message import pack
 from gelpolight_core.translation import tr
 
-WIDTH = 440
 HOST, PORT = "127.0.0.1", 5557
 ANY_HOST = "0.0.0.0"
 """All networks of this computer."""
@@ -141,7 +140,7 @@ class StreamDialog(Dialog):
     def __init__(self, stream: DepthStream, parent: QWidget) -> None:
         super().__init__(parent, "stream", tr("Stream the live depth"))
         self._stream = stream
-        self.setMinimumWidth(WIDTH)
+        self.setMinimumWidth(440)
         about = PlainLabel(
             tr(
                 "Depth, normals, flags and health of the live frames are sent over ZeroMQ while "

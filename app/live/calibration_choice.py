@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QComboBox, QWidget
+from PySide6.QtWidgets import QComboBox
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
@@ -25,7 +25,6 @@ from gelpolight_core.translation import tr
 if TYPE_CHECKING:
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-WIDTH_CHARACTERS = 22
 # From this size on kernels may be compiled, which takes a minute the first time.
 WARM_FROM = 0.2
 
@@ -39,11 +38,11 @@ class CalibrationBox(ComboBox):
         First part of the object name.
     """
 
-    def __init__(self, parent: QWidget | None = None, *, page: str = "inspect") -> None:
-        super().__init__(parent)
+    def __init__(self, *, page: str = "inspect") -> None:
+        super().__init__()
         named(self, f"{page}.calibration", tr("Calibration in use"))
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.setMinimumContentsLength(WIDTH_CHARACTERS)
+        self.setMinimumContentsLength(22)
 
     def show_entries(self, entries: tuple[Entry, ...]) -> None:
         """Show the calibrations that can be read."""

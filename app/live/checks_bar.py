@@ -55,8 +55,8 @@ class ChecksBar(QWidget):
     The number of lines depends only on the width, so that nothing jumps when a text changes.
     """
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "live.checks", tr("Image checks"))
         self.focus = FocusBar()
         self._exposure = named(PlainLabel(), "live.exposure", tr("Exposure"))
@@ -126,7 +126,7 @@ CHANNELS: tuple[tuple[Role, str, Qt.PenStyle], ...] = (
 class Histogram(QWidget):
     """Three lines, pixels by brightness, on a logarithmic scale."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         named(self, "live.histogram", tr("Histogram"))
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)

@@ -25,7 +25,6 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace_tally import TraceTally
 from gelpolight_core.translation import tr
 
-RATE_WINDOW_S = 2.0
 PRESSED_LIVE = "camera", "virtual"
 """Kinds of sources whose gel is pressed now. A recording shows earlier presses."""
 
@@ -265,7 +264,7 @@ class LiveDepth(QObject):
         trace = shown.heightmap and shown.heightmap.trace
         if trace is not None and not self.live.paused:
             self._tally.add(trace, now)
-        while now - self._shown_s[0] > RATE_WINDOW_S:
+        while now - self._shown_s[0] > 2.0:
             self._shown_s.popleft()
 
     def _process_again(self) -> None:

@@ -44,11 +44,8 @@ ROLE_COLOURS: dict[Role, str] = {
 NOTE_SIGNS: dict[Role, str] = {"good": "\u2713", "bad": "\u2715", "expected": "?"}
 HALO = QColor(0, 0, 0, 170)
 PLATE = QColor(0, 0, 0, 150)
-MARKER_PX = 7.0
-GRIP_PX = 4.0
 # How near to a handle the pointer must be, in screen pixels.
 REACH_PX = 12.0
-MASK_ALPHA = 95
 
 
 class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
@@ -58,8 +55,6 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
     -------
     handle_moved(Handle)
         A drag ended.
-    handle_grabbed(str)
-        A handle was grabbed.
     """
 
     handle_moved = Signal(object)
@@ -183,7 +178,7 @@ def _mask_image(mask: Mask) -> tuple[QRectF, QImage]:
     padded[:, :columns] = mask.area[top : top + rows, left : left + columns]
     image = QImage(padded.data, columns, rows, padded.shape[1], QImage.Format.Format_Indexed8)
     tint = QColor(ROLE_COLOURS[mask.role])
-    tint.setAlpha(MASK_ALPHA)
+    tint.setAlpha(95)
     image.setColorTable([0, tint.rgba()])
     return QRectF(left - 0.5, top - 0.5, columns, rows), image.copy()
 
@@ -225,7 +220,7 @@ def _paint_circle(painter: QPainter, circle: Circle, to_screen: QTransform, sele
 
 
 def _paint_grip(painter: QPainter, at: QPointF, role: Role, selected: bool) -> None:
-    size = GRIP_PX + (2.0 if selected else 0.0)
+    size = 4.0 + (2.0 if selected else 0.0)
     box = QRectF(at.x() - size, at.y() - size, 2 * size, 2 * size)
     painter.setPen(QPen(QColor(0, 0, 0), 1.0))
     painter.setBrush(QColor("white") if selected else QColor(ROLE_COLOURS[role]))
@@ -234,7 +229,7 @@ def _paint_grip(painter: QPainter, at: QPointF, role: Role, selected: bool) -> N
 
 def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, selected: bool) -> None:
     at = to_screen.map(QPointF(marker.u, marker.v))
-    x, y, s = at.x(), at.y(), MARKER_PX
+    x, y, s = at.x(), at.y(), 7.0
 
     def draw() -> None:
         match marker.kind:

@@ -35,13 +35,9 @@ from gelpolight_core.reconstruction.modes import IN_PLACE
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
-LIVE_PX = 560
-CAMERA_PX = 760
-STILL_PX = 2000
 MISFIT_NODES = 128, 400
 """Longest side of a live and of a frozen image, in pixels."""
 LEAST_MISFIT = 0.02
-WHITE = np.full((256, 3), 255, np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +250,7 @@ class Maker:
 
 def camera_image(frame: Frame, wanted: Wanted) -> NDArray[np.uint8]:
     """Return the camera image for the screen."""
-    shown = frame.rgb if wanted.still else shading.fitted(frame.rgb, CAMERA_PX)
+    shown = frame.rgb if wanted.still else shading.fitted(frame.rgb, 760)
     return eight_bits(shown)
 
 
@@ -273,7 +269,7 @@ class _Images:
         heightmap, self._raw, self._steps = done.heightmap, raw, done.steps
         self._map, self._wanted, self._display = heightmap, wanted, wanted.display
         self._misfit, self._misfit_top = misfit, misfit_top
-        self._px = STILL_PX if wanted.still else LIVE_PX
+        self._px = 2000 if wanted.still else 560
         self._depth = shading.fitted(heightmap.depth_mm, self._px)
         rows, columns = self._depth.shape
         self._pitch_mm = heightmap.pitch_mm * heightmap.depth_mm.shape[1] / columns
@@ -403,8 +399,9 @@ class _Images:
 
     def _light(self) -> NDArray[np.uint8]:
         """Return the relief under the lamp, without colours."""
+        white = np.full((256, 3), 255, np.uint8)
         return shading.shaded(
-            self._depth, self._pitch_mm, WHITE, self.range_mm, self._display.light,
+            self._depth, self._pitch_mm, white, self.range_mm, self._display.light,
             exaggeration=self._display.exaggeration,
         )  # fmt: skip
 

@@ -36,8 +36,6 @@ class Exposure:
     ----------
     saturated_share : float
         Pixels with a channel at the end of scale, 0..1.
-    brightest : float
-        Level that only a few pixels exceed, share of the scale.
     verdict : Verdict
         Verdict on the exposure.
     advice : str
@@ -45,7 +43,6 @@ class Exposure:
     """
 
     saturated_share: float
-    brightest: float
     verdict: Verdict
     advice: str
 
@@ -85,26 +82,24 @@ def measure_exposure(rgb: Rgb) -> Exposure:
     if share > SATURATED_WARN:
         verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
         text = tr("Too bright: {p} % of the pixels are saturated. Shorten the exposure.")
-        return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * share)))
+        return Exposure(share, verdict, text.format(p=_percent(100.0 * share)))
     if brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
         text = tr("Too dark: maximum {p} % of the scale. Lengthen the exposure.")
-        return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * brightest)))
+        return Exposure(share, verdict, text.format(p=_percent(100.0 * brightest)))
     if brightest >= 1.0:
-        text = tr("Good exposure, except for saturated bright spots.")
-        return Exposure(share, brightest, Verdict.PASS, text)
+        return Exposure(
+            share, Verdict.PASS, tr("Good exposure, except for saturated bright spots.")
+        )
     text = tr("Good exposure: the brightest areas reach {p} % of the scale.")
-    return Exposure(share, brightest, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))
+    return Exposure(share, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))
 
 
 def _level_of_brightest(rgb: Rgb) -> float:
     """Return the share of the scale that the brightest pixels reach, except for a few."""
-    counts = np.cumsum(np.bincount(_high_byte(brightest_channel(rgb)).ravel(), minlength=256)[::-1])
+    levels = eight_bits(brightest_channel(rgb)).ravel()
+    counts = np.cumsum(np.bincount(levels, minlength=256)[::-1])
     return float(255 - int(np.searchsorted(counts, BRIGHTEST_PIXELS))) / 255.0
-
-
-def _high_byte(values: Rgb) -> NDArray[np.uint8]:
-    return np.asarray(values >> (8 * values.dtype.itemsize - 8), np.uint8)
 
 
 def _percent(value: float) -> str:
@@ -152,25 +147,21 @@ class BestFocus:
         return focus / self.best if self.best > 0.0 else 0.0
 
 
-def channel_histograms(rgb: Rgb, bins: int = 64) -> NDArray[np.int64]:
+def channel_histograms(rgb: Rgb) -> NDArray[np.int64]:
     """Count pixels by brightness, separately for each channel.
 
     Parameters
     ----------
     rgb : (rows, columns, 3) uint8 or uint16
         The image, or a regular subset of its pixels.
-    bins : int, optional
-        A power of two, at most 256.
 
     Returns
     -------
-    (3, bins) int64
+    (3, 64) int64
         Counts; the last bin is the end of the scale.
     """
-    shift = 8 * rgb.dtype.itemsize - (bins - 1).bit_length()
-    return np.stack(
-        [np.bincount(rgb[..., k].ravel() >> shift, minlength=bins) for k in range(3)]
-    ).astype(np.int64)
+    levels = rgb >> (8 * rgb.dtype.itemsize - 6)
+    return np.stack([np.bincount(levels[..., k].ravel(), minlength=64) for k in range(3)])
 
 
 def pixel_text(rgb: Rgb, u: float, v: float) -> str:

@@ -13,19 +13,16 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QResizeEvent
-from PySide6.QtWidgets import QWidget
 
 from app.live.drawing import OverlayItem
 from app.view2d.display import SURROUND
-from app.widgets.label import PlainLabel
+from app.widgets.label import placeholder
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 # From this magnification on pixels are shown as squares, which is the purpose of zooming in.
 SQUARES_FROM = 1.5
-FLASH, FLASH_MS = QColor(255, 255, 255, 150), 180
-LEAST_SHOWN_PX = 6.0
-FARTHEST_PX = 8000.0
+FLASH = QColor(255, 255, 255, 150)
 
 
 class _Box(pg.ViewBox):  # type: ignore[misc]
@@ -75,8 +72,8 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
     zoomed = Signal(float)
     resized = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent, background=SURROUND)
+    def __init__(self) -> None:
+        super().__init__(background=SURROUND)
         named(self, "live.image", tr("Live image"))
         # Keys belong to the whole live view, which handles those of tools and handles.
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -95,10 +92,7 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         self._box.sigRangeChanged.connect(self._on_range)
         self.scene().sigMouseMoved.connect(self._on_pointer)
         self.scene().sigMouseClicked.connect(self._on_click)
-        self._placeholder = PlainLabel(tr("No camera. Select a source."), self, wrap=True)
-        self._placeholder.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._placeholder.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 15px;")
-        self._placeholder.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._placeholder = placeholder(self, tr("No camera. Select a source."))
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -136,9 +130,9 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
             # Half a pixel: (0, 0) is the centre of the first pixel, not its corner.
             self._image.setRect(QRectF(-0.5, -0.5, *size))
             # Far enough out for full size in any window, but the image must not get lost.
-            reach = max(4.0 * max(size), FARTHEST_PX)
+            reach = max(4.0 * max(size), 8000.0)
             self._box.setLimits(
-                minXRange=LEAST_SHOWN_PX,
+                minXRange=6.0,
                 xMin=-reach,
                 xMax=size[0] + reach,
                 yMin=-reach,
@@ -153,7 +147,7 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
     def flash(self) -> None:
         """Brighten the view for a moment."""
         self.setForegroundBrush(FLASH)
-        QTimer.singleShot(FLASH_MS, self, lambda: self.setForegroundBrush(Qt.BrushStyle.NoBrush))
+        QTimer.singleShot(180, self, lambda: self.setForegroundBrush(Qt.BrushStyle.NoBrush))
 
     def say(self, text: str) -> None:
         """Change the text that is shown when there is no image."""

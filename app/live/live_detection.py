@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -27,30 +26,6 @@ class Seen:
     moved: bool
 
 
-class _Movement:
-    """Whether the images are still, and have moved. Updated by the processing thread.
-
-    Attributes
-    ----------
-    moved : bool
-        Whether something has moved since this was set to False.
-    """
-
-    def __init__(self) -> None:
-        self.moved = False
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin again with another camera."""
-        self._still = StillnessDetector()
-
-    def update(self, frame: Frame) -> bool:
-        """Return whether the images are still."""
-        quiet = self._still.update(frame.rgb, frame.time_s)
-        self.moved = self.moved or self._still.moves
-        return quiet
-
-
 class LiveDetection(QObject):
     """Lets a session run a detector. The values of its outcomes are `Seen`, or None.
 
@@ -62,8 +37,8 @@ class LiveDetection(QObject):
 
     def __init__(self, live: LiveSession) -> None:
         super().__init__(live)
-        self._live, self._movement = live, _Movement()
-        live.switched.connect(self._restart)
+        self._live, self._movement = live, StillnessDetector()
+        live.switched.connect(self._movement.restart)
 
     def set_detector(self, detect: Callable[[Rgb], Any] | None) -> None:
         """Use a detector from the next frame on. None: no detector."""
@@ -73,7 +48,7 @@ class LiveDetection(QObject):
 
         def detect_frame(frame: Frame) -> Seen | None:
             # Always checked, so that no movement is missed while the detector changes.
-            quiet = movement.update(frame)
+            quiet = movement.update(frame.rgb, frame.time_s)
             return None if detect is None else Seen(detect(frame.rgb), quiet, movement.moved)
 
         self._live.process(detect_frame)
@@ -81,9 +56,6 @@ class LiveDetection(QObject):
     def forget_movement(self) -> None:
         """Reset the movement check: only movements from now on count."""
         self._movement.moved = False
-
-    def _restart(self) -> None:
-        self._movement.restart()
 
 
 # After it is released, an object shakes for a few tenths of a second.
@@ -94,28 +66,32 @@ STILL_FRAMES = 3
 
 
 class StillnessDetector:
-    """Compares consecutive frames and reports when nothing has moved for a while."""
+    """Compares consecutive frames and reports when nothing has moved for a while.
 
-    def __init__(self, still_s: float = STILL_S) -> None:
-        self._still_s = still_s
+    Attributes
+    ----------
+    moved : bool
+        Whether something has moved between two frames since this was set to False.
+    """
+
+    def __init__(self) -> None:
+        self.moved = False
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin again with another camera."""
         self._before: Rgb | None = None
         self._quiet, self._since_s = 0, 0.0
-        self.moving = math.nan
 
     def update(self, rgb: Rgb, time_s: float) -> bool:
         """Add a frame and its time; return whether all the last frames were alike."""
         before, self._before = self._before, rgb
         alike = before is not None and before.shape == rgb.shape and before.dtype == rgb.dtype
         if before is not None and alike:
-            self.moving = moving_share(before, rgb)
-            alike = self.moving <= MOVING_SHARE
+            alike = moving_share(before, rgb) <= MOVING_SHARE
+            self.moved = self.moved or not alike
         if not alike:
             self._quiet, self._since_s = 0, time_s
             return False
         self._quiet += 1
-        return self._quiet >= STILL_FRAMES and time_s - self._since_s >= self._still_s
-
-    @property
-    def moves(self) -> bool:
-        """Whether something moved between the last two frames; False without two frames."""
-        return self.moving > MOVING_SHARE
+        return self._quiet >= STILL_FRAMES and time_s - self._since_s >= STILL_S

@@ -6,7 +6,6 @@ import math
 import time
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -28,16 +27,15 @@ from app.live.image_checks import (
 from app.live.image_view import ImageView
 from app.live.overlay import Handle, Overlay, move, next_name, resize
 from app.live.tools import ImageTools
+from app.sources.stream import Stream
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.translation import tr
 
-TICK_MS = 16
 # Texts and figures change five times per second; faster changes cannot be read.
 CHECK_S = 0.2
-RATE_S = 0.5
 # One pixel in nine: still a hundred thousand for a small camera.
 CHECK_STRIDE = 3
 NUDGE_PX = 0.2
@@ -48,34 +46,17 @@ ZOOM_STEP = 1.25
 CORNER_PX = 10
 
 
-class FrameLike(Protocol):
-    """The part of a frame that this view needs."""
-
-    @property
-    def rgb(self) -> Rgb:
-        """(rows, columns, 3), never changed."""
-
-
-class MailboxLike(Protocol):
-    """A slot with the newest frame."""
-
-    def take(self) -> FrameLike | None:
-        """Return the frame and empty the slot."""
-
-
-class StreamLike(Protocol):
-    """A stream of frames."""
-
-    @property
-    def newest(self) -> MailboxLike:
-        """The newest frame, read only by this view."""
-
-    def figures(self) -> Any:
-        """Return the frame rate and the dropped frames."""
-
-
 class LiveView(QWidget):
     """Shows a stream or a still image with checks, and an overlay with movable handles.
+
+    Attributes
+    ----------
+    image : ImageView
+        The image.
+    tools : ImageTools
+        Its buttons.
+    shown_frames : int
+        Number of images shown so far.
 
     Signals
     -------
@@ -84,7 +65,8 @@ class LiveView(QWidget):
     clicked(float, float)
         A left click at (u, v).
     dragged(str, float, float)
-        "begin", "move" or "end" of a drag, and its position: see :meth:`hand_drags_on`.
+        "begin", "move" or "end" of a drag with the left button beside the handles, and its
+        position, if ``image`` hands drags on.
     saved(str)
         Path of the saved snapshot.
     refused(str)
@@ -97,12 +79,12 @@ class LiveView(QWidget):
     saved = Signal(str)
     refused = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         named(self, "live", tr("Live view"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.snapshot_folder = _default_folder()
-        self._stream: StreamLike | None = None
+        self._stream: Stream | None = None
         self._rgb: Rgb | None = None
         self._overlay = Overlay()
         self._best_focus = BestFocus()
@@ -110,40 +92,29 @@ class LiveView(QWidget):
         self._checked_s = -math.inf
         self._rate_shown_s = -math.inf
         self._pointer = (math.nan, math.nan)
-        self._shown_frames = 0
-        self._tools = ImageTools(self)
-        self._image = ImageView()
+        self.shown_frames = 0
+        self.tools = ImageTools(self)
+        self.image = ImageView()
         self._checks = ChecksBar()
-        self._histogram = Histogram(self._image)
+        self._histogram = Histogram(self.image)
         self._histogram.hide()
-        self._lay_out()
-        self._connect()
-
-    def _lay_out(self) -> None:
-        vbox(self._tools, (self._image, 1), self._checks, of=self, margins=0, spacing=0)
-
-    def _connect(self) -> None:
-        self._tools.pressed.connect(self._on_tool)
-        self._tools.switched.connect(self._on_switch)
-        self._image.pointed.connect(self._on_pointed)
-        self._image.clicked.connect(self.clicked)
-        self._image.dragged.connect(self.dragged)
-        self._image.zoomed.connect(self._tools.show_zoom)
-        self._image.resized.connect(self._place_histogram)
-        self._image.overlay.handle_moved.connect(self._on_handle_moved)
-        self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=TICK_MS)
+        vbox(self.tools, (self.image, 1), self._checks, of=self, margins=0, spacing=0)
+        self.tools.pressed.connect(self._on_tool)
+        self.tools.switched.connect(self._on_switch)
+        self.image.pointed.connect(self._on_pointed)
+        self.image.clicked.connect(self.clicked)
+        self.image.dragged.connect(self.dragged)
+        self.image.zoomed.connect(self.tools.show_zoom)
+        self.image.resized.connect(self._place_histogram)
+        self.image.overlay.handle_moved.connect(self._on_handle_moved)
+        self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=16)
         self._tick.timeout.connect(self._show_newest_frame)
         self._nudge_end = QTimer(self, singleShot=True, interval=NUDGE_END_MS)
         self._nudge_end.timeout.connect(self._end_nudge)
 
-    @property
-    def shown_frames(self) -> int:
-        """Number of images shown so far."""
-        return self._shown_frames
-
     # Called by the pages
 
-    def set_stream(self, stream: StreamLike | None) -> None:
+    def set_stream(self, stream: Stream | None) -> None:
         """Show the newest frames of `stream` from now on; None: remove the image."""
         self._stream = stream
         self._best_focus = BestFocus()
@@ -151,7 +122,7 @@ class LiveView(QWidget):
         self._tick.stop()
         if stream is None:
             self._rgb = None
-            self._image.show_rgb(None)
+            self.image.show_rgb(None)
             self._checks.show_exposure(None)
             self._checks.show_pixel("")
             self._checks.show_rate("")
@@ -159,10 +130,6 @@ class LiveView(QWidget):
             self._histogram.show_counts(None)
         elif self.isVisible():
             self._tick.start()
-
-    def show_frame(self, frame: FrameLike) -> None:
-        """Show a frame."""
-        self._show(frame.rgb)
 
     def show_image(self, rgb: Rgb) -> None:
         """Show a still image, (rows, columns, 3) uint8 or uint16, and check it at once."""
@@ -175,10 +142,6 @@ class LiveView(QWidget):
         self._overlay = overlay or Overlay()
         self._draw_overlay()
 
-    def hand_drags_on(self, on: bool) -> None:
-        """Emit drags that start beside the handles as :attr:`dragged` instead of panning."""
-        self._image.hand_drags_on(on)
-
     def judge_focus(self, on: bool) -> None:
         """Show or hide the focus of live images: most scenes have no edges to focus on."""
         self._judges_focus = on
@@ -186,34 +149,6 @@ class LiveView(QWidget):
 
     def _show_focus(self, on: bool) -> None:
         self._checks.focus.setVisible(on and self._judges_focus)
-
-    def freeze(self, on: bool) -> None:
-        """Freeze the shown image while the stream continues."""
-        self._tools.switch("freeze", on)
-
-    def zebra(self, on: bool) -> None:
-        """Show stripes on saturated pixels."""
-        self._tools.switch("zebra", on)
-
-    def show_histogram(self, on: bool) -> None:
-        """Show the histogram in the corner."""
-        self._tools.switch("histogram", on)
-
-    def fit(self) -> None:
-        """Show the whole image."""
-        self._image.fit()
-
-    def full_size(self) -> None:
-        """Show one image pixel on one screen pixel."""
-        self._image.full_size()
-
-    def flash(self) -> None:
-        """Brighten the image for a moment: it was captured."""
-        self._image.flash()
-
-    def say(self, text: str) -> None:
-        """Change the text that is shown when there is no image."""
-        self._image.say(text)
 
     def snapshot(self, path: Path) -> None:
         """Save the shown image as PNG with full bit depth and without marks.
@@ -247,7 +182,7 @@ class LiveView(QWidget):
     # Frames
 
     def _show_newest_frame(self) -> None:
-        if self._stream is None or self._tools.is_on("freeze"):
+        if self._stream is None or self.tools.is_on("freeze"):
             return
         frame = self._stream.newest.take()
         if frame is not None:
@@ -257,7 +192,7 @@ class LiveView(QWidget):
     def _show(self, rgb: Rgb) -> None:
         resized = self._rgb is None or self._rgb.shape != rgb.shape
         self._rgb = rgb
-        self._shown_frames += 1
+        self.shown_frames += 1
         self._render()
         if resized:
             self._draw_overlay()
@@ -270,9 +205,9 @@ class LiveView(QWidget):
     def _render(self) -> None:
         if self._rgb is None:
             return
-        striped = self._tools.is_on("zebra")
-        shown = with_zebra(self._rgb, self._shown_frames) if striped else eight_bits(self._rgb)
-        self._image.show_rgb(shown)
+        striped = self.tools.is_on("zebra")
+        shown = with_zebra(self._rgb, self.shown_frames) if striped else eight_bits(self._rgb)
+        self.image.show_rgb(shown)
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
         self._checks.show_exposure(measure_exposure(rgb))
@@ -280,10 +215,10 @@ class LiveView(QWidget):
         if self._histogram.isVisible():
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
-    def _show_rate(self, stream: StreamLike) -> None:
+    def _show_rate(self, stream: Stream) -> None:
         """Show the frame rate, or why no more frames arrive."""
         now_s = time.monotonic()
-        if now_s - self._rate_shown_s < RATE_S:
+        if now_s - self._rate_shown_s < 0.5:
             return
         self._rate_shown_s = now_s
         figures = stream.figures()
@@ -291,17 +226,18 @@ class LiveView(QWidget):
         self._checks.show_rate(figures.lost or rate)
 
     def _draw_overlay(self) -> None:
-        shown = self._overlay if self._tools.is_on("overlay") else Overlay()
-        self._image.overlay.set_overlay(shown, self._drawing_size())
+        shown = self._overlay if self.tools.is_on("overlay") else Overlay()
+        self.image.overlay.set_overlay(shown, self._drawing_size())
 
     def _drawing_size(self) -> tuple[int, int]:
-        width, height = self._image.image_size
+        width, height = self.image.image_size
         return max(width, 1), max(height, 1)
 
     # Tools
 
     def _on_tool(self, name: str) -> None:
-        {"fit": self.fit, "full_size": self.full_size, "snapshot": self.save_snapshot}[name]()
+        image = self.image
+        {"fit": image.fit, "full_size": image.full_size, "snapshot": self.save_snapshot}[name]()
 
     def _on_switch(self, name: str, on: bool) -> None:
         match name:
@@ -329,7 +265,7 @@ class LiveView(QWidget):
         self.moved.emit(handle.name, handle.u, handle.v, handle.radius_px)
 
     def _selected(self) -> Handle | None:
-        item = self._image.overlay
+        item = self.image.overlay
         return next((h for h in item.handles if h.name == item.selected), None)
 
     def _end_nudge(self) -> None:
@@ -356,14 +292,14 @@ class LiveView(QWidget):
                 handle = resize(handle, -radius_step)
             case _:
                 return False
-        self._image.overlay.place(handle)
+        self.image.overlay.place(handle)
         self._nudge_end.start()
         return True
 
     # Qt
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102
-        item = self._image.overlay
+        item = self.image.overlay
         if self._nudge(event):
             return
         match event.key():
@@ -373,9 +309,9 @@ class LiveView(QWidget):
             case Qt.Key.Key_Escape if item.selected:
                 item.select("")
             case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
-                self._image.zoom_by(ZOOM_STEP)
+                self.image.zoom_by(ZOOM_STEP)
             case Qt.Key.Key_Minus:
-                self._image.zoom_by(1.0 / ZOOM_STEP)
+                self.image.zoom_by(1.0 / ZOOM_STEP)
             case _:
                 super().keyPressEvent(event)
 
@@ -392,7 +328,7 @@ class LiveView(QWidget):
             self._end_nudge()
 
     def _place_histogram(self) -> None:
-        corner = self._image.rect().bottomRight()
+        corner = self.image.rect().bottomRight()
         self._histogram.move(
             corner.x() - self._histogram.width() - CORNER_PX,
             corner.y() - self._histogram.height() - CORNER_PX,

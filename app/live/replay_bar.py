@@ -17,9 +17,6 @@ from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-POLL_MS = 100
-SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-
 
 class ReplayBar(QWidget):
     """Controls the playback of a recording. Hidden if there is none.
@@ -71,12 +68,12 @@ class ReplayBar(QWidget):
         )
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
         self._speed = named(ComboBox(), f"{page}.replay.speed", tr("Speed"))
-        for speed in SPEEDS:
+        for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 4.0):
             self._speed.addItem(tr("{s:g} x").format(s=speed), speed)
         self._speed.activated.connect(self._set_speed)
         row.addWidget(self._loop)
         row.addWidget(self._speed)
-        self._timer = QTimer(self, interval=POLL_MS)
+        self._timer = QTimer(self, interval=100)
         self._timer.timeout.connect(self._poll)
         self.hide()
 

@@ -18,8 +18,6 @@ from app.sources.source import Frame
 from app.sources.stream import Stream
 from gelpolight_core.translation import tr
 
-TICK_MS = 8
-STATUS_MS = 500
 # Shorter times mean that only the camera image is shown.
 LEAST_MS = 0.5
 
@@ -99,11 +97,9 @@ class LiveSession(QObject):
         self._processor: Processor[Any] = Processor(
             self._inbox.box, self._function, self._outbox, name=name
         )
-        self._tick, self._status = QTimer(self), QTimer(self)
-        self._tick.setTimerType(Qt.TimerType.PreciseTimer)
-        self._tick.setInterval(TICK_MS)
+        self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=8)
         self._tick.timeout.connect(self._poll)
-        self._status.setInterval(STATUS_MS)
+        self._status = QTimer(self, interval=500)
         self._status.timeout.connect(self._update_status)
         self._following = (
             context.source.changed.connect(self._on_source),

@@ -14,7 +14,6 @@ from app.widgets.naming import named
 from app.widgets.tool_key import add_tool_key
 from gelpolight_core.translation import tr
 
-SIDE = 20
 # name: (key, stays pressed, icon)
 TOOLS = {
     "fit": ("F", False, "fit"),
@@ -69,7 +68,7 @@ class ImageTools(QWidget):
     def _make_button(self, name: str, text: str, owner: QWidget) -> QToolButton:
         key, stays, sign = TOOLS[name]
         button = named(QToolButton(autoRaise=True), f"live.{name}", text, text, key)
-        button.setIconSize(QSize(SIDE, SIDE))
+        button.setIconSize(QSize(20, 20))
         button.setIcon(icon(sign))
         button.setCheckable(stays)
         if stays:

@@ -285,7 +285,7 @@ class PressingView(QWidget):
         if self.live.stream is None:
             done = self._work.run.next() is None
             none = tr("No camera is selected. Choose one in the bar above.")
-            self.image.say(tr("All presses are done.") if done else none)
+            self.image.image.say(tr("All presses are done.") if done else none)
         self._aim()
         if self.panel.bench.isChecked() and self.live.stream is not None:
             self._tick.start()

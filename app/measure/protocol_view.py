@@ -49,8 +49,8 @@ class ProtocolView(QWidget):
 
     completed = Signal(object)
 
-    def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
         named(self, "protocol", tr("Evaluation protocol"))
         self.context = context
         self.work: ProtocolWork | None = None

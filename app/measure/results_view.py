@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QHeaderView,
     QStackedWidget,
-    QTableView,
     QWidget,
 )
 
@@ -23,14 +22,14 @@ from app.measure.record_book import RecordBook
 from app.measure.record_table import (
     IMAGE,
     NOTE,
-    TIME,
-    RecordFilter,
-    RecordModel,
+    record_cells,
+    record_titles,
     shape_label,
 )
 from app.services.file_dialogs import ask_save
 from app.widgets.actions import make_action
 from app.widgets.buttons import push_button
+from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
@@ -57,9 +56,6 @@ class ResultsView(QWidget):
         super().__init__()
         named(self, "measure.results", tr("Records"))
         self._book, self._context = book, context
-        self.model = RecordModel()
-        self.model.note_written.connect(book.write_note)
-        self.filter = RecordFilter(self.model)
         self.sensor = named(ComboBox(), "measure.results.sensor", tr("Sensor"))
         self.shape = named(ComboBox(), "measure.results.shape", tr("Object"))
         for box in (self.sensor, self.shape):
@@ -94,23 +90,24 @@ class ResultsView(QWidget):
         book.changed.connect(self.refresh)
         self.refresh()
 
-    def _make_table(self) -> QTableView:
-        table = named(QTableView(), "measure.results.table", tr("Measurements"))
-        table.setModel(self.filter)
-        table.setSortingEnabled(True)
-        table.sortByColumn(TIME, Qt.SortOrder.DescendingOrder)
-        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        table.setAlternatingRowColors(True)
-        table.setShowGrid(False)
-        table.setWordWrap(False)
-        table.verticalHeader().hide()
+    def _make_table(self) -> CellsTable[MeasurementRecord]:
+        table = CellsTable[MeasurementRecord](
+            "measure.results.table",
+            tr("Measurements"),
+            record_titles(),
+            record_cells,
+            lambda record: record.id,
+            editable=NOTE,
+        )
+        table.edited.connect(lambda record, text: self._book.write_note(record.id, text))
+        table.sortByColumn(0, Qt.SortOrder.DescendingOrder)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         table.verticalHeader().setDefaultSectionSize(26)
         header = table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setStretchLastSection(False)
         header.setSectionResizeMode(NOTE, QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(IMAGE, QHeaderView.ResizeMode.Interactive)
         header.resizeSection(IMAGE, IMAGE_WIDTH)
-        table.setTabKeyNavigation(False)
         table.selectionModel().selectionChanged.connect(lambda *_: self._describe())
         return table
 
@@ -148,21 +145,13 @@ class ResultsView(QWidget):
 
     def refresh(self) -> None:
         """Show the current records. The selection is kept."""
-        chosen = {record.id for record in self.selected}
-        self.model.show(self._book.records)
-        self._fill(self.sensor, tr("All sensors"), {r.serial: r.serial for r in self.model.records})
-        self._fill(
-            self.shape,
-            tr("All objects"),
-            {r.shape: shape_label(r.shape) for r in self._book.records},
-        )
+        records = self._book.records
+        self._fill(self.sensor, tr("All sensors"), {r.serial: r.serial for r in records})
+        self._fill(self.shape, tr("All objects"), {r.shape: shape_label(r.shape) for r in records})
         self._on_filter()
-        for row, record in enumerate(self.filter.shown):
-            if record.id in chosen:
-                self.table.selectRow(row)
-        self.stack.setCurrentIndex(1 if self.model.records else 0)
+        self.stack.setCurrentIndex(1 if records else 0)
         for control in (self.export, self.export_action):
-            control.setEnabled(bool(self.model.records))
+            control.setEnabled(bool(records))
 
     @staticmethod
     def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:
@@ -174,17 +163,12 @@ class ResultsView(QWidget):
         box.setCurrentIndex(max(box.findData(chosen), 0))
 
     def _on_filter(self) -> None:
-        self.filter.choose(self.sensor.currentData() or "", self.shape.currentData() or "")
-        shown, all_of_them = self.filter.rowCount(), len(self.model.records)
-        self.count.setText(tr("{n} of {all}").format(n=shown, all=all_of_them))
+        serial, shape = self.sensor.currentData() or "", self.shape.currentData() or ""
+        records = self._book.records
+        shown = [r for r in records if serial in ("", r.serial) and shape in ("", r.shape)]
+        self.table.show_items(shown)
+        self.count.setText(tr("{n} of {all}").format(n=len(shown), all=len(records)))
         self._describe()
-
-    @property
-    def selected(self) -> tuple[MeasurementRecord, ...]:
-        """The records of the selected rows."""
-        rows = sorted(index.row() for index in self.table.selectionModel().selectedRows())
-        shown = self.filter.shown
-        return tuple(shown[row] for row in rows if row < len(shown))
 
     def group(self) -> tuple[MeasurementRecord, ...]:
         """Return the records for the statistics.
@@ -193,7 +177,7 @@ class ResultsView(QWidget):
         sensor,
         shape and true size as the selected one or, if none is selected, as the first row.
         """
-        selected, shown = self.selected, self.filter.shown
+        selected, shown = self.table.selected, self.table.shown
         if len(selected) > 1:
             return tuple(r for r in selected if _thing(r)[1] == _thing(selected[0])[1])
         like = (*selected, *shown)[:1]
@@ -201,10 +185,10 @@ class ResultsView(QWidget):
 
     def _describe(self) -> None:
         group = self.group()
-        self.remove.setEnabled(bool(self.selected))
+        self.remove.setEnabled(bool(self.table.selected))
         self.statistics.setText(_statistics_text(group))
         serial = group[0].serial if group else ""
-        records = tuple(r for r in self.filter.shown if r.serial == serial)
+        records = tuple(r for r in self.table.shown if r.serial == serial)
         self.drift.show_records(records, self._context.settings.limits)
         title = tr("Error of {serial} over time, with the limits").format(serial=serial)
         self.drift_title.setText(title if serial else "")
@@ -213,7 +197,7 @@ class ResultsView(QWidget):
 
     def remove_selected(self) -> None:
         """Remove the selected measurements. Ctrl+Z restores them."""
-        numbers = tuple(r.id for r in self.selected if r.id is not None)
+        numbers = tuple(r.id for r in self.table.selected if r.id is not None)
         if not numbers:
             return
         self._book.remove(numbers)

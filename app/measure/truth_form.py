@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QPushButton,
-    QWidget,
 )
 
 from app.measure.figures_text import UNITS
@@ -39,8 +38,8 @@ class TruthForm(QGroupBox):
 
     changed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(tr("True size"), parent)
+    def __init__(self) -> None:
+        super().__init__(tr("True size"))
         named(self, "measure.truth", tr("True size"))
         self._kind = ""
         self._kept: dict[str, Stated] = {}

@@ -7,10 +7,8 @@ from datetime import datetime
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
-    QFrame,
     QLineEdit,
     QProgressBar,
-    QScrollArea,
     QToolBar,
     QWidget,
 )
@@ -18,7 +16,7 @@ from PySide6.QtWidgets import (
 from app.sensors.tables import made_cell
 from app.theme.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
@@ -27,8 +25,6 @@ from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.quality import Verdict, verdict_word
 from gelpolight_core.translation import tr
-
-FACT_LINES = 6
 
 
 class Details(QWidget):
@@ -45,7 +41,7 @@ class Details(QWidget):
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         # Space for the longest text, that of a validated calibration, so that the buttons do not
         # move.
-        self._facts.setMinimumHeight(FACT_LINES * self._facts.fontMetrics().lineSpacing())
+        self._facts.setMinimumHeight(6 * self._facts.fontMetrics().lineSpacing())
         # A toolbar, because it has an arrow where it is too narrow for all buttons.
         buttons = named(QToolBar(self), "sensors.details.bar", tr("Actions of the calibration"))
         buttons.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
@@ -57,10 +53,8 @@ class Details(QWidget):
                 action.text().replace("&", ""),
             )
             button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self._area = named(QScrollArea(self), "sensors.details.stages", tr("Quality of the stages"))
-        self._area.setWidgetResizable(True)
-        self._area.setFrameShape(QFrame.Shape.NoFrame)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area = scroll_area(QWidget())
+        named(self._area, "sensors.details.stages", tr("Quality of the stages"))
         self.busy = named(QProgressBar(self), "sensors.busy", tr("Writing the report"))
         self.busy.setRange(0, 0)
         self.busy.hide()

@@ -19,12 +19,13 @@ from PySide6.QtWidgets import (
 from app.context.context import AppContext
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
-from app.sensors.tables import Cell, CellsTable, SessionsBox, cells_of, library_titles
+from app.sensors.tables import SessionsBox, cells_of, library_titles
 from app.sensors.trash_dialog import TrashDialog
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job, Jobs
 from app.theme.icons import application_icon
 from app.widgets.actions import make_action
+from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.label import MarkupLabel, PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
@@ -313,9 +314,6 @@ def _open_folder(folder: Path) -> None:
     QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
 
 
-WIDTH = 480
-
-
 class Welcome(QWidget):
     """Shows a short introduction and the first actions.
 
@@ -342,7 +340,7 @@ class Welcome(QWidget):
         )
         text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         middle = QWidget(self)
-        middle.setFixedWidth(WIDTH)
+        middle.setFixedWidth(480)
         centre = Qt.AlignmentFlag.AlignHCenter
         buttons = [(_button(action), 0, centre) for action in actions]
         head = (sign, 0, centre), (title, 0, centre)

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
-from app.sensors.tables import Cell, CellsTable, validated_cell
+from app.sensors.tables import validated_cell
 from app.widgets.buttons import push_button
+from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.dialog import Dialog
 from app.widgets.label import PlainLabel
 from app.workspace.trash import Removal

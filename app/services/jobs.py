@@ -20,7 +20,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
-POLL_MS = 50
 # Longest time for work that cannot be cancelled at once, such as one step of a computation or
 # writing an image to a slow disk.
 CLOSE_S = 10.0
@@ -94,7 +93,7 @@ class Jobs(QObject):
         self._thread: threading.Thread | None = None
         self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._waiting: deque[Job] = deque()
-        self._timer = QTimer(self, interval=POLL_MS)
+        self._timer = QTimer(self, interval=50)
         self._timer.timeout.connect(self._poll)
         self._progress = ("", 0.0)
 

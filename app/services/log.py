@@ -18,8 +18,6 @@ from gelpolight_core import __version__
 
 NAME = "gelpolight.log"
 CRASHES = "gelpolight-crash.log"
-FILE_BYTES = 1_000_000
-FILES = 5
 KEPT = 5000
 OURS = ("app", "gelpolight_core")
 LINE = "%(asctime)s %(levelname)-7s %(threadName)s %(name)s: %(message)s"
@@ -130,7 +128,7 @@ def _open_file(folder: Path | None) -> tuple[Path, logging.Handler]:
 def _handler(folder: Path) -> RotatingFileHandler:
     folder.mkdir(parents=True, exist_ok=True)
     handler = RotatingFileHandler(
-        folder / NAME, maxBytes=FILE_BYTES, backupCount=FILES, encoding="utf-8"
+        folder / NAME, maxBytes=1_000_000, backupCount=5, encoding="utf-8"
     )
     handler.setFormatter(logging.Formatter(LINE))
     return handler

@@ -38,13 +38,12 @@ FOLDER_KINDS = (
 
 # How an INI file of Qt stores objects. Reading a Python object would execute its content.
 OBJECTS = re.compile(rb"@(Variant|DateTime)\(", re.IGNORECASE)
-SIZE_LIMIT = 10_000_000
 
 
 def _keep_aside_what_is_no_text(path: Path) -> None:
     """Start with empty settings if the file contains anything but text, numbers and layouts."""
     try:
-        spoilt = OBJECTS.search(read_file(path, SIZE_LIMIT)) is not None
+        spoilt = OBJECTS.search(read_file(path, 10_000_000)) is not None
     except FileNotFoundError:
         return
     except InputError:
@@ -68,6 +67,10 @@ class Settings:
 
     def _text(self, key: str, default: str = "") -> str:
         return str(self._store.value(key, default))
+
+    def _bytes(self, key: str) -> QByteArray:
+        stored = self._store.value(key)
+        return stored if isinstance(stored, QByteArray) else QByteArray()
 
     @property
     def language(self) -> str:
@@ -197,13 +200,7 @@ class Settings:
 
     def window_state(self) -> tuple[QByteArray, QByteArray]:
         """Return geometry and state of the main window. Empty at first."""
-        none = QByteArray()
-        geometry = self._store.value("window/geometry", none)
-        state = self._store.value("window/state", none)
-        return (
-            geometry if isinstance(geometry, QByteArray) else none,
-            state if isinstance(state, QByteArray) else none,
-        )
+        return self._bytes("window/geometry"), self._bytes("window/state")
 
     def keep_window_state(self, geometry: QByteArray, state: QByteArray) -> None:
         """Save geometry and state of the main window."""
@@ -212,8 +209,7 @@ class Settings:
 
     def layout(self, page: str) -> QByteArray:
         """Return the layout of a page's views. Empty at first."""
-        stored = self._store.value(f"layout/{page}", QByteArray())
-        return stored if isinstance(stored, QByteArray) else QByteArray()
+        return self._bytes(f"layout/{page}")
 
     def keep_layout(self, page: str, state: QByteArray) -> None:
         """Save the layout of a page's views."""

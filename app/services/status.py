@@ -15,8 +15,6 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-WINDOW_S = 3.0
-LEAST_HZ = 0.2
 NUMBERS = ("rate", "processing", "dropped")
 
 
@@ -73,7 +71,7 @@ class Skipped:
         if count is None:
             return 0.0
         self._counts.append((now_s, count))
-        while now_s - self._counts[0][0] > WINDOW_S:
+        while now_s - self._counts[0][0] > 3.0:
             self._counts.popleft()
         (first_s, first), (last_s, last) = self._counts[0], self._counts[-1]
         return (last - first) / (last_s - first_s) if last_s > first_s else 0.0
@@ -168,7 +166,7 @@ class FailedLine(PlainLabel):
 
 def skipped_text(rate_hz: float) -> str:
     """Return the text about skipped frames."""
-    if rate_hz < LEAST_HZ:
+    if rate_hz < 0.2:
         return tr("none skipped")
     return tr("{n:.0f} skipped per second").format(n=max(rate_hz, 1.0))
 

@@ -30,9 +30,7 @@ from gelpolight_core.translation import tr
 log = logging.getLogger(__name__)
 
 MOST = 4
-HISTORY = 200
 MARGIN = 12
-WIDTH = 420
 # Allows half the speed of a slow reader (180 words a minute), and a minimum time.
 LEAST_MS = 5000
 MS_A_WORD = 650
@@ -166,7 +164,7 @@ class Toasts(QObject):
         self._host: QWidget | None = None
         self._over: QWidget | None = None
         self._shown: list[Toast] = []
-        self._history: deque[Notice] = deque(maxlen=HISTORY)
+        self._history: deque[Notice] = deque(maxlen=200)
         self._show_log: Callable[[], None] | None = None
         # A native window that appears later would cover the messages.
         native_windows.appeared.connect(self._raise_all)
@@ -281,7 +279,7 @@ class Toasts(QObject):
             return
         corner = self._over.mapTo(self._host, QPoint())
         area = QRect(corner, self._over.size()).adjusted(MARGIN, MARGIN, -MARGIN, -MARGIN)
-        width = min(WIDTH, area.width())
+        width = min(420, area.width())
         bottom = area.bottom() + 1
         for toast in reversed(self.shown()):
             height = toast.height_for(width)

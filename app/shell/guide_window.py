@@ -44,7 +44,6 @@ OF_PAGE = {
     "inspect": "guide/inspect",
     "measure": "guide/measure",
 }
-EDGE_PX = 40
 
 
 class GuideText(QTextBrowser):
@@ -54,7 +53,7 @@ class GuideText(QTextBrowser):
         """Return a page or a scaled image."""
         if kind == QTextDocument.ResourceType.ImageResource.value:
             image = QImage(self.source().resolved(name).toLocalFile())
-            width = max(self.viewport().width() - EDGE_PX, 200)
+            width = max(self.viewport().width() - 40, 200)
             if image.width() > width:
                 image = image.scaledToWidth(width, Qt.TransformationMode.SmoothTransformation)
             return image

@@ -99,9 +99,6 @@ class Loader(QObject):
             then()
 
 
-WIDTH = 320
-
-
 class LoadingView(QWidget):
     """A title and a moving progress bar."""
 
@@ -111,7 +108,7 @@ class LoadingView(QWidget):
         self._text = named(PlainLabel(), "main.loading.text", tr("Page being loaded"))
         self._text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         bar = named(QProgressBar(minimum=0, maximum=0), "main.loading.bar", tr("Page is loading"))
-        bar.setFixedWidth(WIDTH)
+        bar.setFixedWidth(320)
         vbox(self._text, bar, of=self).setAlignment(Qt.AlignmentFlag.AlignCenter)
 
     def say(self, title: str) -> None:

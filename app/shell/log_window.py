@@ -17,8 +17,6 @@ from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-REFRESH_MS = 250
-
 
 class LogWindow(Dialog):
     """Shows the records of this run, newest last."""
@@ -55,7 +53,7 @@ class LogWindow(Dialog):
             tip=str(log.folder),
         )
         self.fill(hbox(PlainLabel(tr("Show")), self._levels, None, copy, folder), (self._text, 1))
-        self._timer = QTimer(self, interval=REFRESH_MS)
+        self._timer = QTimer(self, interval=250)
         self._timer.timeout.connect(self._show_new)
 
     def copy(self) -> None:

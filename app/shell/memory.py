@@ -7,7 +7,6 @@ import sys
 
 # Options of the GNU C library: M_ARENA_MAX and M_MMAP_THRESHOLD.
 ARENAS_OPTION, LARGE_OPTION = -8, -3
-ARENAS = 2
 LARGE_BYTES = 8 << 20
 """Larger than an image of 1280 x 960 and its depth map. Allocating every frame again costs time."""
 
@@ -24,7 +23,7 @@ def keep_little() -> None:
     if sys.platform.startswith("linux"):
         option = getattr(ctypes.CDLL(None), "mallopt", None)
         if option is not None:
-            option(ARENAS_OPTION, ARENAS)
+            option(ARENAS_OPTION, 2)
             option(LARGE_OPTION, LARGE_BYTES)
 
 

@@ -16,7 +16,6 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-SIZE = QSize(480, 360)
 # From the least to the most important.
 ORDER = ("pass", "info", "warn", "fail")
 
@@ -51,7 +50,7 @@ class NotificationsButton(QToolButton):
         self._new.clear()
         self._show()
         panel = NotificationList(self._toasts, self._show_log, self)
-        panel.resize(SIZE.boundedTo(self.window().size()))
+        panel.resize(QSize(480, 360).boundedTo(self.window().size()))
         corner = self.mapToGlobal(QPoint(self.width(), 0))
         panel.move(corner - QPoint(panel.width(), panel.height() + 4))
         panel.show()

@@ -103,7 +103,6 @@ CONDITION_RANGES = {
 # A coin that can be solved in seconds; the board in front of the lens may be anywhere in view.
 _LARGEST_MM = 12.0
 _DEEPEST_MM = 3.0
-_BOARD_REACH_MM = 100.0
 
 _FIRST_POSITIONS: dict[str, dict[str, Any]] = {
     "board_on_top": {"x_mm": 0.35, "y_mm": -0.25, "yaw_deg": 14.0},
@@ -275,7 +274,7 @@ class Bench:
     def reach_mm(self, scene: Scene) -> float:
         """Return how far from the centre the object of a scene can be moved."""
         if scene.item == "checkerboard":
-            return _BOARD_REACH_MM
+            return 100.0
         return 0.5 * self.design.membrane.working_diameter_mm
 
     def _set_scene(self, change: Callable[[Scene], Scene]) -> Scene:

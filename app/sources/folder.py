@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sources.source import Frame, Rgb, Setting, SourceLost
+from app.sources.source import Frame, Rgb, Setting, SourceLost, closed, no_setting
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.images import SUFFIXES, read_image
 from gelpolight_core.translation import tr
@@ -25,8 +25,6 @@ class FolderSource:
     ----------
     folder : Path
         Folder with the images.
-    loop : bool, optional
-        Whether to restart after the last image; otherwise the source ends there.
     rate_hz : float, optional
         Images per second.
     """
@@ -63,11 +61,7 @@ class FolderSource:
     def frame(self, timeout_s: float) -> Frame | None:
         """Wait for the next image; None if it is not due yet."""
         if not self._files:
-            raise SourceLost(
-                tr("the folder is closed"),
-                where=str(self.folder),
-                advice=tr("Open the folder again"),
-            )
+            raise closed(str(self.folder))
         now = time.monotonic()
         due_s = now if math.isnan(self._due_s) else self._due_s
         if due_s > now and self._closed.wait(min(due_s - now, timeout_s)):
@@ -95,11 +89,7 @@ class FolderSource:
         """Change the rate."""
         (rate,) = self.settings()
         if key != rate.key:
-            raise InputError(
-                tr("a folder has no setting {key}").format(key=key),
-                where=self.name,
-                advice=tr("Use {key}").format(key=rate.key),
-            )
+            raise no_setting(key, (rate,), self.name)
         self._rate_hz = rate.nearest(value)
         return self._rate_hz
 

@@ -19,8 +19,6 @@ from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
-_POLL_S = 0.1
-_KEPT_TIMES = 60
 
 T = TypeVar("T")
 
@@ -98,7 +96,7 @@ class Processor(Generic[T]):
         self._lock = threading.Lock()
         self._function, self._generation = function, 0
         self._reported = -1
-        self._done: deque[tuple[float, float]] = deque(maxlen=_KEPT_TIMES)
+        self._done: deque[tuple[float, float]] = deque(maxlen=60)
         self._end = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -147,7 +145,7 @@ class Processor(Generic[T]):
     def _run(self, end: threading.Event) -> None:
         lower_priority(PROCESSING)
         while not end.is_set():
-            frame = self._inbox.take(_POLL_S)
+            frame = self._inbox.take(0.1)
             if frame is not None:
                 self._process(frame, end)
 

@@ -23,7 +23,6 @@ _LOG = logging.getLogger(__name__)
 # Two seconds of a fast camera: a disk that is slower than this can never keep up.
 QUEUE_BYTES = 256 * 2**20
 LEAST_QUEUE = 4
-FINISH_S = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +64,7 @@ class RecorderFigures:
         return self.missed + self.overrun
 
 
-def header_for(
-    source: Source, *, serial: str = "", calibration_id: str = "", note: str = ""
-) -> RecordingHeader:
+def header_for(source: Source, *, serial: str = "", calibration_id: str = "") -> RecordingHeader:
     """Return the header for a recording of a source.
 
     Parameters
@@ -76,8 +73,6 @@ def header_for(
         Must be open, so that its present settings can be read.
     serial, calibration_id : str, optional
         Sensor and calibration in use.
-    note : str, optional
-        Note entered by the user.
     """
     return RecordingHeader(
         serial=serial,
@@ -85,7 +80,6 @@ def header_for(
         source=source.name,
         kind=source.kind,
         settings={setting.key: setting.value for setting in source.settings()},
-        note=note,
     )
 
 
@@ -144,7 +138,7 @@ class Recorder:
         """Accept no more frames; wait until all are written and the file is closed."""
         self.finish()
         if self._thread is not None:
-            join(self._thread, FINISH_S)
+            join(self._thread, 20.0)
         return self.figures()
 
     def figures(self) -> RecorderFigures:
@@ -232,7 +226,6 @@ class Recorder:
 RESERVE_BYTES = 1_000_000_000
 # A rate from a shorter time is not known well enough.
 LEAST_S = 1.0
-SOON_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +254,7 @@ class Room:
     @property
     def soon_full(self) -> bool:
         """Whether it must stop within a minute."""
-        return self.left_s < SOON_S
+        return self.left_s < 60.0
 
 
 def room_for(figures: RecorderFigures, *, free_bytes: float, limit_bytes: float) -> Room:

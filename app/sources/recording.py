@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sources.source import Frame, Rgb, Setting, SourceLost
+from app.sources.source import Frame, Rgb, Setting, closed, no_setting
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
@@ -18,12 +18,9 @@ from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
-SLOWEST, FASTEST = 0.1, 4.0
 # A paused image is sent this often, so that captures do not wait forever and the source does not
 # count as lost.
 REPEAT_S = 0.2
-LONE_FRAME_S = 0.1
-SHORTEST_S = 1e-3
 # Delays up to this limit are caught up; longer ones shift the following frames.
 CATCH_UP_S = 0.1
 
@@ -132,11 +129,7 @@ class RecordingSource:
         with self._changed:
             while True:
                 if self._recording is None:
-                    raise SourceLost(
-                        tr("the recording is closed"),
-                        where=str(self.path),
-                        advice=tr("Open the recording again"),
-                    )
+                    raise closed(str(self.path))
                 now_s = time.monotonic()
                 index, due_s = self._next(now_s)
                 if due_s <= now_s:
@@ -152,17 +145,13 @@ class RecordingSource:
 
     def settings(self) -> tuple[Setting, ...]:
         """Return the only setting, the speed."""
-        return (Setting("speed", tr("Speed"), "x", SLOWEST, FASTEST, 0.1, self._speed),)
+        return (Setting("speed", tr("Speed"), "x", 0.1, 4.0, 0.1, self._speed),)
 
     def set(self, key: str, value: float) -> float:
         """Change the speed."""
         (speed,) = self.settings()
         if key != speed.key:
-            raise InputError(
-                tr("a recording has no setting {key}").format(key=key),
-                where=self.name,
-                advice=tr("Use {key}").format(key=speed.key),
-            )
+            raise no_setting(key, (speed,), self.name)
         with self._changed:
             self._speed = speed.nearest(value)
             self._changed.notify_all()
@@ -255,12 +244,12 @@ class RecordingSource:
     def _interval_s(self, index: int) -> float:
         """Return how long a frame is shown, in seconds."""
         assert self._recording is not None
-        times_s, own_s = self._recording.times_s, LONE_FRAME_S
+        times_s, own_s = self._recording.times_s, 0.1
         if index + 1 < len(times_s):
             own_s = float(times_s[index + 1] - times_s[index])
         elif len(times_s) > 1:
             own_s = float(np.median(np.diff(times_s)))
-        return max(own_s, SHORTEST_S) / self._speed
+        return max(own_s, 1e-3) / self._speed
 
     def _move_to(self, index: int, due_s: float, now_s: float) -> int:
         """Show a frame, or a later one when behind schedule; return how many were advanced."""

@@ -30,7 +30,6 @@ from gelpolight_core.simulation.virtual_sensor import (
 
 Array = NDArray[np.float64]
 
-_PREVIEW_WIDTH_PX = 480
 _DARK = 1e-6  # far below one count of any camera
 
 
@@ -147,7 +146,7 @@ class _Makers:
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
-        scale = _PREVIEW_WIDTH_PX / bench.design.camera.width_px
+        scale = 480 / bench.design.camera.width_px
         self._small_design = bench.design.scaled(scale) if scale < 1.0 else None
         self._small: VirtualSensor | None = None
         self._large: VirtualSensor | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -90,8 +91,22 @@ class SourceLost(InputError):
     """The source gives no more images: it stopped, was unplugged, or reached its end."""
 
 
+def closed(where: str) -> SourceLost:
+    """Return the refusal of a source that is not open."""
+    return SourceLost(tr("the source is closed"), where=where, advice=tr("Open it again"))
+
+
 class SourceAway(Exception):
     """No images for now: the source tries to reconnect. Its text is a complete sentence."""
+
+
+def no_setting(key: str, settings: Iterable[Setting], where: str) -> InputError:
+    """Return the refusal of a setting that a source does not have."""
+    return InputError(
+        tr("there is no setting {key}").format(key=key),
+        where=where,
+        advice=tr("Use one of {keys}").format(keys=", ".join(s.key for s in settings)),
+    )
 
 
 class Source(Protocol):

@@ -18,8 +18,6 @@ from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
-_POLL_S = 0.1
-_RATE_WINDOW_S = 2.0
 
 Tap = Callable[[Frame], object]
 
@@ -144,7 +142,7 @@ class Stream:
         """Return the statistics of the stream."""
         now = time.monotonic()
         with self._lock:
-            times = [t for t in self._times if now - t < _RATE_WINDOW_S]
+            times = [t for t in self._times if now - t < 2.0]
             rate = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
             lost = None if self._lost is None else str(self._lost)
             made = self._last_number + 1
@@ -187,7 +185,7 @@ class Stream:
         heard_s: float | None = None
         while not end.is_set():
             try:
-                frame = self.source.frame(_POLL_S)
+                frame = self.source.frame(0.1)
             except SourceAway as error:
                 heard_s = None
                 self._wait_for_return(error)

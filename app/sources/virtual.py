@@ -15,8 +15,7 @@ from app.sources.bench import CONDITION_RANGES, NOMINAL_EXPOSURE_MS, Bench, Cond
 from app.sources.bench_faults import with_faults
 from app.sources.noise import NoiseLevel, noisy, rgb_of
 from app.sources.rendering import Renderer, Rendering
-from app.sources.source import Frame, Rgb, Setting, SourceLost
-from gelpolight_core.errors import InputError
+from app.sources.source import Frame, Rgb, Setting, SourceLost, closed, no_setting
 from gelpolight_core.translation import tr
 
 _SETTINGS: dict[str, tuple[Callable[[], str], str, float]] = {
@@ -74,11 +73,7 @@ class VirtualSource:
         limit_s = time.monotonic() + timeout_s
         renderer = self._renderer
         if renderer is None:
-            raise SourceLost(
-                tr("the virtual sensor is closed"),
-                where=self.name,
-                advice=tr("Open the virtual sensor again"),
-            )
+            raise closed(self.name)
         renderer.request(self.bench.seen)
         rendering = renderer.newest(timeout_s)
         if rendering is None or not self._wait_until_due(limit_s):
@@ -106,11 +101,7 @@ class VirtualSource:
         for setting in self.settings():
             if setting.key == key:
                 return float(getattr(self.bench.adjust(**{key: setting.nearest(value)}), key))
-        raise InputError(
-            tr("the virtual sensor has no setting {key}").format(key=key),
-            where=self.name,
-            advice=tr("Use one of {keys}").format(keys=", ".join(_SETTINGS)),
-        )
+        raise no_setting(key, self.settings(), self.name)
 
     def close(self) -> None:
         """Stop rendering."""

@@ -7,13 +7,13 @@ from datetime import datetime
 
 from PySide6.QtCore import QSize, Qt, SignalInstance
 from PySide6.QtGui import QIcon, QImageReader, QPixmap
-from PySide6.QtWidgets import QCommandLinkButton, QFrame, QScrollArea, QWidget
+from PySide6.QtWidgets import QCommandLinkButton, QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.theme.icons import icon
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.workspace.entries import Entry
@@ -23,7 +23,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.quality import verdict_word
 from gelpolight_core.translation import tr
 
-WIDTH = 620
 # Larger images are not decoded here: the window must be up at once.
 MOST_BYTES = 40_000_000
 
@@ -58,16 +57,12 @@ class StartPage(QWidget):
             "home.demo", tr("&Try the virtual sensor"), "demo", requests.begin_demo
         )
         self.demo.say(tr("All functions, without a camera"))
-        middle = QWidget(self, maximumWidth=WIDTH)
+        middle = QWidget(self, maximumWidth=620)
         cards = self.go_on, self.use, self.new, self.open, self.demo
         vbox(None, title, 8, *cards, (None, 2), of=middle, spacing=10)
-        area = named(QScrollArea(self), "home.area", tr("Start"))
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setWidgetResizable(True)
         inner = QWidget()
         hbox(None, (middle, 6), None, of=inner)
-        area.setWidget(inner)
-        vbox(area, of=self, margins=0)
+        vbox(named(scroll_area(inner), "home.area", tr("Start")), of=self, margins=0)
         requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.tools.work_dialog import WorkDialog
+from app.widgets.layout import vbox
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.design_check.check import DesignCheckResult, check_design
 from gelpolight_core.quality import Verdict, limit_text, value_text, verdict_word
@@ -32,16 +33,13 @@ class DesignDialog(WorkDialog):
     def __init__(
         self, design: SensorDesign, *, context: AppContext, parent: QWidget | None = None
     ) -> None:
-        start = tr("&Run"), tr("Run")
-        super().__init__("design", tr("Design check"), start=start, context=context, parent=parent)
+        title = tr("Design check")
+        super().__init__("design", title, start=tr("&Run"), context=context, parent=parent)
         self._design = design
         self.resize(980, 620)
         self.heads = (tr("Figure"), tr("Value"), tr("Limit"), tr("Result"), tr("Advice"))
         self.table = self.result_table(self.heads, stretched=len(self.heads) - 1)
-        column = QVBoxLayout(self)
-        column.addLayout(self.button_row())
-        column.addWidget(self.table, 1)
-        column.addLayout(self.foot_row())
+        vbox(self.button_row(), (self.table, 1), self.foot_row(), of=self)
         self.say(tr("Checks the design of the virtual sensor."))
         self.allow()
 

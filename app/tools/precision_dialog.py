@@ -10,9 +10,7 @@ from PySide6.QtGui import QPixmap, QShowEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
-    QHBoxLayout,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -20,6 +18,7 @@ from app.context.context import AppContext
 from app.tools.work_dialog import WorkDialog
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_open_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -52,7 +51,7 @@ class PrecisionDialog(WorkDialog):
     """
 
     def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
-        title, start = tr("Error against run time"), (tr("&Measure"), tr("Measure"))
+        title, start = tr("Error against run time"), tr("&Measure")
         super().__init__("precision", title, start=start, context=context, parent=parent)
         self.resize(940, 660)
         self._folder: Path | None = None
@@ -104,23 +103,12 @@ class PrecisionDialog(WorkDialog):
         return box
 
     def _lay_out(self) -> None:
-        where = QHBoxLayout()
-        where.addWidget(self.presses, 1)
-        where.addWidget(self.folder)
         form = QFormLayout()
         form.addRow(tr("Calibration"), self.calibrations)
-        form.addRow(tr("Presses"), where)
+        form.addRow(tr("Presses"), hbox((self.presses, 1), self.folder))
         form.addRow("", self.button_row())
-        wish = QHBoxLayout()
-        wish.addWidget(self.rate)
-        wish.addWidget(self.limit)
-        wish.addWidget(self.advice, 1)
-        form.addRow(tr("I need"), wish)
-        column = QVBoxLayout(self)
-        column.addLayout(form)
-        column.addWidget(self.figure, 1)
-        column.addWidget(self.table)
-        column.addLayout(self.foot_row())
+        form.addRow(tr("I need"), hbox(self.rate, self.limit, (self.advice, 1)))
+        vbox(form, (self.figure, 1), self.table, self.foot_row(), of=self)
 
     # Inputs
 

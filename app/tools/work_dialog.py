@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QHeaderView,
     QProgressBar,
-    QPushButton,
     QTableWidget,
     QTableWidgetItem,
     QWidget,
@@ -20,7 +19,9 @@ from PySide6.QtWidgets import (
 
 from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
+from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -35,8 +36,8 @@ class WorkDialog(QDialog):
     ----------
     name, title : str
         For object names, and for the user.
-    start : tuple of 2 str
-        Text of the start button, and its description.
+    start : str
+        Text of the start button.
     context : AppContext
         Settings, and the request to rest.
     parent : QWidget, optional
@@ -53,7 +54,7 @@ class WorkDialog(QDialog):
         name: str,
         title: str,
         *,
-        start: tuple[str, str],
+        start: str,
         context: AppContext,
         parent: QWidget | None = None,
     ) -> None:
@@ -63,13 +64,12 @@ class WorkDialog(QDialog):
         self.context = context
         self.jobs = Jobs(name, self)
         self.result_shown: Any = None
-        self.start = named(QPushButton(start[0]), f"{name}.start", start[1])
+        self.start = push_button(f"{name}.start", start, self.run)
         self.start.setDefault(True)
-        self.start.clicked.connect(self.run)
-        self.stop = named(QPushButton(tr("Stop")), f"{name}.stop", tr("Stop"))
-        self.stop.clicked.connect(self.jobs.cancel)
-        self.save = named(QPushButton(tr("Save report…")), f"{name}.save", tr("Save the report"))
-        self.save.clicked.connect(self.choose_report)
+        self.stop = push_button(f"{name}.stop", tr("Stop"), self.jobs.cancel)
+        self.save = push_button(
+            f"{name}.save", tr("Save report…"), self.choose_report, accessible=tr("Save the report")
+        )
         self.progress = named(QProgressBar(), f"{name}.progress", tr("Progress"))
         self.words = named(PlainLabel(), f"{name}.words", tr("Notes"))
         self.words.setWordWrap(True)
@@ -92,22 +92,13 @@ class WorkDialog(QDialog):
         """Whether everything that the work needs is chosen."""
         return True
 
-    def button_row(self, *before: QWidget) -> QHBoxLayout:
+    def button_row(self) -> QHBoxLayout:
         """Return a row of widgets, the progress, Start and Stop."""
-        row = QHBoxLayout()
-        for widget in before:
-            row.addWidget(widget)
-        row.addWidget(self.progress, 1)
-        row.addWidget(self.start)
-        row.addWidget(self.stop)
-        return row
+        return hbox((self.progress, 1), self.start, self.stop)
 
     def foot_row(self) -> QHBoxLayout:
         """Return a row of the notes and Save."""
-        row = QHBoxLayout()
-        row.addWidget(self.words, 1)
-        row.addWidget(self.save)
-        return row
+        return hbox((self.words, 1), self.save)
 
     def result_table(self, heads: Sequence[str], *, stretched: int) -> QTableWidget:
         """Return an empty table with these columns, which cannot be edited; one is stretched."""

@@ -14,8 +14,6 @@ SHRINK_BELOW = 0.4
 SHRINK_AFTER_S = 2.0
 LOW_SHARE = 0.1
 """Negative depths have colours of their own from this share of the upper end on."""
-_THIN = 8
-_PERCENT = 0.5, 99.9
 
 
 class ColourRange:
@@ -95,9 +93,9 @@ class SteadyEnd:
 
 def extremes_mm(depth_mm: NDArray[np.float32]) -> tuple[float, float]:
     """Return the lowest and the highest depth of a map, without single outliers."""
-    some = depth_mm[::_THIN, ::_THIN]
+    some = depth_mm[::8, ::8]
     some = some[np.isfinite(some)]
     if not some.size:
         return 0.0, 0.0
-    low, high = (float(v) for v in np.percentile(some, _PERCENT))
+    low, high = (float(v) for v in np.percentile(some, (0.5, 99.9)))
     return low, high

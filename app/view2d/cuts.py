@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from app.widgets.fields import choice, number, switch
@@ -134,7 +134,9 @@ class Cut:
 
 def cut(heightmap: HeightMap, section: Section, region: Rectangle | None) -> Cut:
     """Take the profile of each line, and measure along the chosen one and in a rectangle."""
-    ends, figures, sentences = None, [], []
+    ends: tuple[float, float, float] | None = None
+    figures: list[Measured] = []
+    sentences: list[str] = []
     profiles: dict[int, Profile] = {}
     for line in section.lines:
         try:
@@ -144,32 +146,27 @@ def cut(heightmap: HeightMap, section: Section, region: Rectangle | None) -> Cut
         except InputError as error:
             if line.number == section.chosen:
                 sentences.append(str(error))
+
+    def measured(measure: Callable[[], Sequence[Measured]]) -> None:
+        try:
+            figures.extend(measure())
+        except InputError as error:
+            sentences.append(error.found)
+
     profile = profiles.get(section.chosen)
     if profile is not None:
         length = float(profile.along_mm[-1])
         first = (length * section.first[0], length * section.first[1])
         second = (length * section.second[0], length * section.second[1])
-        for measure in (
-            lambda: step_height(profile, first_mm=first, second_mm=second),
-            lambda: width_at(profile, section.level_mm or None),
-            lambda: slope(profile, *first),
-            lambda: slope(profile, *second),
-            lambda: angle_between(profile, first, second),
-        ):
-            try:
-                figures.append(measure())
-            except InputError as error:
-                sentences.append(error.found)
+        measured(lambda: [step_height(profile, first_mm=first, second_mm=second)])
+        measured(lambda: [width_at(profile, section.level_mm or None)])
+        measured(lambda: [slope(profile, *first)])
+        measured(lambda: [slope(profile, *second)])
+        measured(lambda: [angle_between(profile, first, second)])
         if section.cutoff_mm:
-            try:
-                figures.extend(profile_roughness(profile, cutoff_mm=section.cutoff_mm))
-            except InputError as error:
-                sentences.append(str(error))
+            measured(lambda: profile_roughness(profile, cutoff_mm=section.cutoff_mm))
         if any(figure.name == "width" for figure in figures):
             ends = width_ends(profile, section.level_mm or None)
     if region is not None:
-        try:
-            figures.extend(roughness(heightmap, region))
-        except InputError as error:
-            sentences.append(error.found)
+        measured(lambda: roughness(heightmap, region))
     return Cut(profiles, section.chosen, tuple(figures), tuple(dict.fromkeys(sentences)), ends)

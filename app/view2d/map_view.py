@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
@@ -15,14 +15,15 @@ from PySide6.QtWidgets import QWidget
 from app.theme import theme
 from app.view2d.colour_bar import TEXT_FILL, ColourBar
 from app.view2d.display import SURROUND
-from app.widgets.label import PlainLabel
+from app.widgets.label import placeholder
 from app.widgets.naming import named
 from app.widgets.plots import own_plot_menus
 from app.widgets.units import length_text, round_length_mm
+from gelpolight_core.optics.resampling import MembraneGrid
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 CURSOR = "#ffffff"
-REACH_MM = 40.0
 ROOMY_PX = 180
 """Smaller views have no axes, only the scale bar: the map needs the space."""
 SCALE_SHARE = 0.25
@@ -33,18 +34,7 @@ Extent = tuple[float, float, float, float]
 """Outer edges of an image: (left, top, right, bottom)."""
 
 
-class Grid(Protocol):
-    """A regular grid on the membrane: a height map, or the grid of a calibration."""
-
-    @property
-    def x_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
-    @property
-    def y_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
-    @property
-    def pitch_mm(self) -> float: ...  # noqa: D102
-
-
-def extent_of(grid: Grid) -> Extent:
+def extent_of(grid: HeightMap | MembraneGrid) -> Extent:
     """Return (left, top, right, bottom) of the outer edges of the grid's cells, mm."""
     half = 0.5 * grid.pitch_mm
     return (
@@ -114,7 +104,7 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         self._in_mm = True
         self._unit = pg.LabelItem()
         self._lay_out()
-        self._words = self._make_words()
+        self._words = placeholder(self)
         self.shown_images = 0
         self._apply_theme()
         self._connect()
@@ -128,13 +118,6 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
             line.setZValue(20)
             self.box.addItem(line, ignoreBounds=True)
         return lines
-
-    def _make_words(self) -> PlainLabel:
-        words = PlainLabel(parent=self, wrap=True)
-        words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        words.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
-        words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        return words
 
     def _lay_out(self) -> None:
         plot = self._plot
@@ -180,7 +163,7 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
             self._extent = area
             self._words.hide()
             self._show_scales(True)
-            beyond = REACH_MM + max(area.width(), area.height())
+            beyond = 40.0 + max(area.width(), area.height())
             reach = area.adjusted(-beyond, -beyond, beyond, beyond)
             self.box.setLimits(
                 minXRange=0.2,

@@ -18,7 +18,6 @@ from gelpolight_core.translation import tr
 LINE_COLOURS = "#e0309f", "#2f95e8", "#d63d43", "#14958f", "#a07cf0", "#868d96"
 """Of the lines by their number, none like the level, for light and dark surroundings."""
 LEVEL = "#d97a00"
-LEAST_SPAN_MM = 0.05
 
 
 def line_colour(number: int) -> str:
@@ -95,7 +94,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
     def _fit(self, depth: np.ndarray) -> None:
         """Follow the range of the depth in steps that do not flicker with the noise."""
         low, high = float(np.nanmin(depth)), float(np.nanmax(depth))
-        span = max(high - low, LEAST_SPAN_MM)
+        span = max(high - low, 0.05)
         (shown_low, shown_high) = self.getViewBox().viewRange()[1]
         fits = shown_low <= low and shown_high >= high and shown_high - shown_low < 1.6 * span
         if not fits:

@@ -25,8 +25,6 @@ from app.view3d.surface import Surface
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-CLICK_PX = 4.0
-SETTLE_MS = 250
 KEY_DEG = 6.0
 KEY_ZOOM = 1.15
 
@@ -94,7 +92,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self.scene = Scene(self)
         self._orientation = self._add_orientation()
         self._plane: object | None = None
-        self._settle = QTimer(self, singleShot=True, interval=SETTLE_MS)
+        self._settle = QTimer(self, singleShot=True, interval=250)
         self._settle.timeout.connect(self._refine)
         self._follow_theme()
 
@@ -245,7 +243,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         """Treat a press without a drag as a click."""
         super().mouseReleaseEvent(event)
         pressed, self._pressed = self._pressed, None
-        if pressed is None or (event.position() - pressed).manhattanLength() > CLICK_PX:
+        if pressed is None or (event.position() - pressed).manhattanLength() > 4.0:
             return
         if event.button() == Qt.MouseButton.RightButton:
             self.menu_wanted.emit(event.position().toPoint())

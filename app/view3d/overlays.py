@@ -23,7 +23,6 @@ CURSOR = "white"
 PIN = "#ffb02e"
 CUT = "#ff5ac8"
 SOLID = "#5fd0ff"
-CUT_NODES = 256
 
 
 def points_on(surface: Surface, points_mm: Array) -> Array:
@@ -49,7 +48,7 @@ def lines_mesh(surface: Surface, lines: tuple[SurfaceLine, ...]) -> pv.PolyData 
 def cut_edge(surface: Surface, exaggeration: float, normal: Array, origin: Array) -> pv.PolyData:
     """Return the line where a plane of the scene cuts the surface."""
     sheet = Sheet()
-    sheet.show(surface.thinned(CUT_NODES))
+    sheet.show(surface.thinned(256))
     mesh = sheet.mesh.triangulate().scale((1.0, 1.0, exaggeration))
     return mesh.slice(normal=tuple(normal), origin=tuple(origin))
 
@@ -122,7 +121,6 @@ def draw_solid(plotter: Plotter, solid: pv.PolyData | None, exaggeration: float)
 Box = tuple[float, float, float, float, float, float]
 Plotter = BasePlotter
 TICKS = 8  # with at most ten, VTK places labels where we want them
-COLOUR_TICKS = 5
 FONT = 11
 
 
@@ -191,7 +189,7 @@ def draw_scale(
     mapper.scalar_visibility = False  # the texture contains the colours
     title = scale.title.replace(" [", "\n[")  # the unit on a line of its own, for narrow views
     bar = plotter.add_scalar_bar(
-        title, mapper=mapper, vertical=True, n_labels=0 if scale.names else COLOUR_TICKS,
+        title, mapper=mapper, vertical=True, n_labels=0 if scale.names else 5,
         fmt="{:.4g}", color=ink.text, position_x=0.015, position_y=0.42, width=0.17, height=0.54,
         title_font_size=FONT + 1, label_font_size=FONT + 1, unconstrained_font_size=True,
         render=False,

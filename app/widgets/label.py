@@ -41,6 +41,15 @@ class PlainLabel(QLabel):
         self.setText(text)
 
 
+def placeholder(view: QWidget, text: str = "") -> PlainLabel:
+    """Return a text in the middle of a view of images, for while there is none."""
+    words = PlainLabel(text, view, wrap=True)
+    words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    words.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
+    words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+    return words
+
+
 class MarkupLabel(QLabel):
     """Shows HTML of the program. Insert text from outside with :func:`escaped`.
 
@@ -99,9 +108,6 @@ def key_text(key: str | QKeySequence) -> str:
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
 
 
-HIGH = 10_000
-
-
 class RoomyLabel(PlainLabel):
     """Plain text, wrapped, with space for the longest of several texts.
 
@@ -111,8 +117,8 @@ class RoomyLabel(PlainLabel):
         The texts that it may show. Default: space for one line.
     """
 
-    def __init__(self, *texts: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent=parent)
+    def __init__(self, *texts: str) -> None:
+        super().__init__()
         self._texts = texts or (" ",)
         self.setWordWrap(True)
         self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
@@ -124,7 +130,7 @@ class RoomyLabel(PlainLabel):
     def heightForWidth(self, width: int) -> int:
         """Return the height of the longest text, or of the current one if that is higher."""
         metrics, wrap = self.fontMetrics(), Qt.TextFlag.TextWordWrap
-        area = QRect(0, 0, width, HIGH)
+        area = QRect(0, 0, width, 10_000)
         texts = (*self._texts, self.text())
         return max(metrics.boundingRect(area, wrap, text).height() for text in texts)
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from PySide6.QtGui import QIcon, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
-SIDE = 18
-
 
 class Sign(QWidget):
     """Shows an icon. The text next to it has the same meaning.
@@ -17,10 +15,10 @@ class Sign(QWidget):
         An icon of :func:`app.theme.icons.icon` is redrawn when the theme changes.
     """
 
-    def __init__(self, icon: QIcon | None = None, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, icon: QIcon | None = None) -> None:
+        super().__init__()
         self._icon = icon or QIcon()
-        self.setFixedSize(SIDE, SIDE)
+        self.setFixedSize(18, 18)
 
     def show_icon(self, icon: QIcon) -> None:
         """Show another icon."""

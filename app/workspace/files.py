@@ -11,8 +11,6 @@ from gelpolight_core.io.atomic import NameTakenError, write_atomically
 from gelpolight_core.io.reading import open_file
 from gelpolight_core.translation import tr
 
-COPY_BYTES = 1 << 20
-
 
 def free_path(path: Path) -> Path:
     """Return `path`, or a similar path with a number if it exists."""
@@ -41,7 +39,7 @@ def copy_file(source: Path, target: Path, *, new: bool = False) -> None:
     except OSError as error:
         raise _refused(error, source) from error
     with stream:
-        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, COPY_BYTES), new=new)
+        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, 1 << 20), new=new)
 
 
 def move_file(source: Path, target: Path) -> None:

@@ -20,8 +20,6 @@ from gelpolight_core.translation import tr
 FILE = "gel-care.json"
 FORMAT = "gelpolight-gel-care"
 VERSION = 2
-SIZE_LIMIT = 4_000_000
-MOST_PRESSES = 10**9
 
 
 def presses_text(presses: int) -> str:
@@ -39,7 +37,7 @@ def read_presses(folder: Path) -> dict[str, int]:
     """
     path = folder / FILE
     try:
-        data = read_file(path, SIZE_LIMIT)
+        data = read_file(path, 4_000_000)
     except FileNotFoundError:
         return {}
     with refusing(
@@ -68,6 +66,6 @@ def write_presses(presses: Mapping[str, int], folder: Path) -> None:
 
 
 def _presses(value: Any) -> int:
-    if type(value) is not int or not 0 <= value <= MOST_PRESSES:
+    if type(value) is not int or not 0 <= value <= 10**9:
         raise ValueError(f"{brief(value)} is not a number of presses")
     return value

@@ -25,8 +25,6 @@ from gelpolight_core.translation import tr
 FILE = "indenters.json"
 FORMAT = "gelpolight-indenters"
 VERSION = 1
-SIZE_LIMIT = 1_000_000
-MOST_MM = 10_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +112,7 @@ def read_indenters(folder: Path) -> tuple[Indenter, ...]:
     """
     path = folder / FILE
     try:
-        data = read_file(path, SIZE_LIMIT)
+        data = read_file(path, 1_000_000)
     except FileNotFoundError:
         return first_indenters()
     with refusing(
@@ -161,4 +159,4 @@ def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
 def _length(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{brief(value)} is not a length")
-    return float(value) if abs(value) < MOST_MM else math.inf
+    return float(value) if abs(value) < 10_000.0 else math.inf

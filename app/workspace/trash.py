@@ -20,7 +20,6 @@ from gelpolight_core.io.reading import parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 NOTE = "removal.json"
-NOTE_BYTES, NAME_LETTERS = 10_000, 200
 ENDING = ".gplcal"
 
 
@@ -123,8 +122,8 @@ def _read(workspace: Path, trashed: Path) -> Removal:
     # The name of the folder is the time (15 letters), a hyphen, and the name of the old folder.
     old_folder, when, in_use = trashed.parent.name[16:] or "unnamed", None, False
     try:
-        note = parse_json(read_file(trashed.parent / NOTE, NOTE_BYTES))
-        name = plain_text(note["folder"], NAME_LETTERS)
+        note = parse_json(read_file(trashed.parent / NOTE, 10_000))
+        name = plain_text(note["folder"], 200)
         if name == Path(name).name and name not in ("", ".", ".."):
             old_folder = name
         when, in_use = parse_time(str(note["when"])), note["in_use"] is True

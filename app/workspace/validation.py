@@ -25,9 +25,6 @@ from gelpolight_core.translation import tr
 FORMAT = "gelpolight-validation"
 VERSION = 1
 ENDING = ".validation.json"
-SIZE_LIMIT = 1_000_000
-# Small enough that percentages of it are still finite.
-MOST = 1e15
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +121,7 @@ def read_validation(calibration: Path) -> Validation | None:
     """
     path = validation_path(calibration)
     try:
-        data = read_file(path, SIZE_LIMIT)
+        data = read_file(path, 1_000_000)
     except FileNotFoundError:
         return None
     with refusing(
@@ -139,13 +136,13 @@ def read_validation(calibration: Path) -> Validation | None:
 
 def _parse(content: Any) -> Validation:
     validation = Validation(
-        identity=_text(content["identity"]),
-        when=_text(content["when"]),
-        who=_text(content["who"]),
-        indenter=_text(content["indenter"]),
+        identity=plain_text(content["identity"]),
+        when=plain_text(content["when"]),
+        who=plain_text(content["who"]),
+        indenter=plain_text(content["indenter"]),
         comparisons=tuple(
             Comparison(
-                _text(c["quantity"]),
+                plain_text(c["quantity"]),
                 _positive(c["measured_mm"]),
                 _positive(c["true_mm"]),
                 _positive(c["limit_percent"]),
@@ -158,13 +155,9 @@ def _parse(content: Any) -> Validation:
     return validation
 
 
-def _text(value: Any) -> str:
-    return plain_text(value)
-
-
 def _positive(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{brief(value)} is not a number")
-    if not 0.0 < value < MOST:
+    if not 0.0 < value < 1e15:
         raise ValueError(f"{brief(value)} is not a length")
     return float(value)

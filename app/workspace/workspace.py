@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 ENDING = ".gplcal"
 STATE = "workspace.json"
 DRAFT = "-draft"
-NAME_BYTES = 160
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{n}{k}" for n in ("COM", "LPT") for k in range(10))}
 
 
@@ -359,7 +358,7 @@ def folder_name(text: str) -> str:
     name = re.sub(r"[^\w.+-]+", "_", text).strip("._ ")[:80]
     # A letter may use four bytes, and names are limited to 255. Windows reserves some names for
     # devices.
-    name = name.encode("utf-8", "ignore")[:NAME_BYTES].decode("utf-8", "ignore").rstrip("._ ")
+    name = name.encode("utf-8", "ignore")[:160].decode("utf-8", "ignore").rstrip("._ ")
     if name.split(".")[0].upper() in DEVICES:
         name = f"{name}_" if "." not in name else f"_{name}"
     return name or "unnamed"

@@ -23,9 +23,7 @@ from app.widgets.plots import without_menus
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
-POLL_MS = 30
 UM = 1000.0
-LEAST_WIDTH = 250
 
 
 class LivePanel(QWidget):
@@ -52,13 +50,13 @@ class LivePanel(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.setMinimumWidth(LEAST_WIDTH)
+        self.setMinimumWidth(250)
         self._start = self._state = before
         self._before: dict[str, Effect] = {}
         self._worker: NewestWins[tuple[CurveEdit, str], tuple[Effect, Effect]] = NewestWins(
             lambda request: self._both(effect, *request), name="lut-effect"
         )
-        self._timer = QTimer(self, interval=POLL_MS)
+        self._timer = QTimer(self, interval=30)
         self._timer.timeout.connect(self._poll)
         self.press = named(
             ComboBox(), "lut.press", tr("Ball press to show"), tr("Ball press to show")

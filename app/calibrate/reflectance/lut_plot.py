@@ -24,7 +24,6 @@ CHANNEL_COLOURS = (("#b3211d", "#ff8a80"), ("#1b6e3a", "#7fdc9a"), ("#1f4fbf", "
 BINS = 240
 OUTLIER_SPREADS = 4.0
 MAX_MARKS = 1500
-SAMPLES = 500
 GRAB_PX = 14
 NODE_PX = 11
 
@@ -211,7 +210,7 @@ class CurvePlot(pg.PlotWidget):
         colour = channel_colour(channel)
         self._show_scatter(edit, channel)
         self._show_coverage(edit, channel)
-        cosine = np.linspace(0.0, 1.0, SAMPLES)
+        cosine = np.linspace(0.0, 1.0, 500)
         curve = edit[channel].curve
         value = curve.at(cosine)
         low, high = edit[channel].coverage

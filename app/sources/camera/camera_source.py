@@ -6,7 +6,7 @@ from concurrent.futures import TimeoutError as Late
 
 from app.sources.camera.camera import Camera
 from app.sources.mailbox import Mailbox
-from app.sources.source import Frame, Setting, SourceAway, SourceLost
+from app.sources.source import Frame, Setting, SourceAway, closed, no_setting
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -54,9 +54,7 @@ class CameraSource:
             If this source is closed.
         """
         if not self._open:
-            raise SourceLost(
-                tr("the camera is closed"), where=self.name, advice=tr("Open the camera again")
-            )
+            raise closed(self.name)
         frame = self._newest.take(timeout_s)
         if frame is None and (why := self.camera.trouble()):
             raise SourceAway(why)
@@ -80,13 +78,7 @@ class CameraSource:
                 advice=tr("Check its cable"),
             ) from error
         if applied is None or applied.read is None:
-            raise InputError(
-                tr("the camera has no setting {key}").format(key=key),
-                where=self.name,
-                advice=tr("Use one of {keys}").format(
-                    keys=", ".join(setting.key for setting in self.settings())
-                ),
-            )
+            raise no_setting(key, self.settings(), self.name)
         return applied.read
 
     def close(self) -> None:

@@ -18,6 +18,10 @@ DISCRETE = 1
 DISABLED, GRABBED, READ_ONLY, INACTIVE = 0x1, 0x2, 0x4, 0x10
 
 
+def _words(*names: str) -> tuple[tuple[str, type], ...]:
+    return tuple((name, ctypes.c_uint32) for name in names)
+
+
 class Capability(ctypes.Structure):
     """``struct v4l2_capability``."""
 
@@ -25,9 +29,7 @@ class Capability(ctypes.Structure):
         ("driver", ctypes.c_char * 16),
         ("card", ctypes.c_char * 32),
         ("bus_info", ctypes.c_char * 32),
-        ("version", ctypes.c_uint32),
-        ("capabilities", ctypes.c_uint32),
-        ("device_caps", ctypes.c_uint32),
+        *_words("version", "capabilities", "device_caps"),
         ("reserved", ctypes.c_uint32 * 3),
     )
 
@@ -36,12 +38,9 @@ class FormatDescription(ctypes.Structure):
     """``struct v4l2_fmtdesc``."""
 
     _fields_ = (
-        ("index", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
-        ("flags", ctypes.c_uint32),
+        *_words("index", "type", "flags"),
         ("description", ctypes.c_char * 32),
-        ("pixelformat", ctypes.c_uint32),
-        ("mbus_code", ctypes.c_uint32),
+        *_words("pixelformat", "mbus_code"),
         ("reserved", ctypes.c_uint32 * 3),
     )
 
@@ -50,9 +49,7 @@ class FrameSize(ctypes.Structure):
     """``struct v4l2_frmsizeenum``: width and height, or minimum, maximum and step of both."""
 
     _fields_ = (
-        ("index", ctypes.c_uint32),
-        ("pixel_format", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
+        *_words("index", "pixel_format", "type"),
         ("values", ctypes.c_uint32 * 6),
         ("reserved", ctypes.c_uint32 * 2),
     )
@@ -62,11 +59,7 @@ class FrameInterval(ctypes.Structure):
     """``struct v4l2_frmivalenum``: a fraction of a second, or minimum, maximum and step of it."""
 
     _fields_ = (
-        ("index", ctypes.c_uint32),
-        ("pixel_format", ctypes.c_uint32),
-        ("width", ctypes.c_uint32),
-        ("height", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
+        *_words("index", "pixel_format", "width", "height", "type"),
         ("values", ctypes.c_uint32 * 6),
         ("reserved", ctypes.c_uint32 * 2),
     )
@@ -76,14 +69,13 @@ class QueryControl(ctypes.Structure):
     """``struct v4l2_queryctrl``."""
 
     _fields_ = (
-        ("id", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
+        *_words("id", "type"),
         ("name", ctypes.c_char * 32),
         ("minimum", ctypes.c_int32),
         ("maximum", ctypes.c_int32),
         ("step", ctypes.c_int32),
         ("default_value", ctypes.c_int32),
-        ("flags", ctypes.c_uint32),
+        *_words("flags"),
         ("reserved", ctypes.c_uint32 * 2),
     )
 
@@ -94,10 +86,9 @@ class QueryMenu(ctypes.Structure):
     _pack_ = 1
     _layout_ = "ms"
     _fields_ = (
-        ("id", ctypes.c_uint32),
-        ("index", ctypes.c_uint32),
+        *_words("id", "index"),
         ("name", ctypes.c_char * 32),
-        ("reserved", ctypes.c_uint32),
+        *_words("reserved"),
     )
 
 

@@ -214,7 +214,7 @@ def test_a_snapshot_contains_the_exact_values_and_no_marks(
     rgb = np.random.default_rng(1).integers(0, np.iinfo(dtype).max, (HEIGHT, WIDTH, 3), dtype)
     view.show_image(rgb)
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good"),)))
-    view.zebra(True)
+    view.tools.switch("zebra", True)
     path = tmp_path / "shot.png"
     view.snapshot(path)
     read = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
@@ -249,7 +249,7 @@ def test_fit_full_size_and_double_click(view: LiveView) -> None:
     assert fitted == pytest.approx(
         min(image_view.width() / WIDTH, image_view.height() / HEIGHT), rel=0.02
     )
-    view.full_size()
+    view.image.full_size()
     assert image_view.scale_px == pytest.approx(1.0, rel=1e-6)
     assert child(view, "live.zoom").text() == "100 %"
     view.resize(700, 600)
@@ -258,8 +258,8 @@ def test_fit_full_size_and_double_click(view: LiveView) -> None:
     mouse(image_view, QEvent.Type.MouseButtonDblClick, position, True)
     mouse(image_view, QEvent.Type.MouseButtonRelease, position, False)
     assert image_view.scale_px > 4.0
-    view.full_size()
-    view.fit()
+    view.image.full_size()
+    view.image.fit()
     assert image_view.scale_px > 4.0
     view.resize(500, 400)
     QApplication.processEvents()
@@ -294,7 +294,7 @@ def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
 
 def test_requested_drags_are_emitted_and_do_not_pan(view: LiveView, qtbot: QtBot) -> None:
     view.show_image(black())
-    view.hand_drags_on(True)
+    view.image.hand_drags_on(True)
     image_view = child(view, "live.image")
     before = image_view.view_position(40.0, 30.0)
     reported: list[tuple[str, float, float]] = []
@@ -309,7 +309,7 @@ def test_requested_drags_are_emitted_and_do_not_pan(view: LiveView, qtbot: QtBot
 
 def test_a_handle_is_dragged_before_the_object_below_it(view: LiveView, qtbot: QtBot) -> None:
     view.show_image(black())
-    view.hand_drags_on(True)
+    view.image.hand_drags_on(True)
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
     with qtbot.assertNotEmitted(view.dragged), qtbot.waitSignal(view.moved):
         drag(view, (40.0, 30.0), (45.0, 30.0))
