@@ -20,8 +20,8 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
-from gelpolight_core.session.closed import read_any_session
 from gelpolight_core.session.images import read_raw_image
+from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.translation import tr
 
@@ -111,7 +111,7 @@ def calibrate(
     >>> calibration.model
     'paper'
     """
-    found = read_any_session(Path(session))
+    found = read_session(Path(session))
     return calibrate_any(found, model=model, progress=progress).calibration
 
 

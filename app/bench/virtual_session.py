@@ -6,7 +6,6 @@ import tomllib
 from pathlib import Path
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.session.closed import ClosedSession, parse_closed_session
 from gelpolight_core.session.session import Session, parse_session
 from gelpolight_core.simulation.session import closed_session_toml, session_toml
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
@@ -25,7 +24,7 @@ def virtual_session(design: SensorDesign | None = None) -> Session:
     return session
 
 
-def virtual_closed_session(design: SensorDesign | None = None) -> ClosedSession:
+def virtual_closed_session(design: SensorDesign | None = None) -> Session:
     """Return the session description of the virtual sensor closed; it has no folder yet.
 
     Parameters
@@ -35,4 +34,4 @@ def virtual_closed_session(design: SensorDesign | None = None) -> ClosedSession:
     """
     content = tomllib.loads(closed_session_toml(VirtualSensor(design or SensorDesign())))
     content["balls"] = {"default": 4.0}
-    return parse_closed_session(content, Path("session.toml"))
+    return parse_session(content, Path("session.toml"))

@@ -273,7 +273,9 @@ class ClosedBallsStep(BallsStep):
         if not files:
             return too_early
         run = self._run()
-        scale = session.mm_per_px or (run and run.result.model.grid.mm_per_px) or USUAL_MM_PER_PX
+        stated = session.in_place.mm_per_px
+        measured = USUAL_MM_PER_PX if run is None else run.result.model.grid.mm_per_px
+        scale = measured if stated is None else stated[0]
         detect = partial(
             detect_closed_ball,
             untouched=Untouched(files[-1], scale, session.response),

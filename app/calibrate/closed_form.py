@@ -10,7 +10,7 @@ from app.widgets.fields import choice, number
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.in_place.preset import Preset, presets
-from gelpolight_core.session.closed import ClosedSession
+from gelpolight_core.session.session import InPlace, SensorData, Session
 from gelpolight_core.translation import tr
 
 OTHER = "other"
@@ -44,10 +44,11 @@ class ClosedValues(Values):
     scale_sd: float = number(1.0, tr("Uncertainty"), 0.0, 50.0, tr(" %"), 1)
 
 
-def new_closed_session() -> ClosedSession:
+def new_closed_session() -> Session:
     """Return the default description of a new session of a closed sensor, without a folder."""
-    scale, sd = USUAL.mm_per_px, USUAL.mm_per_px_sd
-    return ClosedSession(Path(), "", scale, sd, ball_default_radius_mm=USUAL_RADIUS_MM)
+    scale = InPlace((USUAL.mm_per_px, USUAL.mm_per_px), USUAL.mm_per_px_sd)
+    sensor = SensorData("")
+    return Session(Path(), sensor, ball_default_radius_mm=USUAL_RADIUS_MM, in_place=scale)
 
 
 class ClosedForm(FormPage):
@@ -71,14 +72,15 @@ class ClosedForm(FormPage):
         self.values.rows.addRow("", self.measured)
         self.values.changed.connect(self._on_changed)
 
-    def values_of(self, session: ClosedSession) -> ClosedValues:
+    def values_of(self, session: Session) -> ClosedValues:
         """Return the values of a session, and show what is known about its kind of sensor."""
-        stated, usual = session.mm_per_px is not None, ClosedValues()
-        scale, sd = session.mm_per_px or usual.scale, session.mm_per_px_sd
+        in_place = session.in_place or InPlace()
+        stated = in_place.mm_per_px is not None
+        scale, sd = (in_place.mm_per_px or (ClosedValues().scale,))[0], in_place.mm_per_px_sd
         for name in ("scale", "scale_sd", "preset"):
             self.values.inputs[name].setEnabled(stated)
         self.measured.setVisible(not stated)
-        kind = next((p.key for p in PRESETS.values() if _is_of(p, session)), OTHER)
+        kind = next((p.key for p in PRESETS.values() if _is_of(p, in_place)), OTHER)
         self.facts.setText(_facts(kind))
         percent = 100.0 * (USUAL_SD if sd is None else sd / scale)
         return ClosedValues(session.serial, session.elastomer, kind, scale, percent)
@@ -91,17 +93,18 @@ class ClosedForm(FormPage):
                 percent = 100.0 * preset.mm_per_px_sd / preset.mm_per_px
                 self.values.change(scale=preset.mm_per_px, scale_sd=percent)
 
-    def session_of(self, values: ClosedValues) -> ClosedSession:
+    def session_of(self, values: ClosedValues) -> Session:
         """Return the session with this scale, if it is stated."""
-        scale = values.scale
-        if self.session.mm_per_px is None:
-            return replace(self.session, serial=values.serial)
-        sd = 0.01 * values.scale_sd * scale
-        return replace(self.session, serial=values.serial, mm_per_px=scale, mm_per_px_sd=sd)
+        in_place = self.session.in_place
+        if in_place.mm_per_px is not None:
+            sd = 0.01 * values.scale_sd * values.scale
+            stated = values.scale, values.scale
+            in_place = replace(in_place, mm_per_px=stated, mm_per_px_sd=sd)
+        return replace(self.session, sensor=SensorData(values.serial), in_place=in_place)
 
 
-def _is_of(preset: Preset, session: ClosedSession) -> bool:
-    return session.mm_per_px is not None and abs(session.mm_per_px - preset.mm_per_px) < 5e-6
+def _is_of(preset: Preset, stated: InPlace) -> bool:
+    return stated.mm_per_px is not None and abs(stated.mm_per_px[0] - preset.mm_per_px) < 5e-6
 
 
 def _facts(kind: str) -> str:

@@ -9,20 +9,25 @@ from app.calibrate.closed_form import new_closed_session
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.closed import IN_PLACE, STAGES, ClosedSession
-from gelpolight_core.session.missing import missing_stages
-from gelpolight_core.session.session import parse_radii, read_description
+from gelpolight_core.session.missing import CLOSED_STAGES, missing_stages
+from gelpolight_core.session.session import (
+    IN_PLACE,
+    SensorData,
+    Session,
+    parse_radii,
+    read_description,
+)
 from gelpolight_core.session.table import Table
 
 
-def closed_offer(folder: Path) -> ClosedSession | None:
+def closed_offer(folder: Path) -> Session | None:
     """Return what a folder states for a closed sensor's session, with the folder of its images.
 
     None if it has no background and ball presses, if nothing of an open sensor is missing, or if
     its description is damaged or already that of a closed sensor.
     """
     missing, path = missing_stages(folder, ()), folder / "session.toml"
-    if not missing or any(stage in missing for stage in STAGES):
+    if not missing or any(stage in missing for stage in CLOSED_STAGES):
         return None
     offer = replace(new_closed_session(), folder=folder)
     try:
@@ -38,10 +43,12 @@ def closed_offer(folder: Path) -> ClosedSession | None:
     except InputError:
         return offer  # the form asks for what the folder does not state
     usual = default or offer.ball_default_radius_mm
-    return replace(offer, serial=serial, ball_radii_mm=radii, ball_default_radius_mm=usual)
+    return replace(
+        offer, sensor=SensorData(serial), ball_radii_mm=radii, ball_default_radius_mm=usual
+    )
 
 
-def copy_images(offer: ClosedSession, project: ClosedProject) -> None:
+def copy_images(offer: Session, project: ClosedProject) -> None:
     """Copy background and ball presses of an offer, with their radii, into a new session.
 
     Raises

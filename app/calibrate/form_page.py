@@ -54,7 +54,7 @@ class FormPage(QScrollArea):
     ----------
     title, task : str
         Shown above the groups for a new session.
-    session : Session or ClosedSession
+    session : Session
         The new session.
     values : Values
         With the fields of the form.

@@ -290,7 +290,7 @@ def captures_of(
 
     Parameters
     ----------
-    session : Session or ClosedSession
+    session : Session
         The session.
     folder : str
         Folder of the stage.

@@ -26,7 +26,6 @@ from app.workspace.workspace import folder_name
 from gelpolight_core.calibration.closed_project import ClosedProject, open_project
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -59,7 +58,7 @@ class CalibratePage(QWidget):
         self.start.open.clicked.connect(self.choose_folder)
         self.start.demo.clicked.connect(self.begin_demo)
         self.start.recent_wanted.connect(lambda folder: self.open_path(Path(folder)))
-        self._offer: ClosedSession | None = None
+        self._offer: Session | None = None
         self.start.closed.clicked.connect(self._begin_closed)
         self.question.answered.connect(self._on_answer)
         self.question.back.clicked.connect(self._leave_session)
@@ -149,7 +148,7 @@ class CalibratePage(QWidget):
         info = self.context.source.info
         return info is not None and info.kind == "virtual"
 
-    def _proposal(self, form: FormPage) -> Session | ClosedSession:
+    def _proposal(self, form: FormPage) -> Session:
         """Return the default values of a new session; for the virtual sensor they are known."""
         from app.bench.virtual_session import virtual_closed_session, virtual_session
 
@@ -163,7 +162,7 @@ class CalibratePage(QWidget):
         if isinstance(form, FormPage) and self._is_virtual:
             form.show_session(self._proposal(form), new=True)
 
-    def _begin(self, stated: Session | ClosedSession) -> None:
+    def _begin(self, stated: Session) -> None:
         """Make a new session. Ask first if another one of this sensor is not finished."""
         workspace = self.context.workspace
         sessions = unfinished(workspace.sessions(), workspace.entries())
@@ -183,13 +182,13 @@ class CalibratePage(QWidget):
             (tr("Make a new session"), lambda: self._create(stated)),
         )
 
-    def _create(self, stated: Session | ClosedSession) -> None:
+    def _create(self, stated: Session) -> None:
         name = datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
         folder = self.context.workspace.sessions_folder(stated.serial) / folder_name(name)
         try:
             create_session(replace(stated, folder=folder, ball_radii_mm={}))
             project = open_project(folder)
-            if isinstance(stated, ClosedSession) and stated.folder != Path():
+            if stated.in_place is not None and stated.folder != Path():
                 copy_images(stated, project)
         except InputError as error:
             for form in (self.form, self.closed_form):

@@ -14,7 +14,6 @@ from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
@@ -70,7 +69,7 @@ class SetupStep(StepPresenter):
         if self.form.edited:
             self.context.toasts.show(tr("The set-up changes were not applied."), "warn")
 
-    def _on_stated(self, stated: Session | ClosedSession) -> None:
+    def _on_stated(self, stated: Session) -> None:
         project = self.model.project
         before = project.session
         self.model.correct(

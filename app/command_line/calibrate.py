@@ -18,7 +18,7 @@ from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN
-from gelpolight_core.session.closed import read_any_session
+from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
-    session = read_any_session(options.session)
+    session = read_session(options.session)
     check_outputs([options.output, options.json], session_files(session))
     with stage_progress() as progress:
         result = calibrate_any(session, model=options.model, progress=progress)

@@ -13,8 +13,8 @@ from gelpolight_core.calibration.in_place_session import repaired, with_backgrou
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
-from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.session.images import average, read_image, require_colour
+from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
@@ -61,8 +61,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _refreshed(calibration: InPlaceCalibration, options: argparse.Namespace) -> InPlaceCalibration:
     if options.session is not None:
-        session = read_any_session(options.session)
-        if not isinstance(session, ClosedSession):
+        session = read_session(options.session)
+        if session.in_place is None:
             raise InputError(
                 tr("the session is of an open sensor"),
                 where=str(options.session),

@@ -26,7 +26,7 @@ from gelpolight_core.report.document import Report, Validation
 from gelpolight_core.report.evaluation import validation_of
 from gelpolight_core.report.file import refuse_other_endings, write_report
 from gelpolight_core.sensor_calibration import MODELS
-from gelpolight_core.session.closed import read_any_session
+from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
@@ -101,7 +101,7 @@ def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report
 
 
 def _of_session(options: argparse.Namespace, presses: Path | None) -> Report:
-    session = read_any_session(options.source)
+    session = read_session(options.source)
     refuse_overwriting([options.output], session_files(session))
     refuse_unwritable(options.output)
     with stage_progress() as progress:

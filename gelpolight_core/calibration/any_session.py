@@ -7,19 +7,18 @@ from gelpolight_core.calibration.pipeline import CalibrationRun, Progress, calib
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.sensor_calibration import MODELS
-from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 
 def calibrate_any(
-    session: Session | ClosedSession, *, model: str | None = None, progress: Progress | None = None
+    session: Session, *, model: str | None = None, progress: Progress | None = None
 ) -> CalibrationRun | InPlaceRun:
     """Calibrate a sensor from its session.
 
     Parameters
     ----------
-    session : Session or ClosedSession
+    session : Session
         What was captured.
     model : {"full", "paper", "in-place"}, optional
         By default ``in-place`` for a closed sensor and ``full`` for an open one.
@@ -31,7 +30,7 @@ def calibrate_any(
     InputError
         If the model does not fit the session, or a stage is missing or cannot be used.
     """
-    closed = isinstance(session, ClosedSession)
+    closed = session.in_place is not None
     if model is not None and closed != (model == IN_PLACE):
         raise InputError(
             tr("The session is of a closed sensor")
@@ -40,6 +39,6 @@ def calibrate_any(
             where=f"--model {model}",
             advice=tr("Do not choose a model: it follows from the session"),
         )
-    if isinstance(session, ClosedSession):
+    if closed:
         return calibrate_closed_session(session, progress=progress)
     return calibrate_session(session, model=model or MODELS[-1], progress=progress)

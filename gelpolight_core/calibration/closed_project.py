@@ -7,7 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
+from gelpolight_core.calibration.in_place_session import (
+    InPlaceRun,
+    calibrate_closed_session,
+    stages_of,
+)
 from gelpolight_core.calibration.inputs import FOLDERS, Stage, StageInputs
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.staged_project import Outcome, StagedProject
@@ -15,8 +19,8 @@ from gelpolight_core.calibration.status import StageState, StageStatus, judged_b
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
 from gelpolight_core.quality import QualityTable
-from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.session.images import require_colour
+from gelpolight_core.session.session import InPlace, Session, read_session
 from gelpolight_core.translation import tr
 
 STAGES = (Stage.BACKGROUND, Stage.BALLS)
@@ -38,7 +42,7 @@ class ClosedResults:
     run: InPlaceRun | None = None
 
 
-class ClosedProject(StagedProject[ClosedSession, ClosedResults]):
+class ClosedProject(StagedProject[ClosedResults]):
     """The session folder of a closed sensor with its results; used as a CalibrationProject.
 
     Parameters
@@ -140,10 +144,12 @@ class ClosedProject(StagedProject[ClosedSession, ClosedResults]):
         session = self._session
         radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
         circles = sorted(session.decisions.balls.items())
-        scale = session.mm_per_px, session.mm_per_px_sd, session.pressed_scale
+        stated = session.in_place or InPlace()
+        scale = stated.stated_scale, stated.mm_per_px_sd, stated.pressed_scale
+        cut = () if stated.region_px is None else (stated.region_px,)
         background = self._inputs_of(("background",), session.declared_response, ())
-        folders = ("balls", *session.stages[2:])
-        balls = self._inputs_of(folders, (radii, circles, scale), (background.fingerprint,))
+        folders = ("balls", *stages_of(session)[2:])
+        balls = self._inputs_of(folders, (radii, circles, scale, *cut), (background.fingerprint,))
         return {Stage.BACKGROUND: background, Stage.BALLS: balls}
 
     def _inputs_of(
@@ -174,16 +180,16 @@ def open_project(folder: Path) -> CalibrationProject | ClosedProject:
     Raises
     ------
     InputError
-        As :func:`~gelpolight_core.session.closed.read_any_session`.
+        As :func:`~gelpolight_core.session.session.read_session`.
     """
-    if isinstance(read_any_session(folder), ClosedSession):
+    if read_session(folder).in_place is not None:
         return ClosedProject(folder)
     return CalibrationProject(folder)
 
 
-def _read(folder: Path) -> ClosedSession:
-    session = read_any_session(folder)
-    if isinstance(session, ClosedSession):
+def _read(folder: Path) -> Session:
+    session = read_session(folder)
+    if session.in_place is not None:
         return session
     raise InputError(
         tr("The session has no table [in_place]"),

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -22,7 +22,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import read_image_file
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
-from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
 from gelpolight_core.session.decisions import (
     Decisions,
@@ -36,8 +35,6 @@ from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.session.images import average_frames, write_image
 from gelpolight_core.session.session import ONE_IMAGE_STAGES, Session
 
-Described = TypeVar("Described", bound=Session | ClosedSession)
-"""The session of an open or of a closed sensor."""
 Frame = NDArray[Any]
 Write = Callable[[Path, Path], None]
 
@@ -50,7 +47,7 @@ class _Replaced:
     spots_px: Mapping[int, Point] = field(default_factory=dict)
 
 
-class EditableSession(Generic[Described]):
+class EditableSession:
     """One session folder being edited.
 
     Parameters
@@ -66,16 +63,16 @@ class EditableSession(Generic[Described]):
         If the folder is not a session.
     """
 
-    def __init__(self, folder: Path, read: Callable[[Path], Described]) -> None:
+    def __init__(self, folder: Path, read: Callable[[Path], Session]) -> None:
         self._lock = threading.RLock()
-        self._read: Callable[[Path], Described] = read
+        self._read: Callable[[Path], Session] = read
         self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
-        self._session: Described = read(folder)
+        self._session: Session = read(folder)
         self._replaced: dict[str, _Replaced] = {}
         self._dropped = 0  # counts removed images that a running computation may have used
 
     @property
-    def session(self) -> Described:
+    def session(self) -> Session:
         """The present session."""
         return self._session
 
@@ -287,7 +284,7 @@ class EditableSession(Generic[Described]):
         with self._lock:
             self.decide(replace(self._session.decisions, curves=dict(curves)))
 
-    def describe(self, session: Described) -> None:
+    def describe(self, session: Session) -> None:
         """Store new stated values of the sensor, its boards and the usual ball, on disk first.
 
         Folder, decisions, the radii of single presses and the camera settings stay.
@@ -322,7 +319,7 @@ class EditableSession(Generic[Described]):
             radii = _with(self._session.ball_radii_mm, name, radius_mm)
             self._describe(replace(self._session, ball_radii_mm=radii))
 
-    def _describe(self, session: Described) -> None:
+    def _describe(self, session: Session) -> None:
         kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
         path = kept.folder / DESCRIPTION
         self._files.refuse_changed(path)

@@ -27,9 +27,10 @@ from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor, In
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.sensor_calibration import HandEdit
-from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.file_hashes import refuse_copies
 from gelpolight_core.session.images import require_colour
+from gelpolight_core.session.missing import CLOSED_STAGES
+from gelpolight_core.session.session import InPlace, Session
 from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
@@ -61,7 +62,7 @@ class InPlaceRun:
 
 
 def calibrate_closed_session(
-    session: ClosedSession,
+    session: Session,
     *,
     towards: NDArray[np.float64] | None = None,
     progress: Progress | None = None,
@@ -70,7 +71,7 @@ def calibrate_closed_session(
 
     Parameters
     ----------
-    session : ClosedSession
+    session : Session
         Images and decisions of the user.
     towards : (terms, 2), optional
         Coefficients of an earlier calibration that these presses are to correct.
@@ -84,13 +85,14 @@ def calibrate_closed_session(
     """
     progress = progress or (lambda _stage, _share: None)
     _refuse_missing(session)
-    files = tuple(path for stage in session.stages for path in session.files(stage))
+    files = tuple(path for stage in stages_of(session) for path in session.files(stage))
     refuse_copies(files)
     progress(tr("background"), 0.0)
     background = session.averaged("background")
     require_colour(background, where=str(session.folder / "background"))
-    scale = None if session.mm_per_px is not None else _measured_scale(session, background)
-    mm_per_px, scale_sd = _scale(session, scale)
+    stated = session.in_place or InPlace()
+    scale = None if stated.mm_per_px is not None else _measured_scale(session, stated, background)
+    mm_per_px, scale_sd = _scale(stated, scale)
     grid = WorkingGrid(ImageSize(*background.size), mm_per_px)
     progress(tr("ball presses"), 0.05)
     presses, unreadable = _presses(session, background)
@@ -116,9 +118,15 @@ def calibrate_closed_session(
     return InPlaceRun(calibration, result, scale)
 
 
-def _refuse_missing(session: ClosedSession) -> None:
+def stages_of(session: Session) -> tuple[str, ...]:
+    """Return the folders of the images that a calibration uses."""
+    measured = session.in_place is not None and session.in_place.mm_per_px is None
+    return (*CLOSED_STAGES, "scale") if measured else CLOSED_STAGES
+
+
+def _refuse_missing(session: Session) -> None:
     """Refuse a session that lacks images, with all stages that do."""
-    missing = [stage for stage in session.stages if not session.found(stage)]
+    missing = [stage for stage in stages_of(session) if not session.found(stage)]
     if missing:
         raise InputError(
             tr("the session has no images of: {stages}").format(stages=", ".join(missing)),
@@ -130,11 +138,11 @@ def _refuse_missing(session: ClosedSession) -> None:
         )
 
 
-def _measured_scale(session: ClosedSession, background: LinearImage) -> MeasuredScale:
+def _measured_scale(session: Session, stated: InPlace, background: LinearImage) -> MeasuredScale:
     """Return the scale by the images of ``scale/``."""
     images = session.images("scale")
     rgb = [image.rgb for image in images]
-    where, pressed = str(session.folder / "scale"), session.pressed_scale
+    where, pressed = str(session.folder / "scale"), stated.pressed_scale
     require_size(images[0].size, background.size, where=where)
     if pressed.pin_spacing_mm is not None:
         return scale_from_pins(
@@ -152,17 +160,17 @@ def _measured_scale(session: ClosedSession, background: LinearImage) -> Measured
     )
 
 
-def _scale(session: ClosedSession, measured: MeasuredScale | None) -> tuple[float, float]:
+def _scale(stated: InPlace, measured: MeasuredScale | None) -> tuple[float, float]:
     """Return the scale and its relative standard deviation."""
     if measured is not None:
         return measured.mm_per_px, measured.sd_mm_per_px / measured.mm_per_px
-    assert session.mm_per_px is not None
-    sd = session.mm_per_px_sd
-    return session.mm_per_px, STATED_SCALE_SD if sd is None else sd / session.mm_per_px
+    assert stated.mm_per_px is not None
+    mm_per_px, sd = stated.mm_per_px[0], stated.mm_per_px_sd
+    return mm_per_px, STATED_SCALE_SD if sd is None else sd / mm_per_px
 
 
 def _presses(
-    session: ClosedSession, background: LinearImage
+    session: Session, background: LinearImage
 ) -> tuple[list[PressImage], dict[str, InputError]]:
     """Return the ball images of the background's size, and why others cannot be used."""
     images, unreadable = session.usable_images("balls")
@@ -363,14 +371,14 @@ def with_background(
     return replace(calibration, in_place=changed, quality=quality, provenance=provenance)
 
 
-def repaired(calibration: InPlaceCalibration, session: ClosedSession) -> InPlaceRun:
+def repaired(calibration: InPlaceCalibration, session: Session) -> InPlaceRun:
     """Return a calibration from the presses of a session, regularised towards an earlier one.
 
     Parameters
     ----------
     calibration : InPlaceCalibration
         Of the sensor with the gel before.
-    session : ClosedSession
+    session : Session
         Background and presses of the present gel, three or more.
 
     Raises

@@ -26,7 +26,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.sensor_calibration import MODELS
 from gelpolight_core.session.file_hashes import refuse_copies
-from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
@@ -34,7 +34,7 @@ class Cancelled(Exception):
     """Raised in a computation that the user has stopped."""
 
 
-class CalibrationProject(StagedProject[Session, StageResults]):
+class CalibrationProject(StagedProject[StageResults]):
     """One session folder with its results.
 
     Parameters

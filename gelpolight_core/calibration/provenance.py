@@ -10,20 +10,17 @@ from gelpolight_core import __version__
 from gelpolight_core.io.reading import as_text
 from gelpolight_core.io.user import user_name
 from gelpolight_core.sensor_calibration import Provenance
-from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.session import Session
 
 
-def provenance_of(
-    session: Session | ClosedSession, files: Iterable[Path], *, inputs: str = ""
-) -> Provenance:
+def provenance_of(session: Session, files: Iterable[Path], *, inputs: str = "") -> Provenance:
     """Return the provenance of a calibration that is made now.
 
     Parameters
     ----------
-    session : Session or ClosedSession
+    session : Session
         With its folder, camera settings and elastomer.
     files : iterable of Path
         The images that were used.

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from gelpolight_core.calibration.editable_session import Described, EditableSession
+from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.inputs import Stage, StageInputs, changes_between
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.errors import InputError
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.file_hashes import CachedHashes
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 Results = TypeVar("Results")
@@ -34,7 +35,7 @@ class Outcome:
     fault: InputError | None
 
 
-class StagedProject(EditableSession[Described], Generic[Described, Results]):
+class StagedProject(EditableSession, Generic[Results]):
     """A session folder with the results of its stages.
 
     Parameters
@@ -47,7 +48,7 @@ class StagedProject(EditableSession[Described], Generic[Described, Results]):
         Results before any stage is computed.
     """
 
-    def __init__(self, folder: Path, read: Callable[[Path], Described], results: Results) -> None:
+    def __init__(self, folder: Path, read: Callable[[Path], Session], results: Results) -> None:
         super().__init__(folder, read)
         self._hashes = CachedHashes()
         self._results = results

@@ -12,10 +12,11 @@ from gelpolight_core.in_place.foreign import ForeignFolder, ForeignPress
 from gelpolight_core.in_place.preset import Preset
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.io.reading import read_file
-from gelpolight_core.session.closed import STAGES, ClosedSession
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.images import SUFFIXES, read_raw_image
+from gelpolight_core.session.missing import CLOSED_STAGES
+from gelpolight_core.session.session import InPlace, SensorData, Session
 from gelpolight_core.translation import tr
 
 
@@ -44,7 +45,7 @@ class Stated:
     preset: Preset | None = None
 
 
-def import_session(found: ForeignFolder, stated: Stated, out: Path) -> ClosedSession:
+def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
     """Write the session folder of a closed sensor.
 
     Labelled circles become circles drawn by hand (``decisions.toml``).
@@ -80,11 +81,10 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> ClosedSes
     pairs = list(zip(names, found.presses, strict=True))
     files = {name: name + press.image.suffix.lower() for name, press in pairs}
     scale, scale_sd = _scale(found, stated, background)
-    session = ClosedSession(
+    session = Session(
         out,
-        stated.serial,
-        scale,
-        scale_sd,
+        SensorData(stated.serial),
+        in_place=InPlace((scale, scale), scale_sd),
         ball_radii_mm={files[name]: _radius(press, stated) for name, press in pairs},
         decisions=Decisions(
             balls={files[name]: press.circle for name, press in pairs if press.circle is not None}
@@ -93,7 +93,7 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> ClosedSes
     made = not out.exists()
     try:
         create_session(session)
-        for stage in STAGES:
+        for stage in CLOSED_STAGES:
             make_folder(out / stage)
         _copy(background, out / "background" / f"background{background.suffix.lower()}")
         for name, press in pairs:

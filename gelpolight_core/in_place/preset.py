@@ -8,7 +8,7 @@ from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import brief, read_toml
-from gelpolight_core.session.closed import SCALE_RANGE
+from gelpolight_core.session.session import SCALE_RANGE
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 

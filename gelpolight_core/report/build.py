@@ -20,7 +20,6 @@ from gelpolight_core.report.document import Listing, Parts, Report, Section, Val
 from gelpolight_core.report.drawing import Map
 from gelpolight_core.report.facts import head_facts, stage_facts, stage_intro
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -48,7 +47,7 @@ def calibration_report(
 
 def run_report(
     run: CalibrationRun | InPlaceRun,
-    session: Session | ClosedSession,
+    session: Session,
     *,
     validation: Validation | None = None,
 ) -> Report:
@@ -58,7 +57,7 @@ def run_report(
     ----------
     run : CalibrationRun or InPlaceRun
         A calibration with the results of every stage.
-    session : Session or ClosedSession
+    session : Session
         The session of the run, for the images.
     validation : Validation, optional
         Results on objects of known size; by default none.
@@ -71,7 +70,6 @@ def run_report(
     if isinstance(run, InPlaceRun):
         parts = _closed_parts(run.calibration, run.result)
     else:
-        assert isinstance(session, Session)
         parts = _run_parts(run, session)
     return _assemble(run.calibration, parts, validation)
 

@@ -11,14 +11,20 @@ import tomli_w
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_text
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.closed import IN_PLACE, ClosedSession
-from gelpolight_core.session.session import ELASTOMER, FORMAT, VERSION, Session
+from gelpolight_core.session.session import (
+    ELASTOMER,
+    FORMAT,
+    IN_PLACE,
+    VERSION,
+    InPlace,
+    Session,
+)
 from gelpolight_core.translation import tr
 
 FILE_NAME = "session.toml"
 
 
-def write_description(session: Session | ClosedSession) -> None:
+def write_description(session: Session) -> None:
     """Write the description of a session, completely or not at all.
 
     Raises
@@ -30,7 +36,7 @@ def write_description(session: Session | ClosedSession) -> None:
     if session.ball_default_radius_mm is not None:
         radii["default"] = session.ball_default_radius_mm
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION}
-    content |= _closed(session) if isinstance(session, ClosedSession) else _opened(session)
+    content |= _opened(session) if session.in_place is None else _closed(session, session.in_place)
     if session.elastomer:
         content["sensor"][ELASTOMER] = session.elastomer
     content["balls"] = radii
@@ -40,7 +46,7 @@ def write_description(session: Session | ClosedSession) -> None:
     write_text(session.folder / FILE_NAME, tomli_w.dumps(content), inside=session.folder)
 
 
-def create_session(session: Session | ClosedSession) -> None:
+def create_session(session: Session) -> None:
     """Create a session folder with its description and without images.
 
     Raises
@@ -70,13 +76,13 @@ def _opened(session: Session) -> dict[str, Any]:
     return content
 
 
-def _closed(session: ClosedSession) -> dict[str, Any]:
-    pressed = session.pressed_scale
+def _closed(session: Session, in_place: InPlace) -> dict[str, Any]:
+    scale, region = in_place.stated_scale, in_place.region_px
     stated = {
-        "mm_per_px": session.mm_per_px,
-        "mm_per_px_sd": session.mm_per_px_sd,
-        "pin_spacing_mm": pressed.pin_spacing_mm,
-        "punch_diameter_mm": pressed.punch_diameter_mm,
+        "mm_per_px": list(scale) if isinstance(scale, tuple) else scale,
+        "mm_per_px_sd": in_place.mm_per_px_sd,
+        **asdict(in_place.pressed_scale),
+        "region_px": None if region is None else list(region),
     }
     return {
         "sensor": {"serial": session.serial},
@@ -84,7 +90,7 @@ def _closed(session: ClosedSession) -> dict[str, Any]:
     }
 
 
-def _camera(session: Session | ClosedSession) -> dict[str, Any]:
+def _camera(session: Session) -> dict[str, Any]:
     stored, response = session.camera_settings, session.declared_response
     camera = {} if stored is None else stored.as_table()
     if response is not None:

@@ -23,7 +23,7 @@ SUFFIXES = (".png", ".tif", ".tiff")
 
 
 class SessionImages:
-    """Common part of the sessions of open and of closed sensors: images and ball radii.
+    """The images of a session, and the radii of its balls.
 
     Attributes
     ----------

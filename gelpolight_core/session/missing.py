@@ -13,7 +13,8 @@ from gelpolight_core.translation import tr
 
 OPEN_STAGES = ("checkerboard", "top_pose", "mirror", "whiteboard")
 """Stages whose images need the sensor open: lens, top surface, LEDs and light intensity."""
-STAGES = (*OPEN_STAGES, "background", "balls")
+CLOSED_STAGES = ("background", "balls")
+STAGES = (*OPEN_STAGES, *CLOSED_STAGES)
 TABLES = ("checkerboard", "balls")
 """Tables that session.toml must have, beside ``[sensor]``."""
 

@@ -1,4 +1,7 @@
-"""Read a session folder: its description (session.toml) and the images of each stage."""
+"""Read a session folder: its description (session.toml) and the images of each stage.
+
+A session is of a closed sensor where ``session.toml`` has a table ``[in_place]``.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,15 @@ from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
+from gelpolight_core.session.missing import refuse_undescribed
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
+COMMON = ("format", "version", "sensor", "balls", "camera")
+"""Tables and keys of every session.toml."""
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 DENSEST_INDEX = 2.5
 SENSOR_RANGES = {
@@ -33,20 +39,70 @@ SENSOR_RANGES = {
     "working_diameter_mm": (0.5, 1000.0),
 }
 _SENSOR_DEFAULTS = {"window_thickness_mm": 0.0, "window_refractive_index": 1.49}
+IN_PLACE = "in_place"
 ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
+SCALE_RANGE = (1e-4, 10.0)
+PUNCH_RANGE = (0.1, 100.0)
 
 
 @dataclass(frozen=True, slots=True)
 class SensorData:
-    """The sensor as described by its maker; lengths in mm (session.toml, ``[sensor]``)."""
+    """The sensor as described by its maker; lengths in mm (session.toml, ``[sensor]``).
+
+    A closed sensor has only a serial; its lengths and indices are 0.
+    """
 
     serial: str
-    led_height_mm: float
-    elastomer_thickness_mm: float
-    elastomer_refractive_index: float
-    window_thickness_mm: float
-    window_refractive_index: float
-    working_diameter_mm: float
+    led_height_mm: float = 0.0
+    elastomer_thickness_mm: float = 0.0
+    elastomer_refractive_index: float = 0.0
+    window_thickness_mm: float = 0.0
+    window_refractive_index: float = 0.0
+    working_diameter_mm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PressedScale:
+    """The object in the images of ``scale/``.
+
+    Attributes
+    ----------
+    pin_spacing_mm : float or None
+        Distance between neighbouring pins of a square grid.
+    punch_diameter_mm : float or None
+        Diameter of a flat round punch.
+    """
+
+    pin_spacing_mm: float | None = None
+    punch_diameter_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class InPlace:
+    """What is stated for the calibration of a closed sensor (session.toml, ``[in_place]``).
+
+    Attributes
+    ----------
+    mm_per_px : (x, y) or None
+        Size of a pixel on the membrane; None where it is measured on ``scale/``.
+    mm_per_px_sd : float or None
+        Its standard deviation, where that is stated.
+    pressed_scale : PressedScale
+        The object in the images of ``scale/``.
+    region_px : (x, y, width, height) or None
+        The membrane's part of the image; None for all of it.
+    """
+
+    mm_per_px: tuple[float, float] | None = None
+    mm_per_px_sd: float | None = None
+    pressed_scale: PressedScale = PressedScale()
+    region_px: tuple[int, int, int, int] | None = None
+
+    @property
+    def stated_scale(self) -> float | tuple[float, float] | None:
+        """`mm_per_px`, as one number where pixels are square."""
+        scale = self.mm_per_px
+        return scale[0] if scale is not None and scale[0] == scale[1] else scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +113,10 @@ class Session(SessionImages):
 
     Attributes
     ----------
-    folder, sensor, checkerboard, top_pose
-        The folder, and the sensor and boards described in ``session.toml``.
+    folder, sensor
+        The folder, and the sensor described in ``session.toml``.
+    checkerboard, top_pose : BoardSpec
+        The boards; without meaning for a closed sensor.
     ball_radii_mm, ball_default_radius_mm
         From ``[balls]``.
     declared_response : str, float or None
@@ -74,12 +132,14 @@ class Session(SessionImages):
         with its settings; None if unknown.
     elastomer : str
         From ``[sensor]``: name or serial number of the elastomer; empty if not stated.
+    in_place : InPlace or None
+        From ``[in_place]``; None for a sensor that can be opened.
     """
 
     folder: Path
     sensor: SensorData
-    checkerboard: BoardSpec
-    top_pose: BoardSpec
+    checkerboard: BoardSpec = field(default_factory=BoardSpec)
+    top_pose: BoardSpec = field(default_factory=BoardSpec)
     ball_radii_mm: Mapping[str, float] = field(default_factory=dict)
     ball_default_radius_mm: float | None = None
     declared_response: str | float | None = None
@@ -88,6 +148,7 @@ class Session(SessionImages):
     decisions: Decisions = field(default_factory=Decisions)
     camera_settings: CameraSettings | None = None
     elastomer: str = ""
+    in_place: InPlace | None = None
 
     @property
     def serial(self) -> str:
@@ -148,7 +209,7 @@ class Session(SessionImages):
 
 
 def read_session(folder: Path) -> Session:
-    """Read and check ``session.toml`` of a session folder.
+    """Read and check ``session.toml`` of a session folder, of an open or of a closed sensor.
 
     In addition to the required tables, there may be ``[camera]`` with ``response = "linear"`` (the
     default) or ``"srgb"``, or ``gamma = 2.2``, and with the camera's name, format and settings in
@@ -159,9 +220,13 @@ def read_session(folder: Path) -> Session:
     ------
     InputError
         If the folder or file is missing, is not TOML, has another format or version, or has a key
-        that is unknown, missing, of the wrong type or out of range.
+        that is unknown, missing, of the wrong type or out of range. Where tables of an open sensor
+        are missing, one message lists everything that is missing and offers the closed route.
     """
-    return parse_session(read_description(folder), folder / "session.toml")
+    content = read_description(folder)
+    if IN_PLACE not in content:
+        refuse_undescribed(content, folder)
+    return parse_session(content, folder / "session.toml")
 
 
 def read_description(folder: Path) -> dict[str, Any]:
@@ -191,32 +256,89 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
     """
     top = Table(content, "", path)
     top.check_version(FORMAT, VERSION)
-    stated = top.table("sensor")
-    sensor = _parse_sensor(stated)
-    checkerboard = _parse_board(top.table("checkerboard"))
-    pose = _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard
     camera = top.table("camera") if "camera" in content else Table({}, "camera", path)
     declared = parse_response(camera) if "camera" in content else None
+    own = _parse_in_place(top) if IN_PLACE in content else _parse_opened(top)
     radii, default = parse_radii(top.table("balls"))
-    series = top.table("response") if "response" in content else Table({}, "response", path)
-    times = {name: series.number(name, 1e-4, 1e6) for name in series.file_names()}
-    top.no_more(
-        "format", "version", "sensor", "checkerboard", "top_pose", "balls", "camera", "response"
-    )
     return Session(
         path.parent,
-        sensor,
-        checkerboard,
-        pose,
-        radii,
-        default,
-        declared,
-        times,
-        declared_response(declared),
-        read_decisions(path.parent),
-        parse_settings(camera) if "device" in camera.content else None,
-        stated.optional_text(ELASTOMER),
+        ball_radii_mm=radii,
+        ball_default_radius_mm=default,
+        declared_response=declared,
+        response=declared_response(declared),
+        decisions=read_decisions(path.parent),
+        camera_settings=parse_settings(camera) if "device" in camera.content else None,
+        elastomer=top.table("sensor").optional_text(ELASTOMER),
+        **own,
     )
+
+
+def _parse_opened(top: Table) -> dict[str, Any]:
+    """Return what only the session of an open sensor states."""
+    content = top.content
+    checkerboard = _parse_board(top.table("checkerboard"))
+    series = top.table("response") if "response" in content else Table({}, "response", top.path)
+    top.no_more(*COMMON, "checkerboard", "top_pose", "response")
+    return {
+        "sensor": _parse_sensor(top.table("sensor")),
+        "checkerboard": checkerboard,
+        "top_pose": _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard,
+        "exposures_ms": {name: series.number(name, 1e-4, 1e6) for name in series.file_names()},
+    }
+
+
+def _parse_in_place(top: Table) -> dict[str, Any]:
+    """Return what only the session of a closed sensor states."""
+    sensor, stated = top.table("sensor"), top.table(IN_PLACE)
+    sensor.no_more("serial", ELASTOMER)
+    stated.no_more("mm_per_px", "mm_per_px_sd", "pin_spacing_mm", "punch_diameter_mm", "region_px")
+    top.no_more(*COMMON, IN_PLACE)
+    found = InPlace(
+        _parse_scale(stated),
+        _optional(stated, "mm_per_px_sd", (0.0, SCALE_RANGE[1])),
+        PressedScale(
+            _optional(stated, "pin_spacing_mm", PUNCH_RANGE),
+            _optional(stated, "punch_diameter_mm", PUNCH_RANGE),
+        ),
+        _parse_region(stated),
+    )
+    pressed = found.pressed_scale
+    one = (pressed.pin_spacing_mm is None) != (pressed.punch_diameter_mm is None)
+    if found.mm_per_px is None and not one:
+        raise InputError(
+            tr("[in_place] does not state the scale"),
+            where=str(top.path),
+            advice=tr(
+                "State mm_per_px; or press a pin grid or a flat punch, put the images in scale/, "
+                "and state either pin_spacing_mm or punch_diameter_mm"
+            ),
+        )
+    return {"sensor": SensorData(sensor.text("serial")), "in_place": found}
+
+
+def _parse_scale(table: Table) -> tuple[float, float] | None:
+    """Return the size of a pixel, one number or [x, y]."""
+    stated = table.content.get("mm_per_px")
+    if isinstance(stated, list) and len(stated) == 2:
+        x, y = (Table({"mm_per_px": n}, table.name, table.path) for n in stated)
+        return x.number("mm_per_px", *SCALE_RANGE), y.number("mm_per_px", *SCALE_RANGE)
+    one = _optional(table, "mm_per_px", SCALE_RANGE)
+    return None if one is None else (one, one)
+
+
+def _parse_region(table: Table) -> tuple[int, int, int, int] | None:
+    stated = table.content.get("region_px")
+    if stated is None:
+        return None
+    whole = isinstance(stated, list) and len(stated) == 4 and all(type(n) is int for n in stated)
+    if not whole or min(stated) < 0 or min(stated[2:]) < 1:
+        raise table.wrong("region_px", tr("must be four whole numbers: x, y, width and height"))
+    x, y, width, height = stated
+    return x, y, width, height
+
+
+def _optional(table: Table, key: str, limits: tuple[float, float]) -> float | None:
+    return table.number(key, *limits) if key in table.content else None
 
 
 def parse_radii(balls: Table) -> tuple[dict[str, float], float | None]:

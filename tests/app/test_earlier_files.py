@@ -175,7 +175,7 @@ def test_a_closed_session_has_its_scale_and_balls(workspace: Workspace) -> None:
     project = open_project(workspace.folder / "sensors/small-1/sessions/closed")
 
     assert len(project.session.found("balls")) == 3
-    assert project.session.mm_per_px == pytest.approx(0.165, abs=0.001)
+    assert project.session.in_place.stated_scale == pytest.approx(0.165, abs=0.001)
     assert project.session.ball_radii_mm["ball_01.png"] == 4.0
 
 

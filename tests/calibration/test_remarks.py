@@ -16,9 +16,8 @@ from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.session.description import create_session
-from gelpolight_core.session.session import Session
+from gelpolight_core.session.session import InPlace, SensorData, Session, read_session
 
 
 @pytest.fixture
@@ -54,10 +53,15 @@ def test_a_session_states_it_and_its_calibration_keeps_it(tmp_path: Path, elasto
     sensor, board = scene.calibration().sensor, BoardSpec((9, 6), 3.0)
     stated = (
         Session(tmp_path / "open", sensor, board, board, {}, 3.0, elastomer=elastomer),
-        ClosedSession(tmp_path / "closed", "S", 0.06, elastomer=elastomer),
+        Session(
+            tmp_path / "closed",
+            SensorData("S"),
+            elastomer=elastomer,
+            in_place=InPlace((0.06, 0.06)),
+        ),
     )
     for session in stated:
         create_session(session)
-        again = read_any_session(session.folder)
+        again = read_session(session.folder)
         assert again.elastomer == elastomer
         assert provenance_of(again, ()).elastomer == elastomer

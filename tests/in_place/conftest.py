@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
-from gelpolight_core.session.closed import ClosedSession, read_any_session
-from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session import Session, read_session
 
 MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 MM_PER_PX = 0.0989
@@ -57,14 +56,13 @@ def closed_folder(small_session_of_ten_balls: Path, made_once: MadeOnce) -> Path
 
 
 @pytest.fixture(scope="session")
-def closed_session(closed_folder: Path) -> ClosedSession:
+def closed_session(closed_folder: Path) -> Session:
     """Return the closed sensor's session."""
-    session = read_any_session(closed_folder)
-    assert isinstance(session, ClosedSession)
+    session = read_session(closed_folder)
     return session
 
 
 @pytest.fixture(scope="session")
-def closed_run(closed_session: ClosedSession, made_once: MadeOnce) -> InPlaceRun:
+def closed_run(closed_session: Session, made_once: MadeOnce) -> InPlaceRun:
     """Return the closed sensor's calibration with its presses; not to be changed."""
     return made_once("closed-run", lambda _: calibrate_closed_session(closed_session))

@@ -16,7 +16,7 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.errors import InputError
 from gelpolight_core.report.build import run_report
-from gelpolight_core.session.closed import ClosedSession
+from gelpolight_core.session.session import Session
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_objects_with_walls_are_doubtful_because_balls_have_none(
 
 
 def test_reports_show_presses_and_what_is_not_known(
-    calibration: Path, closed_run: InPlaceRun, closed_session: ClosedSession, tmp_path: Path
+    calibration: Path, closed_run: InPlaceRun, closed_session: Session, tmp_path: Path
 ) -> None:
     path = tmp_path / "report.pdf"
     assert main(["report", str(calibration), "-o", str(path)]) == 0

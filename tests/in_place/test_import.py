@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from app.command_line.main import MENDABLE, main
-from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.session.decisions import PlacedCircle
+from gelpolight_core.session.session import Session, read_session
 
 
 @pytest.fixture
-def images(closed_session: ClosedSession) -> list[Path]:
+def images(closed_session: Session) -> list[Path]:
     """Return a background and two presses."""
     return [*closed_session.files("background"), *closed_session.files("balls")[:2]]
 
@@ -37,11 +37,10 @@ def catalog(images: list[Path], tmp_path: Path) -> Path:
     return folder
 
 
-def imported(folder: Path, out: Path, *options: str) -> ClosedSession:
+def imported(folder: Path, out: Path, *options: str) -> Session:
     """Return the session that the command writes."""
     assert main(["import", str(folder), "-o", str(out), *options]) == 0
-    session = read_any_session(out)
-    assert isinstance(session, ClosedSession)
+    session = read_session(out)
     return session
 
 
@@ -57,8 +56,9 @@ def test_a_catalog_keeps_sizes_images_and_labels(
 ) -> None:
     session = imported(catalog, tmp_path / "s", "--preset", "gelsight-mini", "--serial", "m")
     assert session.serial == "m"
-    assert session.mm_per_px == pytest.approx(0.0634)
-    assert session.mm_per_px_sd == pytest.approx(0.0013)
+    assert session.in_place is not None
+    assert session.in_place.stated_scale == pytest.approx(0.0634)
+    assert session.in_place.mm_per_px_sd == pytest.approx(0.0013)
     first, second = session.files("balls")
     assert first.read_bytes() == images[1].read_bytes()
     assert session.ball_radius_mm(second.name) == 3.0
@@ -82,7 +82,8 @@ def test_a_raster_takes_one_frame_of_each_place_and_states_its_scale(
         json.dumps({"px_per_mm": 20.0, "probe_radius_mm": 2.0})
     )
     session = imported(folder, tmp_path / "s")
-    assert session.mm_per_px == pytest.approx(0.05)
+    assert session.in_place is not None
+    assert session.in_place.stated_scale == pytest.approx(0.05)
     names = [path.name for path in session.files("balls")]
     assert [session.ball_radius_mm(name) for name in names] == [2.0, 2.0]
     assert not session.decisions.balls

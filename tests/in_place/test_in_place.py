@@ -26,11 +26,11 @@ from gelpolight_core.reconstruction.background_shift import background_shift, ze
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.in_place.calibration import require_open
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.session.decisions import PlacedCircle
+from gelpolight_core.session.session import Session, read_session
 
 
-def held_back(session: ClosedSession, count: int) -> tuple[ClosedSession, tuple[str, ...]]:
+def held_back(session: Session, count: int) -> tuple[Session, tuple[str, ...]]:
     """Return the session without its last presses, and these."""
     names = tuple(path.name for path in session.files("balls"))[-count:]
     excluded = frozenset(f"balls/{name}" for name in names)
@@ -38,14 +38,14 @@ def held_back(session: ClosedSession, count: int) -> tuple[ClosedSession, tuple[
 
 
 @pytest.fixture(scope="module")
-def held_back_run(closed_session: ClosedSession) -> tuple[InPlaceRun, tuple[str, ...]]:
+def held_back_run(closed_session: Session) -> tuple[InPlaceRun, tuple[str, ...]]:
     """Return a calibration without two presses, and their names."""
     session, names = held_back(closed_session, 2)
     return calibrate_closed_session(session), names
 
 
 def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(
-    closed_session: ClosedSession, closed_run: InPlaceRun
+    closed_session: Session, closed_run: InPlaceRun
 ) -> None:
     first, *_ = closed_session.files("balls")
     detected = closed_run.result.presses[0].ball
@@ -58,7 +58,7 @@ def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(
 
 
 def test_presses_that_were_not_used_are_measured(
-    held_back_run: tuple[InPlaceRun, tuple[str, ...]], closed_session: ClosedSession
+    held_back_run: tuple[InPlaceRun, tuple[str, ...]], closed_session: Session
 ) -> None:
     run, names = held_back_run
     reconstructor = Reconstructor(run.calibration)
@@ -81,14 +81,15 @@ def test_presses_that_were_not_used_are_measured(
 
 
 def test_normals_and_depth_have_the_signs_and_places_that_are_promised(
-    closed_run: InPlaceRun, closed_session: ClosedSession
+    closed_run: InPlaceRun, closed_session: Session
 ) -> None:
     name, x, y, contact, radius = closed_run.calibration.balls[0]
     image = closed_session.image(closed_session.folder / "balls" / name)
     found = Reconstructor(closed_run.calibration).depth(image.rgb)
     height, width = image.rgb.shape[:2]
-    scale = closed_session.mm_per_px
-    assert scale is not None and found.normals is not None
+    assert closed_session.in_place is not None and found.normals is not None
+    scale = closed_session.in_place.stated_scale
+    assert isinstance(scale, float)
     assert found.x_mm == pytest.approx((np.arange(width) - 0.5 * (width - 1)) * scale)
     assert found.y_mm == pytest.approx((np.arange(height) - 0.5 * (height - 1)) * scale)
     across, down = np.meshgrid(found.x_mm - x, found.y_mm - y)
@@ -117,7 +118,7 @@ def test_figures_are_those_of_presses_left_out(closed_run: InPlaceRun) -> None:
 def test_the_stated_errors_hold_on_presses_that_were_not_used(
     held_back_run: tuple[InPlaceRun, tuple[str, ...]],
     closed_run: InPlaceRun,
-    closed_session: ClosedSession,
+    closed_session: Session,
 ) -> None:
     run, names = held_back_run
     places = {ball[0]: ball[1:] for ball in closed_run.calibration.balls}
@@ -137,7 +138,7 @@ def test_the_stated_errors_hold_on_presses_that_were_not_used(
 
 
 def test_the_file_gives_the_same_depth(
-    closed_run: InPlaceRun, closed_session: ClosedSession, tmp_path: Path
+    closed_run: InPlaceRun, closed_session: Session, tmp_path: Path
 ) -> None:
     path = tmp_path / "closed.gplcal"
     write_calibration(closed_run.calibration, path)
@@ -156,7 +157,7 @@ def test_the_file_gives_the_same_depth(
 
 
 def test_what_the_balls_have_not_shown_is_flagged(
-    closed_run: InPlaceRun, closed_session: ClosedSession
+    closed_run: InPlaceRun, closed_session: Session
 ) -> None:
     reconstructor = Reconstructor(closed_run.calibration)
     frame = closed_session.averaged("background").rgb.copy()
@@ -178,8 +179,7 @@ def test_a_wrong_background_is_refused(closed_folder: Path, tmp_path: Path) -> N
         image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         part = image[30:-10, 40:-10]
         assert cv2.imwrite(str(path), cv2.resize(part, image.shape[1::-1]))
-    session = read_any_session(folder)
-    assert isinstance(session, ClosedSession)
+    session = read_session(folder)
     with pytest.raises(InputError, match="the background's"):
         calibrate_closed_session(session)
 
@@ -195,14 +195,13 @@ def test_a_set_without_any_ball_is_refused(closed_folder: Path, tmp_path: Path) 
         noise = np.random.default_rng(number).normal(0.0, 0.003 * top, background.shape)
         image = np.clip(background + noise, 0, top)
         assert cv2.imwrite(str(path), image.astype(np.uint8 if top == 255 else np.uint16))
-    session = read_any_session(folder)
-    assert isinstance(session, ClosedSession)
+    session = read_session(folder)
     with pytest.raises(InputError, match=r"0 of \d+ images show a pressed ball"):
         calibrate_closed_session(session)
 
 
 def test_a_new_background_and_new_presses_refresh_a_calibration(
-    closed_run: InPlaceRun, closed_session: ClosedSession
+    closed_run: InPlaceRun, closed_session: Session
 ) -> None:
     old = closed_run.calibration
     background = closed_session.averaged("background")
@@ -228,7 +227,7 @@ def test_a_new_background_and_new_presses_refresh_a_calibration(
 
 
 def test_drift_and_zero_work_without_optics(
-    closed_run: InPlaceRun, closed_session: ClosedSession
+    closed_run: InPlaceRun, closed_session: Session
 ) -> None:
     frame = closed_session.averaged("background").rgb
     assert background_shift(frame, closed_run.calibration).quality.verdict is Verdict.PASS

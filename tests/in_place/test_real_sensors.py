@@ -12,16 +12,15 @@ import pytest
 from gelpolight_core import Measurement, measure, read_image
 from gelpolight_core.calibration.in_place_session import calibrate_closed_session
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.closed import ClosedSession, read_any_session
+from gelpolight_core.session.session import InPlace, Session, read_session
 
 
-def real_session(shared_data: Path, name: str) -> ClosedSession:
+def real_session(shared_data: Path, name: str) -> Session:
     """Return a real sensor's session, or skip the test."""
     folder = shared_data / "real" / "closed" / name
     if not folder.is_dir():
         pytest.skip(f"{folder} is not there")
-    session = read_any_session(folder)
-    assert isinstance(session, ClosedSession)
+    session = read_session(folder)
     return session
 
 
@@ -34,8 +33,11 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None
     excluded = frozenset(f"balls/{p.name}" for p in session.files("balls") if p.name not in trained)
     training = replace(session, decisions=replace(session.decisions, excluded=excluded))
     run = calibrate_closed_session(training)
-    reconstructor, scale = Reconstructor(run.calibration), session.mm_per_px
-    assert scale is not None
+    reconstructor, scale = (
+        Reconstructor(run.calibration),
+        (session.in_place or InPlace()).stated_scale,
+    )
+    assert isinstance(scale, float)
     errors = []
     for row in kept_back:
         image = session.image(session.folder / "balls" / row["file"])

@@ -10,9 +10,10 @@ import pytest
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.session.description import write_description
 from gelpolight_core.session.file_hashes import refuse_copies
 from gelpolight_core.session.images import read_image, require_colour
-from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session import InPlace, read_session
 
 GOOD = """format = "gelpolight-session"
 version = 1
@@ -191,3 +192,47 @@ def test_a_grey_image_is_refused_where_colour_is_needed() -> None:
     with pytest.raises(InputError, match="saturated"):
         require_colour(LinearImage("w", np.ones((2, 2, 3), np.float32)), where="w")
     require_colour(LinearImage("c", np.float32([[[0.5, 0.1, 0.2]]])), where="c")
+
+
+CLOSED = """format = "gelpolight-session"
+version = 1
+[sensor]
+serial = "c-1"
+[in_place]
+mm_per_px = [0.06, 0.05]
+region_px = [20, 10, 200, 150]
+[balls]
+default = 3.0
+"""
+
+
+def test_a_closed_sensor_states_scale_and_region(tmp_path: Path) -> None:
+    session = read_session(session_folder(tmp_path, CLOSED))
+    assert session.serial == "c-1"
+    assert session.in_place == InPlace((0.06, 0.05), region_px=(20, 10, 200, 150))
+    write_description(session)
+    assert read_session(tmp_path) == session
+    square = CLOSED.replace("[0.06, 0.05]", "0.06")
+    written = read_session(session_folder(tmp_path, square))
+    assert written.in_place is not None and written.in_place.mm_per_px == (0.06, 0.06)
+    write_description(written)
+    assert "mm_per_px = 0.06\n" in (tmp_path / "session.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("[0.06, 0.05]", "[0.06, 0.05, 0.04]", "mm_per_px"),
+        ("[0.06, 0.05]", "[0.06, 0.0]", "mm_per_px"),
+        ("200, 150", "200", "four whole numbers"),
+        ("200, 150", "0, 150", "four whole numbers"),
+        ("20, 10", "20.5, 10", "four whole numbers"),
+        ("mm_per_px = [0.06, 0.05]\n", "", "does not state the scale"),
+        ('serial = "c-1"', 'serial = "c-1"\nled_height_mm = 13.0', "led_height_mm"),
+    ],
+)
+def test_a_wrong_key_of_a_closed_sensor_is_named(
+    tmp_path: Path, old: str, new: str, match: str
+) -> None:
+    with pytest.raises(InputError, match=match):
+        read_session(session_folder(tmp_path, CLOSED.replace(old, new, 1)))

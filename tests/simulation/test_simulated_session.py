@@ -16,7 +16,7 @@ import pytest
 from gelpolight_core.design.parts import BallPress, Press, SessionDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.closed import ClosedSession, read_any_session
+from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.boards import board_views
 from gelpolight_core.simulation.session import simulate_session
 
@@ -68,10 +68,10 @@ def test_a_closed_sensor_shows_background_balls_and_scale_only(
     }  # fmt: skip
     same = digests(session)
     assert all(same[name] == digest for name, digest in digests(closed).items())
-    read = read_any_session(closed)
-    assert isinstance(read, ClosedSession)
+    read = read_session(closed)
     # The membrane is 34.26 mm behind the lens as refraction shows it, the focal length 346.4 px.
-    assert read.mm_per_px == pytest.approx(34.26 / 346.4, rel=0.02)
+    assert read.in_place is not None
+    assert read.in_place.stated_scale == pytest.approx(34.26 / 346.4, rel=0.02)
     assert read.ball_radius_mm("ball_01.png") == 4.0
 
 

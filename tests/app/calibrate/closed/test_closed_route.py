@@ -18,11 +18,11 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.in_place_session import SETTLED
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.in_place.preset import preset_named
-from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.session.description import create_session
-from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session import InPlace, SensorData, read_session
 
 MM_PER_PX = 0.0989
+SCALE = InPlace((MM_PER_PX, MM_PER_PX))
 """Apparent distance of the design's membrane over its focal length, at a quarter of its size."""
 
 
@@ -92,7 +92,7 @@ def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> ClosedProject
     """Return a session with the background and some presses of the small sensor."""
     source = read_session(opened)
     session = replace(
-        new_closed_session(), folder=tmp_path / "session", serial="c", mm_per_px=MM_PER_PX
+        new_closed_session(), folder=tmp_path / "session", sensor=SensorData("c"), in_place=SCALE
     )
     create_session(session)
     project = ClosedProject(session.folder)
@@ -118,11 +118,11 @@ def test_a_change_makes_the_calibration_outdated_and_undo_restores_it(
     project.exclude(Stage.BALLS, name, False)
     assert project.stale() == ()
     session = project.session
-    project.describe(replace(session, mm_per_px=2.0 * MM_PER_PX))
+    twice = InPlace((2.0 * MM_PER_PX, 2.0 * MM_PER_PX))
+    project.describe(replace(session, in_place=twice))
     assert project.stale() == (Stage.BALLS,)
-    kept = read_any_session(session.folder)
-    assert isinstance(kept, ClosedSession)
-    assert kept.mm_per_px == 2.0 * MM_PER_PX
+    kept = read_session(session.folder)
+    assert kept.in_place == twice
     assert kept.ball_radii_mm == session.ball_radii_mm
 
 
@@ -132,8 +132,8 @@ def test_a_preset_fills_in_the_scale_and_its_uncertainty(qtbot: QtBot) -> None:
     digit = preset_named("digit")
     form.values.change(preset="digit")
     stated = form.stated()
-    assert stated.mm_per_px == pytest.approx(digit.mm_per_px)
-    assert stated.mm_per_px_sd == pytest.approx(digit.mm_per_px_sd, rel=0.02)
+    assert stated.in_place.mm_per_px == pytest.approx((digit.mm_per_px, digit.mm_per_px))
+    assert stated.in_place.mm_per_px_sd == pytest.approx(digit.mm_per_px_sd, rel=0.02)
     assert str(digit.image_px[0]) in form.facts.text()
     form.show_session(stated, new=False)
     assert form.values.value.preset == "digit"
