@@ -22,12 +22,11 @@ from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 
-def add_model(parser: argparse.ArgumentParser, *, default: str | None = None) -> None:
+def add_model(parser: argparse.ArgumentParser) -> None:
     """Add ``--model``. By default a calibration's own model is used."""
     parser.add_argument(
         "--model",
         choices=(*MODELS, IN_PLACE),
-        default=default,
         help=tr(
             "paper: light of the flat membrane, direct integration; full: near "
             "light, gloss, interreflection, shadows, refracted rays; in-place: a "

@@ -11,7 +11,6 @@ from app.context.context import AppContext
 from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
-from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
@@ -68,11 +67,9 @@ def put_into_use(
     entry = None if path is None else read_entry(path)
 
     def act() -> None:
-        try:
+        done = False
+        with context.toasts.errors():
             done = context.workspace.use(path) is None if use is None else use()
-        except InputError as error:
-            done = False
-            context.toasts.show(str(error), "fail")
         context.requests.calibrations_changed.emit()
         if done and entry is not None and entry.state[1] == "warn":
             context.toasts.show(not_validated(), "warn")
@@ -81,11 +78,8 @@ def put_into_use(
         from gelpolight_core.calibration.remarks import write_remark  # slow import
 
         assert path is not None
-        try:
+        with context.toasts.errors():
             write_remark(path, "accepted", line.text())
-        except InputError as error:
-            context.toasts.show(str(error), "fail")
-        else:
             act()
 
     if entry is None or entry.summary is None or not entry.failed or entry.summary.accepted:

@@ -18,7 +18,6 @@ from app.widgets.inputs import ComboBox
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from app.workspace.entries import Entry
-from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.translation import tr
 
@@ -92,11 +91,9 @@ class CalibrationChoice(QObject):
 
     def refresh(self) -> None:
         """Update from the library, and read the calibration in use if it changed."""
-        try:
+        self.entries = ()
+        with self._context.toasts.errors():
             self.entries = self._context.workspace.entries()
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-            self.entries = ()
         self._box.show_entries(self.entries)
         used = next((e for e in self.entries if e.in_use and e.summary is not None), None)
         state = () if used is None or used.summary is None else (used.path, used.summary.identity)

@@ -58,7 +58,6 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
     """
 
     handle_moved = Signal(object)
-    handle_grabbed = Signal(str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -140,7 +139,6 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
     def _take(self, over: tuple[Handle, Grip]) -> None:
         self._held = over
         self.select(over[0].name)
-        self.handle_grabbed.emit(over[0].name)
 
     def _grip_at(self, position: QPointF) -> tuple[Handle, Grip] | None:
         width_px = self.pixelLength(pg.Point(1.0, 0.0)) or 1.0

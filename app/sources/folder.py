@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sources.source import Frame, Rgb, Setting, SourceLost, closed, no_setting
+from app.sources.source import Frame, Rgb, Setting, closed, no_setting
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.images import SUFFIXES, read_image
 from gelpolight_core.translation import tr
@@ -31,11 +31,11 @@ class FolderSource:
 
     kind = "folder"
 
-    def __init__(self, folder: Path, *, loop: bool = True, rate_hz: float = 10.0) -> None:
+    def __init__(self, folder: Path, *, rate_hz: float = 10.0) -> None:
         self.folder = Path(folder)
         self.name = self.folder.name
         self.size = (0, 0)
-        self._loop, self._rate_hz = loop, rate_hz
+        self._rate_hz = rate_hz
         self._files: tuple[Path, ...] = ()
         self._kept: dict[int, Rgb] = {}
         self._closed = threading.Event()
@@ -68,12 +68,6 @@ class FolderSource:
             return None
         if due_s > now + timeout_s:
             return None
-        if self._number >= len(self._files) and not self._loop:
-            raise SourceLost(
-                tr("the last image was shown"),
-                where=str(self.folder),
-                advice=tr("Open the folder again to restart"),
-            )
         rgb = self._image(self._number % len(self._files))
         # A folder waits for its reader, so no frame is ever lost.
         now = time.monotonic()

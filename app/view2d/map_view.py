@@ -10,7 +10,6 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QPainter, QResizeEvent
-from PySide6.QtWidgets import QWidget
 
 from app.theme import theme
 from app.view2d.colour_bar import TEXT_FILL, ColourBar
@@ -74,14 +73,9 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
     bar_double_clicked = Signal()
 
     def __init__(
-        self,
-        name: str,
-        accessible: str,
-        parent: QWidget | None = None,
-        *,
-        limits: tuple[float, float] | None = None,
+        self, name: str, accessible: str, *, limits: tuple[float, float] | None = None
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         named(self, name, accessible)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setMinimumSize(120, 100)

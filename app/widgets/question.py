@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QRegularExpression, Qt
+from PySide6.QtCore import QRegularExpression
 from PySide6.QtWidgets import (
-    QDialog,
     QDialogButtonBox,
     QLineEdit,
     QPushButton,
     QWidget,
 )
 
+from app.widgets.dialog import Dialog, Kinds
 from app.widgets.label import PlainLabel
-from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-WIDTH = 460
 
-
-class Question(QDialog):
+class Question(Dialog):
     """A sentence with one button for each answer, and Cancel. Enter chooses the first answer.
 
     Parameters
@@ -41,29 +38,22 @@ class Question(QDialog):
         text: str,
         answers: tuple[tuple[str, Callable[[], object]], ...],
     ) -> None:
-        super().__init__(parent)
-        named(self, "question", title)
-        self.setWindowTitle(title)
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        super().__init__(parent, "question", title, Kinds.Cancel, once=True)
         label = named(PlainLabel(text, self, wrap=True), "question.text", text)
-        label.setMinimumWidth(WIDTH)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        buttons.rejected.connect(self.reject)
+        label.setMinimumWidth(460)
         for number, (words, act) in enumerate(answers):
             button = named(QPushButton(words, self), f"question.answer{number}", words)
             button.setDefault(number == 0)
-            buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
+            self.buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
             button.clicked.connect(self.accept)
             button.clicked.connect(act)
-        named(
-            buttons.button(QDialogButtonBox.StandardButton.Cancel), "question.cancel", tr("Cancel")
-        )
-        self._column = vbox(label, buttons, of=self)
+        named(self.buttons.button(Kinds.Cancel), "question.cancel", tr("Cancel"))
+        self.fill(label)
 
     def require_text(self, hint: str, most: int) -> QLineEdit:
         """Add a line of text without which no answer can be chosen. Return it."""
         line = named(QLineEdit(self, placeholderText=hint, maxLength=most), "question.line", hint)
-        self._column.insertWidget(1, line)
+        self.layout().insertWidget(1, line)
         for button in self.findChildren(QPushButton, QRegularExpression("question.answer")):
             button.setEnabled(False)
             line.textChanged.connect(lambda text, b=button: b.setEnabled(bool(text.strip())))

@@ -63,8 +63,6 @@ class LutEditor(QWidget):
         Called with the text of an edit, the state before it and the state after it, to add the edit
         to a history. It must call :meth:`show_state` with the new state, and again after each undo
         or redo.
-    parent : QWidget, optional
-        Parent of the editor.
     """
 
     edited = Signal(object)
@@ -77,9 +75,8 @@ class LutEditor(QWidget):
         previous: CurveEdit | None = None,
         effect: Callable[[CurveEdit, str], Effect],
         history: Callable[[str, CurveEdit, CurveEdit], None],
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._history = history
         self._start = self._state = self._shown = start
         self._previous = previous or start

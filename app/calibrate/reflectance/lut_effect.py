@@ -62,9 +62,7 @@ class Effect:
         return self.profile_mm - self.sphere_mm
 
 
-def ball_effect(
-    run: CalibrationRun, session: Session, *, workers: int = 1
-) -> Callable[[CurveEdit, str], Effect]:
+def ball_effect(run: CalibrationRun, session: Session) -> Callable[[CurveEdit, str], Effect]:
     """Return a function of (state, name of press) that reconstructs the press with those curves.
 
     Parameters
@@ -73,10 +71,8 @@ def ball_effect(
         Gives the presses and everything except the curves.
     session : Session
         Session with the ball images.
-    workers : int, optional
-        Number of threads of the reconstruction.
     """
-    reconstructor = Reconstructor(run.calibration, model="paper", workers=workers)
+    reconstructor = Reconstructor(run.calibration, model="paper", workers=1)
     presses = {press.name: press for press in run.reflectance.presses}
 
     @lru_cache(maxsize=2)
@@ -85,7 +81,7 @@ def ball_effect(
 
     def effect(edit: CurveEdit, name: str) -> Effect:
         maps = _maps(reconstructor.paper.maps, run.calibration, edit)
-        field = solve_slopes(frame(name), maps, workers=workers)
+        field = solve_slopes(frame(name), maps, workers=1)
         depth = reconstructor.paper.integration.integrate(field.slope_x, field.slope_y).depth_mm
         return _compare(np.asarray(depth, np.float64), presses[name], run)
 

@@ -37,8 +37,6 @@ class LivePanel(QWidget):
         Names of the presses to choose from.
     effect : callable
         From (state, name of press) to :class:`Effect`; called in a separate thread.
-    parent : QWidget, optional
-        Parent of the panel.
     """
 
     def __init__(
@@ -46,10 +44,8 @@ class LivePanel(QWidget):
         before: CurveEdit,
         presses: Sequence[str],
         effect: Callable[[CurveEdit, str], Effect],
-        *,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setMinimumWidth(250)
         self._start = self._state = before
         self._before: dict[str, Effect] = {}
