@@ -176,21 +176,18 @@ def _refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
         )
 
 
-def placed_ball(circle: PlacedCircle, setting: BallSetting) -> Detection:
+def placed_ball(_rgb: Rgb, *, circle: PlacedCircle, marks: Overlay) -> Detection:
     """Show a contact that was placed by hand."""
     mark = Circle(circle.u_px, circle.v_px, circle.radius_px, "good", handle="ball")
-    overlay = Overlay(circles=(mark,), lines=(working_circle(setting.table),))
-    return Detection(overlay, tr("The contact was placed by hand."), True)
+    marks = replace(marks, circles=(mark,))
+    return Detection(marks, tr("The contact was placed by hand."), True)
 
 
-def ball_in_capture(rgb: Rgb, setting: BallSetting, radius_mm: float) -> Detection:
+def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
     """Find the ball in a capture; without one, offer a circle that the user can place."""
-    found = detect_ball(rgb, setting, radius_mm=radius_mm, editable=True)
-    return found if found.overlay.circles else with_first_circle(found, rgb)
-
-
-def with_first_circle(found: Detection, rgb: Rgb) -> Detection:
-    """Return a detection that found no contact, with a circle to drag onto it."""
+    found = detect(rgb)
+    if found.overlay.circles:
+        return found
     rows, columns = rgb.shape[:2]
     circle = Circle(columns / 2.0, rows / 2.0, FIRST_RADIUS * rows, "bad", handle="ball")
     marks = replace(found.overlay, circles=(circle,))
@@ -276,10 +273,15 @@ class BallsStep(ImageStep):
                 earlier_mm=done,
                 next_mm=next_press_mm(setting.table, radius_mm, done),
             )
-        placed = project.session.decisions.balls.get(name)
+        detect = partial(detect_ball, setting=setting, radius_mm=radius_mm, editable=True)
+        return self.of_capture(name, detect, Overlay(lines=(working_circle(setting.table),)))
+
+    def of_capture(self, name: str, detect: Detector, marks: Overlay) -> Detector:
+        """Return the detection for a capture: as placed by hand, or found and ready to be moved."""
+        placed = self.model.project.session.decisions.balls.get(name)
         if placed is not None:
-            return lambda _rgb: placed_ball(placed, setting)
-        return partial(ball_in_capture, setting=setting, radius_mm=radius_mm)
+            return partial(placed_ball, circle=placed, marks=marks)
+        return partial(ball_in_capture, detect=detect)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the radius of the shown or of the next press."""

@@ -92,6 +92,7 @@ def detect_closed_ball(
     radius_mm: float,
     earlier_px: Sequence[Point] = (),
     next_px: Point | None = None,
+    editable: bool = False,
 ) -> Detection:
     """Find a pressed ball.
 
@@ -107,6 +108,8 @@ def detect_closed_ball(
         Centres of the presses captured before.
     next_px : (u, v), optional
         Where the next press helps most.
+    editable : bool, optional
+        Whether the contact circle can be dragged; its handle is ball.
     """
     marks = Overlay(markers=tuple(Marker(*at, "dot", "info") for at in earlier_px))
     if next_px is not None:
@@ -121,7 +124,7 @@ def detect_closed_ball(
         found, _ = find_contact(seen, untouched.base, ball_radius=radius, name=tr("Image"))
         size = grid.factor
         u, v = (size * c + 0.5 * (size - 1) for c in (found.x, found.y))
-        contact = Circle(u, v, size * found.radius, "good")
+        contact = Circle(u, v, size * found.radius, "good", handle="ball" if editable else "")
         text = tr("Ball found: contact radius {c:.2f} mm.")
         return Detection(
             replace(marks, circles=(contact,)),
@@ -281,7 +284,9 @@ class ClosedBallsStep(BallsStep):
             untouched=Untouched(files[-1], scale, session.response),
             radius_mm=self.radius.radius_mm,
         )
-        if name or run is None:
+        if name:
+            return self.of_capture(name, partial(detect, editable=True), Overlay())
+        if run is None:
             return detect
         grid = run.result.model.grid
         earlier = [to_px(x, y, grid) for _name, x, y, _c, _r in run.calibration.balls]

@@ -122,6 +122,7 @@ class ImageStep(StepPresenter):
         self.area.view.judge_focus(self.judges_focus)
         self.model.live_detection.forget_movement()
         super().enter()
+        self.camera_changed()
 
     def refresh(self) -> None:
         """Update to changed results and corrections, also after undo."""
@@ -148,9 +149,17 @@ class ImageStep(StepPresenter):
             self.area.view.image.say(no_camera() + "\n" + tr("Click an image below to show it."))
 
     def camera_changed(self) -> None:
-        """Show the images of another camera, unless a capture is shown."""
+        """Show the images of another camera, unless a capture is shown.
+
+        If the session's images are not from that camera, show the newest of them instead.
+        """
+        live = self.model.live
+        found = self.model.project.session.found(self.step.folder)
+        own = live.stream is not None and not self.model.camera_fault(ask=False)
         if self.model.shown:
-            self.panel.capture.setEnabled(self.model.live.stream is not None)
+            self.panel.capture.setEnabled(live.stream is not None)
+        elif found and live.page_shown and not own:
+            self.show_capture(found[-1].name)
         else:
             self.live()
 

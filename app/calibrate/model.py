@@ -142,7 +142,7 @@ class WizardModel(QObject):
             jobs.refused.connect(self.refused)
         # Returns why the present camera must not be used for this session; the session camera sets
         # it.
-        self.camera_fault: Callable[[], str] = lambda: ""
+        self.camera_fault: Callable[..., str] = lambda ask=True: ""
         self.shown = ""
         self._saved = self._saved_inputs = ""
         self.states: dict[str, StepState] = {}

@@ -278,7 +278,7 @@ class Saving(QObject):
 
     def report(self) -> None:
         """Ask for a file name and write the report there."""
-        name = f"{self._model.project.session.sensor.serial}-report.pdf"
+        name = f"{self._model.project.session.serial}-report.pdf"
         title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
         path = ask_save(self._view, self._context.settings, "report", title, name, patterns)
         if path is not None:

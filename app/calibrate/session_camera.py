@@ -12,7 +12,8 @@ from app.calibrate.model import WizardModel
 from app.context.context import AppContext
 from app.context.source_button import show_settings_of_source
 from app.sources.camera.applying import is_locked
-from app.widgets.question import Question, ask
+from app.widgets.question import Question
+from app.widgets.question import ask as question
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
@@ -98,7 +99,7 @@ class SessionCamera(QObject):
         model.photographed.connect(self._on_photographed)
         model.camera_fault = self.fault
 
-    def fault(self) -> str:
+    def fault(self, *, ask: bool = True) -> str:
         """Return why the present camera cannot be used: the session belongs to another camera.
 
         If both are of one model, the user is asked whether it is the same one at another port.
@@ -108,7 +109,7 @@ class SessionCamera(QObject):
         if not any(session.found(folder) for folder in FOLDERS.values()):
             return ""
         serial = self._model.live.serial
-        if now is None and serial not in ("", session.serial):
+        if (now is None or stored is None) and serial not in ("", session.serial):
             text = tr(
                 "This session belongs to sensor {one}, but the images are those of {other}. Select "
                 "the camera of the sensor, or start a new session for the other sensor."
@@ -126,9 +127,11 @@ class SessionCamera(QObject):
             other=now.name,
             other_id=now.identity,
         )
-        if stored.model and stored.model == now.model and not self._window.findChild(Question):
+        alike = stored.model and stored.model == now.model
+        if ask and alike and not self._window.findChild(Question):
             accept = partial(cameras.accept_same, stored.identity, now.identity)
-            ask(self._window, tr("Another camera"), text, (tr("It is the same camera"), accept))
+            same = tr("It is the same camera"), accept
+            question(self._window, tr("Another camera"), text, same)
         return text
 
     def _present(self) -> CameraSettings | None:

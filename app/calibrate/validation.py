@@ -309,9 +309,8 @@ class ClosedValidationStep(ValidationStep):
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
         self.view = ResultView(parts.steps)
-        self.view.report.hide()  # a report describes the optics of an open sensor
         self.view.step_wanted.connect(self.step_wanted)
-        self._saving = Saving(self.model, self.view, context=self.context)
+        self.saving = Saving(self.model, self.view, context=self.context)
         self._shown = self.centre
 
     step = Step(

@@ -226,8 +226,8 @@ class Wizard(QMainWindow):
         following = self.presenters[row + 1 : row + 2]
         self.panel.show_step(self.open.step, following=following[0].step.title if following else "")
         self._capture_key.setEnabled(self.open.step.captures)
-        self.open.enter()
         self.live.use(self.open.uses_camera)
+        self.open.enter()
         self._compute_what_never_was()
         self.moving_on.enter(self.open)
         self.refresh()

@@ -186,7 +186,7 @@ class LiveSession(QObject):
     @property
     def processing_ms(self) -> float:
         """Typical time of the function in ms."""
-        return self._processor.figures().median_ms
+        return self._processor.median_ms
 
     @property
     def source(self) -> object:

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame
-from app.sources.stopping import PROCESSING, join, lower_priority
+from app.sources.stopping import PROCESSING, Worker, lower_priority
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -61,15 +61,7 @@ class Failure:
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessorFigures:
-    """Statistics of the function in use, over its last 60 frames; times in ms."""
-
-    rate_hz: float = 0.0
-    median_ms: float = 0.0
-
-
-class Processor(Generic[T]):
+class Processor(Worker, Generic[T]):
     """Runs a function on the newest frame in one thread; a failure is a result, not an end.
 
     Parameters
@@ -92,13 +84,12 @@ class Processor(Generic[T]):
         *,
         name: str = "processing",
     ) -> None:
-        self._inbox, self._outbox, self._name = inbox, outbox, name
+        super().__init__(name)
+        self._inbox, self._outbox = inbox, outbox
         self._lock = threading.Lock()
         self._function, self._generation = function, 0
         self._reported = -1
-        self._done: deque[tuple[float, float]] = deque(maxlen=60)
-        self._end = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._done: deque[float] = deque(maxlen=60)
 
     @property
     def generation(self) -> int:
@@ -114,33 +105,11 @@ class Processor(Generic[T]):
             self._done.clear()
             return self._generation
 
-    def start(self) -> None:
-        """Start processing."""
-        if self._thread is not None and self._thread.is_alive():
-            raise RuntimeError("the processor is already running")
-        self._end = threading.Event()
-        self._thread = threading.Thread(
-            target=self._run, args=(self._end,), name=self._name, daemon=True
-        )
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Stop after the present frame; may be called twice."""
-        self._end.set()
-        if self._thread is not None:
-            join(self._thread)
-            self._thread = None
-
-    def figures(self) -> ProcessorFigures:
-        """Return the statistics."""
+    @property
+    def median_ms(self) -> float:
+        """Median time of the function in use, of its last 60 frames; 0 before the first."""
         with self._lock:
-            done = tuple(self._done)
-        if not done:
-            return ProcessorFigures()
-        spent = [ms for _, ms in done]
-        span_s = done[-1][0] - done[0][0]
-        rate = (len(done) - 1) / span_s if span_s > 0.0 else 0.0
-        return ProcessorFigures(rate, statistics.median(spent))
+            return statistics.median(self._done) if self._done else 0.0
 
     def _run(self, end: threading.Event) -> None:
         lower_priority(PROCESSING)
@@ -154,11 +123,11 @@ class Processor(Generic[T]):
             function, generation = self._function, self._generation
         began = time.perf_counter()
         item = self._apply(function, generation, frame)
-        now = time.perf_counter()
+        took_ms = 1e3 * (time.perf_counter() - began)
         with self._lock:
             stale = generation != self._generation
             if not stale:
-                self._done.append((now, 1e3 * (now - began)))
+                self._done.append(took_ms)
         if not stale and not end.is_set():
             self._outbox.put(item)
 

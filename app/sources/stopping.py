@@ -45,6 +45,41 @@ def join_left_behind(timeout_s: float) -> bool:
     return not _left_behind
 
 
+class Worker:
+    """A thread that can be started and stopped again. What it does is :meth:`_run`.
+
+    Parameters
+    ----------
+    name : str
+        Name of the thread.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._thread: threading.Thread | None = None
+        self._end = threading.Event()
+
+    def start(self) -> None:
+        """Start the thread."""
+        if self._thread is not None and self._thread.is_alive():
+            raise RuntimeError(f"{self._name} is already running")
+        self._end = threading.Event()
+        self._thread = threading.Thread(
+            target=self._run, args=(self._end,), name=self._name, daemon=True
+        )
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop the thread after its present frame; may be called twice."""
+        self._end.set()
+        if self._thread is not None:
+            join(self._thread)
+            self._thread = None
+
+    def _run(self, end: threading.Event) -> None:
+        raise NotImplementedError
+
+
 PROCESSING = 5
 """For threads that compute what is shown; the window and capture keep their priority."""
 RENDERING = 10

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame, Source, SourceAway, SourceLost
-from app.sources.stopping import join
+from app.sources.stopping import Worker
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -56,7 +56,7 @@ class _Capture:
     frames: list[Frame] = field(default_factory=list)
 
 
-class Stream:
+class Stream(Worker):
     """Frames of a source, read by a separate thread, which also opens and closes the source.
 
     Parameters
@@ -76,33 +76,19 @@ class Stream:
     """
 
     def __init__(self, source: Source, *, silence_s: float = 5.0) -> None:
+        super().__init__(f"capture {source.name}")
         self.source = source
         self.newest: Mailbox[Frame] = Mailbox()
         self._silence_s = silence_s
         self._lock = threading.Lock()
         self._taps: list[Tap] = []
         self._captures: list[_Capture] = []
-        self._thread: threading.Thread | None = None
-        self._end = threading.Event()
         self._restart()
 
     def start(self) -> None:
-        """Start to capture; returns at once. Errors are reported by :meth:`figures`."""
-        if self._thread is not None and self._thread.is_alive():
-            raise RuntimeError("the stream is already running")
-        self._end = threading.Event()
+        """Start capturing; the counts begin again."""
         self._restart()
-        self._thread = threading.Thread(
-            target=self._run, args=(self._end,), name=f"capture {self.source.name}", daemon=True
-        )
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Stop capturing and close the source; may be called twice."""
-        self._end.set()
-        if self._thread is not None:
-            join(self._thread)
-            self._thread = None
+        super().start()
 
     def reopen(self) -> None:
         """Try a lost source again."""

@@ -74,6 +74,10 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert read_calibration(path).model == "in-place"
     step = wizard.at("validation")
     assert wizard.centre.currentWidget() is wizard.area
+    report = tmp_path / "report.pdf"
+    wizard.open.saving.write_report(report)
+    technician.rest()
+    assert report.is_file()
     step.form.show_known(KnownObject("ball", 2.0 * opened.ball_radius_mm(files[-1].name), None))
     step.import_press(files[-1])
     technician.until(step.form.keep.isEnabled)
@@ -86,6 +90,43 @@ def test_too_few_presses_are_not_a_failure(
 ) -> None:
     technician.begin(closed_project(small_session, tmp_path, balls=2), "balls")
     assert technician.state("balls") == "begun"
+
+
+def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
+    technician: Technician, small_session: Path, tmp_path: Path
+) -> None:
+    project = closed_project(small_session, tmp_path, balls=4)
+    technician.begin(project, "balls")
+    wizard = technician.wizard
+    name = project.session.found("balls")[-1].name
+    assert wizard.model.shown == name, "without a camera the session shows its own images"
+    contact = wizard.area.view.image.overlay
+    technician.until(lambda: contact.handles)
+    (found,) = contact.handles
+    wizard.open.moved("ball", found.u + 3.0, found.v, found.radius_px)
+    technician.until(lambda: contact.handles and contact.handles[0].u == found.u + 3.0)
+    assert project.session.decisions.balls[name].u_px == found.u + 3.0
+    technician.rest()
+    wizard.model.undo.undo()
+    technician.until(lambda: contact.handles and contact.handles[0].u == found.u)
+    technician.rest()
+    assert not project.session.decisions.balls
+
+
+def test_the_images_of_another_sensor_are_not_shown_in_the_session(
+    technician: Technician, small_session: Path, tmp_path: Path
+) -> None:
+    """The virtual sensor may be the source when a session is opened from files."""
+    technician.page.context.source.choose_virtual_sensor()
+    project = closed_project(small_session, tmp_path, balls=1)
+    technician.begin(project, "background")
+    technician.until(lambda: technician.wizard.model.shown)
+    technician.wizard.go_to("balls")
+    assert technician.wizard.model.shown == project.session.found("balls")[0].name
+    technician.wizard.open.live()
+    technician.until(lambda: technician.see("calibrate.capture").isEnabled())
+    technician.click("calibrate.capture")
+    assert "belongs to sensor c" in technician.see("calibrate.notice").text()
 
 
 def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> ClosedProject:
