@@ -11,27 +11,15 @@ from gelpolight_core.simulation.session import closed_session_toml, session_toml
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 
-def virtual_session(design: SensorDesign | None = None) -> Session:
+def virtual_session(*, opens: bool = True) -> Session:
     """Return the session description of the virtual sensor; it has no folder yet.
 
     Parameters
     ----------
-    design : SensorDesign, optional
-        The sensor design; by default the standard one.
+    opens : bool, optional
+        Whether the sensor can be opened.
     """
-    content = tomllib.loads(session_toml(design or SensorDesign()))
-    session = parse_session(content, Path("session.toml"))
-    return session
-
-
-def virtual_closed_session(design: SensorDesign | None = None) -> Session:
-    """Return the session description of the virtual sensor closed; it has no folder yet.
-
-    Parameters
-    ----------
-    design : SensorDesign, optional
-        The sensor design; by default the standard one.
-    """
-    content = tomllib.loads(closed_session_toml(VirtualSensor(design or SensorDesign())))
-    content["balls"] = {"default": 4.0}
-    return parse_session(content, Path("session.toml"))
+    design = SensorDesign()
+    content = session_toml(design) if opens else closed_session_toml(VirtualSensor(design))
+    usual = {} if opens else {"balls": {"default": 4.0}}
+    return parse_session(tomllib.loads(content) | usual, Path("session.toml"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from app.calibrate.closed_form import new_closed_session
+from app.calibrate.setup_values import new_session
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.errors import InputError
@@ -29,7 +29,7 @@ def closed_offer(folder: Path) -> Session | None:
     missing, path = missing_stages(folder, ()), folder / "session.toml"
     if not missing or any(stage in missing for stage in CLOSED_STAGES):
         return None
-    offer = replace(new_closed_session(), folder=folder)
+    offer = replace(new_session(optics=False), folder=folder)
     try:
         content = read_description(folder) if path.exists() else {}
     except InputError:

@@ -8,12 +8,11 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
 
-from app.calibrate.closed_form import ClosedForm, new_closed_session
 from app.calibrate.closed_offer import closed_offer, copy_images
-from app.calibrate.form_page import FormPage
 from app.calibrate.question_view import QuestionView
 from app.calibrate.session_camera import SetupCamera
-from app.calibrate.setup_form import SetupForm, new_session
+from app.calibrate.setup_form import SetupForm
+from app.calibrate.setup_values import new_session
 from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext
@@ -50,10 +49,13 @@ class CalibratePage(QWidget):
         vbox(self._stack, of=self, margins=0)
         self.start = StartView()
         self.question = QuestionView()
-        self.form, self.closed_form = SetupForm(), ClosedForm()
-        for view in (self.start, self.question, self.form, self.closed_form):
+        self.form = SetupForm()
+        for view in (self.start, self.question, self.form):
             self._stack.addWidget(view)
-        self.setup_cameras = [self._prepare(form) for form in (self.form, self.closed_form)]
+        none = tr("No camera: import images")
+        self.form.offer_cameras(SourceButton(context=context, page="setup", none=none))
+        self.form.accepted.connect(self._begin)
+        self.setup_camera = SetupCamera(self.form, context=context)
         self.start.new.clicked.connect(self.begin)
         self.start.open.clicked.connect(self.choose_folder)
         self.start.demo.clicked.connect(self.begin_demo)
@@ -64,12 +66,6 @@ class CalibratePage(QWidget):
         self.question.back.clicked.connect(self._leave_session)
         context.source.changed.connect(self._on_source)
         self.start.show_recent(context.settings.recent("sessions"))
-
-    def _prepare(self, form: FormPage) -> SetupCamera:
-        none = tr("No camera: import images")
-        form.offer_cameras(SourceButton(context=self.context, page="setup", none=none))
-        form.accepted.connect(self._begin)
-        return SetupCamera(form, context=self.context)
 
     # Called by the main window
 
@@ -117,9 +113,7 @@ class CalibratePage(QWidget):
     def _begin_closed(self) -> None:
         """Show the form of a closed sensor for the folder that could not be opened."""
         if self._offer is not None:
-            self.closed_form.show_session(self._offer, new=True)
-            self._stack.setCurrentWidget(self.closed_form)
-            self.closed_form.serial.setFocus()
+            self._show_form(self._offer)
 
     def begin_demo(self) -> None:
         """Start with the virtual sensor."""
@@ -127,12 +121,21 @@ class CalibratePage(QWidget):
         self.begin()
 
     def _on_answer(self, opens: bool) -> None:
-        """Show the form for the sensor; text typed before is kept."""
-        form: FormPage = self.form if opens else self.closed_form
-        if not form.edited or self._is_virtual:
-            form.show_session(self._proposal(form), new=True)
-        self._stack.setCurrentWidget(form)
-        form.serial.setFocus()
+        """Show the form for the sensor; what was typed before is kept."""
+        typed, edited = self.form.values.value, self.form.edited and not self._is_virtual
+        if edited and typed.optics == opens:
+            self._show_form(None)
+            return
+        self._show_form(self._proposal(opens))
+        if edited:
+            self.form.values.change(serial=typed.serial, elastomer=typed.elastomer)
+
+    def _show_form(self, session: Session | None) -> None:
+        """Show the form, with the values of a new session if one is given."""
+        if session is not None:
+            self.form.show_session(session, new=True)
+        self._stack.setCurrentWidget(self.form)
+        self.form.serial.setFocus()
 
     def choose_folder(self) -> None:
         """Let the user choose a session folder."""
@@ -148,19 +151,17 @@ class CalibratePage(QWidget):
         info = self.context.source.info
         return info is not None and info.kind == "virtual"
 
-    def _proposal(self, form: FormPage) -> Session:
+    def _proposal(self, opens: bool) -> Session:
         """Return the default values of a new session; for the virtual sensor they are known."""
-        from app.bench.virtual_session import virtual_closed_session, virtual_session
+        from app.bench.virtual_session import virtual_session
 
-        if form is self.form:
-            return virtual_session() if self._is_virtual else new_session()
-        return virtual_closed_session() if self._is_virtual else new_closed_session()
+        return virtual_session(opens=opens) if self._is_virtual else new_session(optics=opens)
 
     def _on_source(self) -> None:
         """Fill in the known values of the virtual sensor when it is selected in a form."""
-        form = self._stack.currentWidget()
-        if isinstance(form, FormPage) and self._is_virtual:
-            form.show_session(self._proposal(form), new=True)
+        if self._stack.currentWidget() is self.form and self._is_virtual:
+            proposal = self._proposal(self.form.values.value.optics)
+            self.form.show_session(proposal, new=True)
 
     def _begin(self, stated: Session) -> None:
         """Make a new session. Ask first if another one of this sensor is not finished."""
@@ -191,8 +192,7 @@ class CalibratePage(QWidget):
             if stated.in_place is not None and stated.folder != Path():
                 copy_images(stated, project)
         except InputError as error:
-            for form in (self.form, self.closed_form):
-                form.show_problem(str(error))
+            self.form.show_problem(str(error))
             return
         self._show_wizard(project)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from app.widgets.label import PlainLabel
+from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -27,41 +28,33 @@ class QuestionView(QWidget):
     def __init__(self) -> None:
         super().__init__()
         named(self, "question", tr("Can the sensor be opened?"))
-        column = QVBoxLayout(self)
-        column.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        column.setSpacing(10)
         title = PlainLabel(tr("Can the sensor be opened?"))
         make_bold(title, size=1.6)
-        column.addWidget(title)
         self.can = self._answer("open", tr("&Yes, the membrane can be taken off"))
-        self.cannot = self._answer("closed", tr("&No, the membrane is bonded"))
         self.can.clicked.connect(lambda: self.answered.emit(True))
-        self.cannot.clicked.connect(lambda: self.answered.emit(False))
-        for button, text in (
-            (
-                self.can,
-                tr(
-                    "Lens, top surface, lights and membrane are measured one by one, in eleven "
-                    "steps. This gives the most exact depth. You need two checkerboards, a "
-                    "mirror, a white board and balls."
-                ),
+        opened = PlainLabel(
+            tr(
+                "Lens, top surface, lights and membrane are measured one by one, in eleven "
+                "steps. This gives the most exact depth. You need two checkerboards, a "
+                "mirror, a white board and balls."
             ),
-            (
-                self.cannot,
-                tr(
-                    "For GelSight Mini, DIGIT, 9DTact and most home-made sensors. Four steps: one "
-                    "image of the untouched membrane and some presses of a ball of known diameter."
-                ),
+            wrap=True,
+        )
+        cannot = self._answer("closed", tr("&No, the membrane is bonded"))
+        cannot.clicked.connect(lambda: self.answered.emit(False))
+        bonded = PlainLabel(
+            tr(
+                "For GelSight Mini, DIGIT, 9DTact and most home-made sensors. A few steps: one "
+                "image of the untouched membrane and some presses of a ball of known diameter."
             ),
-        ):
-            label = PlainLabel(text, wrap=True)
-            label.setFixedWidth(WIDTH)
-            column.addWidget(button)
-            column.addWidget(label)
-            column.addSpacing(10)
+            wrap=True,
+        )
         self.back = self._answer("back", tr("&Back"))
         self.back.setFlat(True)
-        column.addWidget(self.back)
+        for label in (opened, bonded):
+            label.setFixedWidth(WIDTH)
+        parts = title, self.can, opened, 10, cannot, bonded, 10, self.back
+        vbox(*parts, of=self, spacing=10).setAlignment(Qt.AlignmentFlag.AlignCenter)
 
     def _answer(self, name: str, text: str) -> QPushButton:
         button = named(QPushButton(text), f"question.{name}", text.replace("&", ""))

@@ -9,12 +9,8 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
     QPushButton,
-    QScrollArea,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -26,7 +22,7 @@ from app.context.context import AppContext
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
 from app.widgets.label import PlainLabel, RoomyLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -60,10 +56,8 @@ class ResultView(QWidget):
         self._name = ""
         self.headline = named(PlainLabel(wrap=True), "result.headline", tr("Verdict"))
         make_bold(self.headline, size=1.2)
-        scroll = named(QScrollArea(widgetResizable=True), "result.scroll", tr("All stages"))
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
         inside = QWidget()
-        rows = QVBoxLayout(inside)
+        rows = vbox(of=inside)
         for step in steps:
             for stage in step.stages:
                 if stage not in self._rows:
@@ -71,8 +65,7 @@ class ResultView(QWidget):
                     self._rows[stage].step_wanted.connect(self.step_wanted)
                     rows.addWidget(self._rows[stage])
         rows.addStretch(1)
-        scroll.setWidget(inside)
-        buttons = QHBoxLayout()
+        scroll = named(scroll_area(inside), "result.scroll", tr("All stages"))
         self.save = named(
             QPushButton(tr("&Save the calibration")), "result.save", tr("Save the calibration")
         )
@@ -81,10 +74,9 @@ class ResultView(QWidget):
         )
         for button in (self.save, self.report):
             button.setMinimumHeight(38)
-            buttons.addWidget(button)
         self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        vbox(self.headline, (scroll, 1), buttons, self.saved, of=self)
+        vbox(self.headline, (scroll, 1), hbox(self.save, self.report), self.saved, of=self)
 
     def show_saved(self, sentence: str, role: str = "pass") -> None:
         """Show where the calibration or its report was saved, or why it was not."""

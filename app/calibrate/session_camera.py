@@ -7,8 +7,8 @@ from functools import partial
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.form_page import FormPage
 from app.calibrate.model import WizardModel
+from app.calibrate.setup_form import SetupForm
 from app.context.context import AppContext
 from app.context.source_button import show_settings_of_source
 from app.sources.camera.applying import is_locked
@@ -31,13 +31,13 @@ class SetupCamera(QObject):
 
     Parameters
     ----------
-    setup : FormPage
+    setup : SetupForm
         The form.
     context : AppContext
         Context with the cameras and the selected source.
     """
 
-    def __init__(self, setup: FormPage, *, context: AppContext) -> None:
+    def __init__(self, setup: SetupForm, *, context: AppContext) -> None:
         super().__init__(setup)
         self._setup, self._context = setup, context
         setup.camera_settings.clicked.connect(self._set)

@@ -6,8 +6,6 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.closed_form import ClosedForm
-from app.calibrate.form_page import FormPage
 from app.calibrate.session_camera import SetupCamera
 from app.calibrate.setup_form import SetupForm
 from app.calibrate.states import StepState
@@ -21,11 +19,9 @@ from gelpolight_core.translation import tr
 class SetupStep(StepPresenter):
     """Shows the form, and applies it."""
 
-    form_type: type[FormPage] = SetupForm
-
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
-        self.form = self.form_type()
+        self.form = SetupForm()
         self.form.accepted.connect(self._on_stated)
         self._camera = SetupCamera(self.form, context=self.context)
 
@@ -84,8 +80,6 @@ class SetupStep(StepPresenter):
 
 class ClosedSetupStep(SetupStep):
     """Shows the form of a closed sensor."""
-
-    form_type = ClosedForm
 
     step = Step(
         "setup",

@@ -1,150 +1,217 @@
-"""The set-up step: data of the sensor, its boards and its balls."""
+"""The form of the set-up: camera, sensor, boards and balls of a session."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QStandardPaths, QUrl
+from PySide6.QtCore import QStandardPaths, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
+    QPushButton,
+    QScrollArea,
     QSizePolicy,
     QToolButton,
     QWidget,
 )
 
-from app.calibrate.form_page import USUAL_RADIUS_MM, FormPage, Values, length_box
-from app.widgets.fields import number
+from app.calibrate.setup_values import (
+    PRESETS,
+    USUAL_RADIUS_MM,
+    SetupValues,
+    new_session,
+    preset_text,
+    session_of,
+    values_of,
+)
 from app.widgets.folding_row import FoldingRow
-from app.widgets.inputs import SpinBox
+from app.widgets.forms import Form
+from app.widgets.inputs import DoubleSpinBox, SpinBox
 from app.widgets.label import PlainLabel
-from app.widgets.meaning import show_meaning
+from app.widgets.layout import hbox, vbox
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.session import DENSEST_INDEX, SensorData, Session
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
-MM = tr(" mm")
 
+class SetupForm(QScrollArea):
+    """A form for the description of a session. What it asks follows from the session.
 
-@dataclass(frozen=True)
-class SensorValues(Values):
-    """What is known about a sensor that can be opened, as in :class:`SensorData`."""
+    Signals
+    -------
+    accepted(object)
+        The session with the entered values, in the folder of the session shown last.
+    """
 
-    led_height_mm: float = number(
-        14.0,
-        tr("LED height"),
-        0.1,
-        500.0,
-        MM,
-        3,
-        step=0.1,
-        tip=tr(
-            "From the light-emitting points of the LEDs to the top surface; see the drawing of the "
-            "housing"
-        ),
-    )
-    elastomer_thickness_mm: float = number(
-        14.0,
-        tr("Elastomer thickness"),
-        0.0,
-        500.0,
-        MM,
-        3,
-        step=0.1,
-        tip=tr("Layer of clear silicone below the membrane"),
-    )
-    elastomer_refractive_index: float = number(
-        1.41,
-        tr("Elastomer refractive index"),
-        1.0,
-        DENSEST_INDEX,
-        decimals=4,
-        step=0.01,
-        tip=tr("Silicone: about 1.41"),
-    )
-    window_thickness_mm: float = number(
-        0.0,
-        tr("Window thickness"),
-        0.0,
-        100.0,
-        MM,
-        3,
-        step=0.1,
-        tip=tr("Rigid plate below the elastomer; 0 if there is none"),
-    )
-    window_refractive_index: float = number(
-        1.49,
-        tr("Window refractive index"),
-        1.0,
-        DENSEST_INDEX,
-        decimals=4,
-        step=0.01,
-        tip=tr("Acrylic: about 1.49"),
-    )
-    working_diameter_mm: float = number(
-        26.0,
-        tr("Working diameter"),
-        0.5,
-        1000.0,
-        MM,
-        3,
-        step=0.1,
-        tip=tr("Diameter of the circle on the membrane in which the sensor measures"),
-    )
-
-    def sensor(self) -> SensorData:
-        """Return the data of the sensor."""
-        return SensorData(**{f.name: getattr(self, f.name) for f in fields(SensorData)})
-
-
-def new_session(sensor: SensorData | None = None) -> Session:
-    """Return the default description of a new session; it has no folder yet."""
-    boards = BoardSpec((9, 6), 3.0), BoardSpec((9, 6), 2.0)
-    return Session(Path(), sensor or SensorValues().sensor(), *boards, {}, USUAL_RADIUS_MM)
-
-
-class SetupForm(FormPage):
-    """The form with the data of a sensor that can be opened."""
+    accepted = Signal(object)
 
     def __init__(self) -> None:
+        super().__init__()
+        named(self, "setup", tr("Set-up"))
+        self.setWidgetResizable(True)
+        inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
+        self.setWidget(inside)
+        hbox(None, holder, None, of=inside)
+        self._title, self._task = PlainLabel(), PlainLabel(wrap=True)
+        make_bold(self._title, size=1.35)
+        self.values = Form(SetupValues(), "setup", at_once=True)
+        self.values.changed.connect(self._on_changed)
+        self.serial = self.values.inputs["serial"]
+        self.facts = named(PlainLabel(wrap=True), "setup.facts", tr("About this kind of sensor"))
+        below = self.values.rows.getWidgetPosition(self.values.inputs["preset"])[0] + 1
+        self.values.rows.insertRow(below, "", self.facts)
+        sensor, balls = QGroupBox(tr("Sensor")), QGroupBox(tr("Balls"))
+        vbox(self.values, of=sensor)
+        self.ball = length_box("setup.ball", tr("Default ball diameter"), 0.1, 1000.0)
+        self.ball.setToolTip(tr("Diameter measured with a calliper; each press can have its own"))
+        QFormLayout(balls).addRow(tr("Default diameter"), self.ball)
+        self._boards = self._build_boards()
+        self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
+        self.accept = named(
+            QPushButton(minimumHeight=38), "setup.accept", tr("Start the calibration")
+        )
+        self.accept.clicked.connect(lambda: self.accepted.emit(self.stated()))
+        vbox(
+            self._title,
+            self._task,
+            self._build_camera(),
+            sensor,
+            self._boards,
+            balls,
+            self.problem,
+            self.accept,
+            None,
+            of=holder,
+        )
+        self.show_session(new_session(), new=True)
+
+    def show_session(self, session: Session, *, new: bool) -> None:
+        """Show the values of a session; `new`: the session is not on disk yet."""
+        self.session = session
+        values = values_of(session)
+        title = tr("Sensor data") if values.optics else tr("Closed sensor")
+        task = tr(
+            "Enter the values from the drawing of the housing and the data sheets of the "
+            "parts. Every length here scales the result. You can change the values later. "
+            "Then click the button at the bottom."
+        )
+        if not values.optics:
+            task = tr(
+                "The sensor is calibrated from one image of the untouched membrane and some "
+                "presses of a ball of known diameter. Use the same image size, crop and exposure "
+                "for all images."
+            )
+        for label, words in ((self._title, title), (self._task, task)):
+            label.setText(words)
+            label.setVisible(new)
+        self.values.show_value(values)
+        self.lens_board.show_board(session.checkerboard)
+        self.top_board.show_board(session.top_pose)
+        self.ball.setValue(2.0 * (session.ball_default_radius_mm or USUAL_RADIUS_MM))
+        self._boards.setVisible(values.optics)
+        self.accept.setText(tr("&Start the calibration") if new else tr("&Apply these values"))
+        self._check()
+        # The values of the fields, not of the session: the fields round them.
+        self._known = self.stated()
+
+    @property
+    def first(self) -> QWidget:
+        """The first value of the sensor."""
+        return self.values.inputs["led_height_mm" if self.values.value.optics else "preset"]
+
+    def stated(self) -> Session:
+        """Return the session with the values of the form.
+
+        Raises
+        ------
+        InputError
+            If a text is not what it should be.
+        """
+        values = self.values.value
+        values = replace(values, serial=values.serial.strip(), elastomer=values.elastomer.strip())
+        return replace(
+            session_of(self.session, values),
+            checkerboard=self.lens_board.board(),
+            top_pose=self.top_board.board(),
+            ball_default_radius_mm=0.5 * self.ball.value(),
+        )
+
+    @property
+    def edited(self) -> bool:
+        """Whether the user has changed a value since the form was filled."""
+        try:
+            return bool(self.stated() != self._known)
+        except InputError:
+            return True
+
+    def show_problem(self, sentence: str) -> None:
+        """Show why the entered values were not applied."""
+        self.problem.setText(sentence)
+        show_meaning(self.problem, "fail")
+
+    def _on_changed(self, name: str, value: object) -> None:
+        """Fill in what is known about a kind of sensor."""
+        preset = PRESETS.get(str(value))
+        if name == "preset" and preset is not None:
+            percent = 100.0 * preset.mm_per_px_sd / preset.mm_per_px
+            self.values.change(scale=preset.mm_per_px, scale_y=0.0, scale_sd=percent)
+        self._check()
+
+    def _check(self) -> None:
+        values, problem = self.values.value, ""
+        self.facts.setText(preset_text(values.preset))
+        self.values.rows.setRowVisible(self.facts, not values.optics)
+        try:
+            session_of(self.session, values)
+        except InputError as error:
+            problem = f"{error.found}. {error.advice}."
+        if not values.serial.strip():
+            problem = tr("Enter a serial number for the sensor.")
+        self.problem.setText(problem)
+        self.accept.setEnabled(not problem)
+
+    def _build_boards(self) -> QGroupBox:
         boards = QGroupBox(tr("Checkerboards (count inner corners)"))
         form = QFormLayout(boards, rowWrapPolicy=QFormLayout.RowWrapPolicy.WrapLongRows)
         self.lens_board = _BoardRow("setup.lens_board", tr("Lens views"))
         self.top_board = _BoardRow("setup.top_board", tr("Top surface"))
-        for row in (self.lens_board, self.top_board):
+        for label, row in (
+            (tr("Lens views"), self.lens_board),
+            (tr("Top surface"), self.top_board),
+        ):
             row.print.clicked.connect(lambda _=False, row=row: self._save_board(row.board()))
-        form.addRow(tr("Lens views"), self.lens_board)
-        form.addRow(tr("Top surface"), self.top_board)
-        super().__init__(
-            tr("Sensor data"),
-            tr(
-                "Enter the values from the drawing of the housing and the data sheets of the "
-                "parts. Every length here scales the result. You can change the values later. "
-                "Then click the button at the bottom."
-            ),
-            new_session(),
-            SensorValues(),
-            boards,
+            form.addRow(label, row)
+        return boards
+
+    def _build_camera(self) -> QGroupBox:
+        box = QGroupBox(tr("Camera"))
+        self.camera = named(PlainLabel(wrap=True), "setup.camera", tr("Camera state"))
+        self.camera_settings = named(
+            QPushButton(tr("&Set and lock…")),
+            "setup.camera.settings",
+            tr("Set and lock the camera"),
+            tr("Format, exposure, gain, white balance, focus, and a test of the image stability"),
         )
-        self.first = self.values.inputs["led_height_mm"]
+        self._camera_row = hbox((self.camera, 1), self.camera_settings, of=box)
+        self.show_camera(tr("No camera is selected."), "", settable=False)
+        return box
 
-    def values_of(self, session: Session) -> SensorValues:
-        """Return the data of the sensor, and show the boards."""
-        self.lens_board.show_board(session.checkerboard)
-        self.top_board.show_board(session.top_pose)
-        return SensorValues(elastomer=session.elastomer, **asdict(session.sensor))
+    def offer_cameras(self, button: QWidget) -> None:
+        """Add the camera selection to the form, for pages without a bar that has one."""
+        self._camera_row.insertWidget(1, button)
 
-    def session_of(self, values: SensorValues) -> Session:
-        """Return the session with this sensor and the boards."""
-        lens, top = self.lens_board.board(), self.top_board.board()
-        return replace(self.session, sensor=values.sensor(), checkerboard=lens, top_pose=top)
+    def show_camera(self, text: str, role: str, *, settable: bool) -> None:
+        """Show how the camera is set; enable the settings button if it can be set."""
+        self.camera.setText(text)
+        show_meaning(self.camera, role)
+        self.camera_settings.setEnabled(settable)
 
     def _save_board(self, board: BoardSpec) -> None:
         """Save a page with the board where the user chooses, and open it."""
@@ -169,6 +236,12 @@ class SetupForm(FormPage):
         shown = QDesktopServices.openUrl(QUrl.fromLocalFile(chosen))
         self.problem.setText("" if shown else tr("Saved as {path}").format(path=chosen))
         show_meaning(self.problem, "")
+
+
+def length_box(name: str, accessible: str, low: float, high: float) -> QDoubleSpinBox:
+    """Return an input for a length in mm."""
+    box = DoubleSpinBox(decimals=3, minimum=low, maximum=high, singleStep=0.1, suffix=tr(" mm"))
+    return named(box, name, tr("{what} in mm").format(what=accessible))
 
 
 class _BoardRow(FoldingRow):
@@ -216,9 +289,6 @@ class _BoardRow(FoldingRow):
 def _beside(*widgets: QWidget) -> QWidget:
     """Return widgets in a row; number fields use the remaining width."""
     part = QWidget()
-    row = QHBoxLayout(part)
-    row.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        row.addWidget(widget, int(isinstance(widget, QDoubleSpinBox)))
-    row.addStretch()
+    parts = ((widget, int(isinstance(widget, QDoubleSpinBox))) for widget in widgets)
+    hbox(*parts, None, of=part, margins=0)
     return part

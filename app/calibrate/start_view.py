@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -28,9 +29,6 @@ class StartView(QWidget):
     def __init__(self) -> None:
         super().__init__()
         named(self, "start", tr("Start a calibration"))
-        column = QVBoxLayout(self)
-        column.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        column.setSpacing(10)
         title = PlainLabel(tr("Calibrate a sensor"))
         make_bold(title, size=1.6)
         intro = PlainLabel(
@@ -40,9 +38,6 @@ class StartView(QWidget):
             )
         )
         intro.setWordWrap(True)
-        intro.setFixedWidth(460)
-        column.addWidget(title)
-        column.addWidget(intro)
         self.new, self.open, self.demo = (
             named(QPushButton(text), f"start.{name}", text.replace("&", ""))
             for name, text in (
@@ -53,13 +48,9 @@ class StartView(QWidget):
         )
         for button in (self.new, self.open, self.demo):
             button.setMinimumHeight(40)
-            button.setFixedWidth(460)
-            column.addWidget(button)
         self.problem = named(PlainLabel(wrap=True), "start.problem", tr("Why it was not opened"))
         show_meaning(self.problem, "fail")
-        self.problem.setFixedWidth(460)
         self.problem.hide()
-        column.addWidget(self.problem)
         text = tr("Calibrate it as a &closed sensor")
         self.closed = named(
             QPushButton(text),
@@ -67,12 +58,13 @@ class StartView(QWidget):
             text.replace("&", ""),
             tr("Start a new session with the background and the ball presses of this folder"),
         )
-        self.closed.setFixedWidth(460)
         self.closed.hide()
-        column.addWidget(self.closed)
-        self._recent = QVBoxLayout()
-        column.addSpacing(12)
-        column.addLayout(self._recent)
+        self._recent = vbox()
+        parts = intro, self.new, self.open, self.demo, self.problem, self.closed
+        for part in parts:
+            part.setFixedWidth(460)
+        column = vbox(title, *parts, 12, self._recent, of=self, spacing=10)
+        column.setAlignment(Qt.AlignmentFlag.AlignCenter)
 
     def show_problem(self, sentence: str, *, closed: bool = False) -> None:
         """Show why a session was not opened; hide the message if the text is empty.

@@ -8,7 +8,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QFrame,
     QProgressBar,
     QPushButton,
     QScrollArea,
@@ -24,7 +23,7 @@ from app.calibrate.residual_table import ResidualTable
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.step_data import Step
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, keep_space, scroll_area, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -55,9 +54,7 @@ class StepPanel(QWidget):
         self.finished = False
         self._step: Step | None = None
         self._scroll, inside = side_scroll("calibrate.panel.scroll", tr("This step"))
-        self._column = QVBoxLayout(inside)
-        self._column.setContentsMargins(12, 10, 12, 6)
-        self._column.setSpacing(8)
+        self._column = vbox(of=inside, margins=(12, 10, 12, 6), spacing=8)
         self._build_head()
         self._build_capture()
         self._build_state()
@@ -141,13 +138,9 @@ class StepPanel(QWidget):
         self.progress = named(QProgressBar(), "calibrate.progress", tr("Progress"))
         self.progress.setRange(0, 100)
         self.progress.setTextVisible(True)
-        keep = self.progress.sizePolicy()
-        keep.setRetainSizeWhenHidden(True)
-        self.progress.setSizePolicy(keep)
         self.cancel = named(QPushButton(tr("Stop")), "calibrate.stop", tr("Stop the work"))
-        keep = self.cancel.sizePolicy()
-        keep.setRetainSizeWhenHidden(True)
-        self.cancel.setSizePolicy(keep)
+        for widget in (self.progress, self.cancel):
+            keep_space(widget)
         row = hbox((self.progress, 1), self.cancel)
         self.next = named(QPushButton(tr("&Next step")), "calibrate.next", tr("Next step"))
         self.next.setMinimumHeight(38)
@@ -272,14 +265,11 @@ class _QuietBar(QScrollBar):
 
 def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
     """Return a vertical scroll area for a side panel, and the widget in it."""
-    scroll = named(QScrollArea(widgetResizable=True), name, accessible)
-    scroll.setFrameShape(QFrame.Shape.NoFrame)
+    inside = QWidget()
+    scroll = named(scroll_area(inside), name, accessible)
     scroll.setVerticalScrollBar(_QuietBar())
     scroll.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
-    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    inside = QWidget()
-    scroll.setWidget(inside)
     return scroll, inside
 
 

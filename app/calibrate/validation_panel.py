@@ -18,7 +18,7 @@ from app.services.preferences import Limits
 from app.widgets.fields import choice, number, switch
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, keep_space, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -97,9 +97,7 @@ class ValidationPanel(QWidget):
         self.blocked.setWordWrap(True)
         self.progress = named(QProgressBar(), "validation.progress", tr("Progress"))
         self.progress.setRange(0, 100)
-        keep = self.progress.sizePolicy()
-        keep.setRetainSizeWhenHidden(True)
-        self.progress.setSizePolicy(keep)
+        keep_space(self.progress)
         self.progress.hide()
         self.result = named(MarkupLabel(wrap=True), "validation.result", tr("Result"))
         self.keep = named(

@@ -5,10 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QApplication,
-    QHBoxLayout,
     QMainWindow,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -26,6 +24,7 @@ from app.calibrate.step_panel import StepPanel
 from app.calibrate.steps import route_of, steps_of
 from app.context.context import AppContext
 from app.widgets.actions import make_action
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.project import CalibrationProject
@@ -84,18 +83,11 @@ class Wizard(QMainWindow):
 
     def _lay_out(self) -> None:
         middle = QWidget()
-        column = QVBoxLayout(middle)
-        row = QHBoxLayout()
-        for layout in (column, row):
-            layout.setContentsMargins(0, 0, 0, 0)
-            layout.setSpacing(0)
-        column.addWidget(self.outside)
-        column.addLayout(row, 1)
         self.centre, self.side = QStackedWidget(), QStackedWidget()
         self.centre.addWidget(self.area)
         self.side.addWidget(self.panel)
-        for widget, stretch in ((self.step_list, 0), (self.centre, 1), (self.side, 0)):
-            row.addWidget(widget, stretch)
+        row = hbox(self.step_list, (self.centre, 1), self.side, margins=0, spacing=0)
+        vbox(self.outside, (row, 1), of=middle, margins=0, spacing=0)
         self.setCentralWidget(middle)
 
     def _build_docks(self) -> None:

@@ -22,7 +22,7 @@ from app.measure.protocol_work import REPORT, ProtocolWork
 from app.services.file_dialogs import ask_folder
 from app.widgets.buttons import Slot, push_button
 from app.widgets.label import PlainLabel, plain_tip
-from app.widgets.layout import hbox, splitter, vbox
+from app.widgets.layout import hbox, keep_space, splitter, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -84,9 +84,7 @@ class ResultView(QWidget):
         self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
         split = splitter(Qt.Orientation.Vertical, (self.figure, 3), (self._tabs, 2))
         self.progress = named(QProgressBar(), "protocol.result.progress", tr("Running work"))
-        keep = self.progress.sizePolicy()
-        keep.setRetainSizeWhenHidden(True)
-        self.progress.setSizePolicy(keep)
+        keep_space(self.progress)
         vbox(
             hbox((self.verdict, 1), self._back, save, save_as, leave),
             self.sentence,

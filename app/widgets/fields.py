@@ -11,9 +11,12 @@ When = Callable[[Any], bool]
 """Whether the row of a field is shown, from the value of the form."""
 
 
-def choice(default: Any, label: str, choices: Mapping[Any, str], tip: str = "") -> Any:
+def choice(
+    default: Any, label: str, choices: Mapping[Any, str], tip: str = "", *, when: When | None = None
+) -> Any:
     """Return a field with one of several values, each with its text."""
-    return field(default=default, metadata={"label": label, "choices": choices, "tip": tip})
+    shown = {"label": label, "choices": choices, "tip": tip, "when": when}
+    return field(default=default, metadata=shown)
 
 
 def number(
@@ -44,9 +47,17 @@ def switch(
     return field(default=default, metadata=shown)
 
 
-def text(default: str, label: str, tip: str = "", *, example: str = "", length: int = 200) -> Any:
+def text(
+    default: str,
+    label: str,
+    tip: str = "",
+    *,
+    example: str = "",
+    length: int = 200,
+    when: When | None = None,
+) -> Any:
     """Return a field with a line of text. The example is shown while it is empty."""
-    shown = {"label": label, "tip": tip, "example": example, "length": length}
+    shown = {"label": label, "tip": tip, "example": example, "length": length, "when": when}
     return field(default=default, metadata=shown)
 
 

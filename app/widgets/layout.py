@@ -78,6 +78,13 @@ def _fill(
     return box
 
 
+def keep_space(widget: QWidget) -> None:
+    """Keep the space of a widget while it is hidden, so that its neighbours do not move."""
+    policy = widget.sizePolicy()
+    policy.setRetainSizeWhenHidden(True)
+    widget.setSizePolicy(policy)
+
+
 def scroll_area(inside: QWidget) -> QScrollArea:
     """Return an area without a frame in which a widget scrolls up and down."""
     area = QScrollArea(widgetResizable=True)

@@ -11,7 +11,8 @@ from pytestqt.qtbot import QtBot
 from technician import Technician
 
 from app.calibrate.closed_balls import Progress
-from app.calibrate.closed_form import ClosedForm, new_closed_session
+from app.calibrate.setup_form import SetupForm
+from app.calibrate.setup_values import new_session
 from app.calibrate.validation import KnownObject
 from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.file import read_calibration
@@ -32,7 +33,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     page, opened = technician.page, read_session(small_session_of_ten_balls)
     page.begin()
     technician.click("question.closed")
-    form = page.closed_form
+    form = page.form
     qtbot.keyClicks(form.serial, "closed-1")
     form.values.inputs["scale"].setValue(MM_PER_PX)
     technician.click("setup.accept")
@@ -133,7 +134,10 @@ def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> ClosedProject
     """Return a session with the background and some presses of the small sensor."""
     source = read_session(opened)
     session = replace(
-        new_closed_session(), folder=tmp_path / "session", sensor=SensorData("c"), in_place=SCALE
+        new_session(optics=False),
+        folder=tmp_path / "session",
+        sensor=SensorData("c"),
+        in_place=SCALE,
     )
     create_session(session)
     project = ClosedProject(session.folder)
@@ -168,8 +172,9 @@ def test_a_change_makes_the_calibration_outdated_and_undo_restores_it(
 
 
 def test_a_preset_fills_in_the_scale_and_its_uncertainty(qtbot: QtBot) -> None:
-    form = ClosedForm()
+    form = SetupForm()
     qtbot.addWidget(form)
+    form.show_session(new_session(optics=False), new=True)
     digit = preset_named("digit")
     form.values.change(preset="digit")
     stated = form.stated()
@@ -206,7 +211,7 @@ def test_a_folder_without_the_open_stages_is_offered_the_closed_route(
     problem = technician.see("start.problem").text()
     assert all(stage in problem for stage in ("checkerboard", "top_pose", "mirror", "whiteboard"))
     technician.click("start.closed")
-    assert technician.page.closed_form.serial.text() == "B-7"
+    assert technician.page.form.serial.text() == "B-7"
     technician.click("setup.accept")
     technician.rest()
     session = technician.wizard.project.session

@@ -1,0 +1,261 @@
+"""What the set-up form asks, and how it becomes the description of a session."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from app.widgets.fields import choice, number, text
+from gelpolight_core.calibration.manifest import REMARK_LENGTH
+from gelpolight_core.errors import InputError
+from gelpolight_core.in_place.preset import presets
+from gelpolight_core.session.board import BoardSpec
+from gelpolight_core.session.session import (
+    PUNCH_RANGE,
+    SCALE_RANGE,
+    SENSOR_RANGES,
+    InPlace,
+    PressedScale,
+    SensorData,
+    Session,
+)
+from gelpolight_core.translation import tr
+
+USUAL_RADIUS_MM = 3.0
+OTHER = "other"
+PRESETS = {preset.key: preset for preset in presets()}
+USUAL = PRESETS["gelsight-mini"]
+MM = tr(" mm")
+
+
+def _optical(name: str, default: float, label: str, tip: str) -> Any:
+    """Return the field of a length or an index of a sensor that is described by its optics."""
+    unit, decimals, step = (MM, 3, 0.1) if name.endswith("_mm") else ("", 4, 0.01)
+    span, when = SENSOR_RANGES[name], lambda values: values.optics
+    return number(default, label, *span, unit, decimals, step=step, tip=tip, when=when)
+
+
+def _pressed(source: str, default: float, label: str, tip: str = "") -> Any:
+    """Return the field of a length of the object in the images of the scale."""
+    return number(
+        default, label, *PUNCH_RANGE, MM, 3, step=0.1, tip=tip, when=lambda v: v.source == source
+    )
+
+
+@dataclass(frozen=True)
+class SetupValues:
+    """What is known about a sensor: its optics, or the scale of its images.
+
+    Attributes
+    ----------
+    optics : bool
+        Whether the sensor is described by its optics. Otherwise its images have a scale.
+    """
+
+    optics: bool = True
+    serial: str = text(
+        "",
+        tr("Serial number"),
+        tr("Identifies the sensor in every file"),
+        example=tr("for example A-001"),
+    )
+    elastomer: str = text(
+        "",
+        tr("Elastomer"),
+        tr("Tells elastomers apart: the presses are counted for each. May be empty"),
+        example=tr("for example gel 7"),
+        length=REMARK_LENGTH,
+    )
+    led_height_mm: float = _optical(
+        "led_height_mm",
+        14.0,
+        tr("LED height"),
+        tr(
+            "From the light-emitting points of the LEDs to the top surface; see the drawing of the "
+            "housing"
+        ),
+    )
+    elastomer_thickness_mm: float = _optical(
+        "elastomer_thickness_mm",
+        14.0,
+        tr("Elastomer thickness"),
+        tr("Layer of clear silicone below the membrane"),
+    )
+    elastomer_refractive_index: float = _optical(
+        "elastomer_refractive_index",
+        1.41,
+        tr("Elastomer refractive index"),
+        tr("Silicone: about 1.41"),
+    )
+    window_thickness_mm: float = _optical(
+        "window_thickness_mm",
+        0.0,
+        tr("Window thickness"),
+        tr("Rigid plate below the elastomer; 0 if there is none"),
+    )
+    window_refractive_index: float = _optical(
+        "window_refractive_index", 1.49, tr("Window refractive index"), tr("Acrylic: about 1.49")
+    )
+    working_diameter_mm: float = _optical(
+        "working_diameter_mm",
+        26.0,
+        tr("Working diameter"),
+        tr("Diameter of the circle on the membrane in which the sensor measures"),
+    )
+    preset: str = choice(
+        USUAL.key,
+        tr("Kind of sensor"),
+        {k: p.name for k, p in PRESETS.items()} | {OTHER: tr("Other")},
+        when=lambda v: not v.optics,
+    )
+    scale_from: str = choice(
+        "stated",
+        tr("Scale"),
+        {
+            "stated": tr("stated here"),
+            "pins": tr("from images of a pressed pin grid"),
+            "punch": tr("from images of a pressed flat punch"),
+        },
+        tr("A scale that is 1 % wrong makes every size 1 % wrong. Images measure it"),
+        when=lambda v: not v.optics,
+    )
+    scale: float = number(
+        0.06,
+        tr("Size of a pixel"),
+        *SCALE_RANGE,
+        MM,
+        5,
+        step=0.0001,
+        when=lambda v: v.source == "stated",
+    )
+    scale_y: float = number(
+        0.0,
+        tr("Height of a pixel"),
+        0.0,
+        SCALE_RANGE[1],
+        MM,
+        5,
+        step=0.0001,
+        tip=tr("Only if pixels are not square: contacts of balls are then all ellipses"),
+        none=tr("as its width"),
+        when=lambda v: v.source == "stated",
+    )
+    scale_sd: float = number(
+        1.0, tr("Uncertainty"), 0.0, 50.0, tr(" %"), 1, when=lambda v: v.source == "stated"
+    )
+    pins: float = _pressed(
+        "pins",
+        2.0,
+        tr("Distance of the pins"),
+        tr("From the centre of a pin to that of the next one, in a square grid"),
+    )
+    punch: float = _pressed("punch", 5.0, tr("Diameter of the punch"))
+    region: str = text(
+        "",
+        tr("Membrane's region"),
+        tr(
+            "x, y, width and height in pixels, if the image also shows the housing or mirror "
+            "images of the membrane. Empty: the whole image"
+        ),
+        example=tr("whole image; or for example 40, 0, 560, 480"),
+        when=lambda v: not v.optics,
+    )
+
+    @property
+    def source(self) -> str:
+        """Where the scale comes from; empty for a sensor that is described by its optics."""
+        return "" if self.optics else self.scale_from
+
+
+def new_session(*, optics: bool = True) -> Session:
+    """Return the default description of a new session; it has no folder yet."""
+    values = SetupValues(optics=optics)
+    if not optics:
+        percent = 100.0 * USUAL.mm_per_px_sd / USUAL.mm_per_px
+        values = replace(values, scale=USUAL.mm_per_px, scale_sd=percent)
+    boards = BoardSpec((9, 6), 3.0), BoardSpec((9, 6), 2.0)
+    empty = Session(Path(), SensorData(""), *boards, {}, USUAL_RADIUS_MM)
+    return session_of(empty, values)
+
+
+def values_of(session: Session) -> SetupValues:
+    """Return the values of a session."""
+    known = SetupValues(serial=session.serial, elastomer=session.elastomer)
+    stated = session.in_place
+    if stated is None:
+        return replace(known, **asdict(session.sensor))
+    pressed, (x, y) = stated.pressed_scale, stated.mm_per_px or (known.scale, known.scale)
+    kinds = (p.key for p in PRESETS.values() if abs(x - p.mm_per_px) < 5e-6)
+    sd, region = stated.mm_per_px_sd, stated.region_px
+    source = "pins" if pressed.punch_diameter_mm is None else "punch"
+    return replace(
+        known,
+        optics=False,
+        preset=OTHER if stated.mm_per_px is None else next(kinds, OTHER),
+        scale_from=source if stated.mm_per_px is None else "stated",
+        scale=x,
+        scale_y=0.0 if x == y else y,
+        scale_sd=known.scale_sd if sd is None else 100.0 * sd / x,
+        pins=pressed.pin_spacing_mm or known.pins,
+        punch=pressed.punch_diameter_mm or known.punch,
+        region="" if region is None else ", ".join(map(str, region)),
+    )
+
+
+def session_of(session: Session, values: SetupValues) -> Session:
+    """Return a session with other values.
+
+    Raises
+    ------
+    InputError
+        If the region is not one.
+    """
+    session = replace(session, elastomer=values.elastomer)
+    if values.optics:
+        data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
+        return replace(session, sensor=SensorData(**data))
+    stated = InPlace(region_px=_region(values.region))
+    if values.scale_from == "stated":
+        scale = values.scale, values.scale_y or values.scale
+        stated = replace(stated, mm_per_px=scale, mm_per_px_sd=0.01 * values.scale_sd * scale[0])
+    elif values.scale_from == "pins":
+        stated = replace(stated, pressed_scale=PressedScale(pin_spacing_mm=values.pins))
+    else:
+        stated = replace(stated, pressed_scale=PressedScale(punch_diameter_mm=values.punch))
+    return replace(session, sensor=SensorData(values.serial), in_place=stated)
+
+
+def _region(words: str) -> tuple[int, int, int, int] | None:
+    """Return the region of a text; None for the whole image."""
+    if not words.strip():
+        return None
+    parts = [part.strip() for part in words.split(",")]
+    if len(parts) == 4 and all(map(str.isdecimal, parts)) and min(map(int, parts[2:])) > 0:
+        x, y, width, height = map(int, parts)
+        return x, y, width, height
+    raise InputError(
+        tr("This is not a region: {text}").format(text=words),
+        where=tr("Membrane's region"),
+        advice=tr("Enter x, y, width and height in pixels, separated by commas"),
+    )
+
+
+def preset_text(kind: str) -> str:
+    """Return the images that a preset is made for, as sentences."""
+    if kind == OTHER:
+        return tr("State the size of a pixel on the membrane: image an object of known size.")
+    preset = PRESETS[kind]
+    words = tr("For images of {w} x {h} pixels").format(w=preset.image_px[0], h=preset.image_px[1])
+    if any(preset.cropped):
+        words += tr(", with {c:.0f} % of the camera image cut off on each side").format(
+            c=100.0 * max(preset.cropped)
+        )
+    area = tr("The visible membrane is {a:g} x {b:g} mm.").format(
+        a=preset.working_area_mm[0], b=preset.working_area_mm[1]
+    )
+    markers = ""
+    if any(preset.marker_pitches_mm):
+        markers = tr(" Printed markers are found and left out.")
+    limits = f" {preset.limits}." if preset.limits else ""
+    return f"{words}. {area}{markers}{limits}"
