@@ -15,8 +15,7 @@ from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.misfit import Misfit
-from gelpolight_core.reconstruction.modes import IN_PLACE, PAPER
+from gelpolight_core.reconstruction.modes import PAPER
 from gelpolight_core.translation import tr
 
 TELL_EVERY = 10
@@ -40,8 +39,8 @@ class QualityPanel(QWidget):
         self.map = MapView("inspect.quality.map", tr("Quality of the depth"))
         self._what = named(ComboBox(), "inspect.quality.what", tr("Quantity shown"))
         self._what.addItem(tr("Flags"), "flags")
+        self._what.addItem(tr("Misfit of the image"), "misfit")
         self._what.addItem(tr("Uncertainty (when paused)"), "uncertainty")
-        self._offer_misfit(True)
         self._what.currentIndexChanged.connect(self._on_chosen)
         self._legend = named(MarkupLabel(wrap=True), "inspect.quality.legend", tr("Legend"))
         self._legend.setContentsMargins(6, 2, 6, 2)
@@ -58,7 +57,6 @@ class QualityPanel(QWidget):
         """Show the quality of a frame."""
         if shown.heightmap is None:
             return
-        self._offer_misfit(shown.heightmap.model != IN_PLACE)
         if self.what == "misfit" and shown.misfit is None:
             return  # the frame is older than the selection
         if shown.quality is None:
@@ -85,16 +83,6 @@ class QualityPanel(QWidget):
             text = legend(shown.heightmap.flags) if misfit is None else misfit_text(misfit)
             self._legend.setText(text)
 
-    def _offer_misfit(self, offered: bool) -> None:
-        """Offer the misfit, which is not known for a closed sensor."""
-        place = self._what.findData("misfit")
-        if offered and place < 0:
-            self._what.insertItem(1, tr("Misfit of the image (| |n| - 1 |)"), "misfit")
-        elif place >= 0 and not offered:
-            if self.what == "misfit":
-                self._what.setCurrentIndex(self._what.findData("flags"))
-            self._what.removeItem(place)
-
     def say(self, text: str) -> None:
         """Show a text instead of the image and its legend."""
         self._forget_colours()
@@ -113,16 +101,13 @@ class QualityPanel(QWidget):
         self.chosen.emit()
 
 
-def misfit_text(misfit: Misfit) -> str:
+def misfit_text(misfit: np.ndarray) -> str:
     """Return the definition of the misfit and its median over all nodes, as markup."""
-    if misfit.model == "paper":
-        text = tr("| |n| - 1 |: length of the computed normal minus 1. Median {m:.1f} %.")
-    else:
-        text = tr(
-            "Measured brightness minus the brightness computed from the depth, relative "
-            "to the flat membrane. Median {m:.1f} %."
-        )
-    known = misfit.values[np.isfinite(misfit.values)]
+    text = tr(
+        "Measured brightness minus the brightness computed from the depth, relative "
+        "to the flat membrane. Median {m:.1f} %."
+    )
+    known = misfit[np.isfinite(misfit)]
     return escaped(text.format(m=100.0 * float(np.median(known)) if known.size else 0.0))
 
 

@@ -30,11 +30,11 @@ from app.view3d.surface import LIVE_NODES, ColourScale, Surface, surface_of
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import difference, usable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.misfit import Misfit, solve_misfit
-from gelpolight_core.reconstruction.modes import IN_PLACE
+from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
+Map = NDArray[np.float32]
 MISFIT_NODES = 128, 400
 """Longest side of a live and of a frozen image, in pixels."""
 LEAST_MISFIT = 0.02
@@ -98,7 +98,7 @@ class Wanted:
     @property
     def needs_normals(self) -> bool:
         """Whether the reconstruction must include the normals."""
-        return bool(self.normals) or self.quality == "misfit" or self.stream
+        return bool(self.normals) or self.stream
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,8 +125,8 @@ class Shown:
         Images over the extent of the grid.
     quality_top : float
         Value at the upper end of the quality image's colours: mm, or a share.
-    misfit : Misfit or None
-        How well the depth explains the image.
+    misfit : (rows, columns) float32 or None
+        How far the image is from that of the depth, as a share of the flat membrane's brightness.
     surface : Surface or None
         For the 3D view.
     cut : Cut or None
@@ -146,7 +146,7 @@ class Shown:
     normals: NDArray[np.uint8] | None = None
     quality: NDArray[np.uint8] | None = None
     quality_top: float = 0.0
-    misfit: Misfit | None = None
+    misfit: Map | None = None
     surface: Surface | None = None
     cut: Cut | None = None
     depth_ms: float = 0.0
@@ -234,16 +234,16 @@ class Maker:
         self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
 
-    def _misfit(self, frame: Frame, heightmap: HeightMap, wanted: Wanted) -> Misfit | None:
-        if wanted.quality != "misfit" or heightmap.model == IN_PLACE:
+    def _misfit(self, frame: Frame, heightmap: HeightMap, wanted: Wanted) -> Map | None:
+        if wanted.quality != "misfit":
             return None
         reconstructor = self.best if wanted.still else self.live
         assert reconstructor is not None
         nodes = MISFIT_NODES[wanted.still]
         return solve_misfit(reconstructor, frame.rgb, heightmap, largest=nodes)
 
-    def _steady_top(self, misfit: Misfit, frame: Frame) -> float:
-        known = misfit.values[np.isfinite(misfit.values)]
+    def _steady_top(self, misfit: Map, frame: Frame) -> float:
+        known = misfit[np.isfinite(misfit)]
         top = float(np.percentile(known, 99.0)) if known.size else 0.0
         return self._misfit_top.update(max(top, LEAST_MISFIT), frame.time_s)
 
@@ -263,7 +263,7 @@ class _Images:
         raw: HeightMap,
         wanted: Wanted,
         range_mm: tuple[float, float],
-        misfit: Misfit | None = None,
+        misfit: Map | None = None,
         misfit_top: float = 0.0,
     ) -> None:
         heightmap, self._raw, self._steps = done.heightmap, raw, done.steps
@@ -329,7 +329,7 @@ class _Images:
         if self._misfit is not None:
             top = self._misfit_top
             rows, columns = self._depth.shape
-            shown = cv2.resize(np.nan_to_num(self._misfit.values), (columns, rows))
+            shown = cv2.resize(np.nan_to_num(self._misfit), (columns, rows))
             rgb = shading.coloured(np.asarray(shown), colour_table("inferno"), 0.0, top)
             return shading.outside_filled(rgb, self._outside, SURROUND), top
         if self._wanted.quality == "uncertainty":

@@ -76,7 +76,7 @@ def ball_height_error(
         Poses from the joint refinement.
     """
     assert calibration.full is not None
-    solver = NearLightSolver(calibration, calibration.full, workers=1)
+    solver = NearLightSolver(calibration, workers=1)
     scale, grid = solver.maps.scale(COARSE), calibration.table.grid
     points = np.stack(np.meshgrid(middles(grid.x_mm, COARSE), middles(grid.y_mm, COARSE)), axis=-1)
     rays = np.moveaxis(scale.rays[:2], 0, -1)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.in_place.ball import Ball, ball_slopes, distances
 from gelpolight_core.parallel import in_parallel
+from gelpolight_core.reconstruction.height_map import surface_slopes
 from gelpolight_core.reconstruction.in_place.change import ColourChange
-from gelpolight_core.reconstruction.in_place.depth import depth_of, surface_slopes
+from gelpolight_core.reconstruction.in_place.depth import depth_of
 from gelpolight_core.reconstruction.in_place.model import ErrorCurve, evaluate
 
 Array = NDArray[np.float64]

@@ -194,6 +194,16 @@ def unanchored_note() -> Note:
     return Note(text, doubtful=False)
 
 
+def rounds_notes(stopped: str) -> Notes:
+    """Return the note on near-light rounds that ended in this way, if it matters."""
+    texts = {
+        "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
+        "unsettled": tr("the near-light rounds did not converge: damping did not help"),
+        "grows": tr("the near-light rounds did not converge: the last round was undone"),
+    }
+    return (Note(texts[stopped], doubtful=stopped != "damped"),) if stopped in texts else ()
+
+
 def unsolved_notes(share: float) -> Notes:
     """Return the note on nodes that the light alone does not determine, if there are many."""
     if share <= UNSOLVED_SHARE:
@@ -249,15 +259,15 @@ def refuse_coplanar_lights(calibration: Calibration, leds_mm: NDArray[np.float64
         )
 
 
-def refuse_dark_membrane(calibration: Calibration, *, model: str) -> None:
+def refuse_dark_membrane(calibration: Calibration, light: Map) -> None:
     """Refuse a calibration with light on almost no part of the membrane.
 
     Parameters
     ----------
     calibration : Calibration
         The sensor's.
-    model : str
-        ``full``, which checks the background, or ``paper``, which checks the radiance.
+    light : (rows, columns, 3)
+        Of the membrane, as the model uses it.
 
     Raises
     ------
@@ -265,8 +275,7 @@ def refuse_dark_membrane(calibration: Calibration, *, model: str) -> None:
         If fewer than `LEAST_USABLE` of the nodes in view are lit in all channels.
     """
     thin = np.s_[::USABLE_STEP, ::USABLE_STEP]
-    full, valid = calibration.full, calibration.table.valid[thin]
-    light = calibration.radiance if model != "full" or full is None else full.background
+    valid = calibration.table.valid[thin]
     lit = usable(valid, light[thin], calibration.factors[thin])
     share = float(np.count_nonzero(lit)) / max(int(valid.sum()), 1)
     if not share > LEAST_USABLE:

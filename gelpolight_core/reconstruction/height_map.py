@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 from types import MappingProxyType
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -165,3 +166,35 @@ class HeightMap:
             found = np.shape(getattr(self, name))
             if found != shape:
                 raise ValueError(f"{name} of shape {found} beside a depth map of {rows, columns}")
+
+
+def surface_slopes(
+    depth_mm: NDArray[np.float32], pitch_mm: float, *, step: int = 1
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the slopes (rows, columns) of a depth map along x and y, averaged over `step` nodes.
+
+    They are those of a surface, unlike the slopes that were solved for single nodes. The
+    integration has removed the inconsistent part of those, 0.4 to 1.5 degrees on real closed
+    sensors.
+    """
+    averaged = cv2.blur(depth_mm, (step, step)) if step > 1 else depth_mm
+    slope_y, slope_x = np.gradient(averaged, np.float32(pitch_mm))
+    return np.asarray(slope_x, np.float32), np.asarray(slope_y, np.float32)
+
+
+def normals_from_slopes(
+    slope_x: NDArray[np.float32], slope_y: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return unit normals (rows, columns, 3) towards the camera (z < 0), sensor frame.
+
+    Parameters
+    ----------
+    slope_x, slope_y : (rows, columns) float32
+        d(depth)/dx and d(depth)/dy.
+    """
+    normals = np.empty((*slope_x.shape, 3), np.float32)
+    scale = -1.0 / np.sqrt(1.0 + slope_x**2 + slope_y**2)
+    normals[..., 0] = slope_x * scale
+    normals[..., 1] = slope_y * scale
+    normals[..., 2] = scale
+    return normals

@@ -11,8 +11,9 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
 from gelpolight_core.in_place.next_ball import next_position
 from gelpolight_core.in_place.scale import scale_from_pins
+from gelpolight_core.reconstruction.height_map import normals_from_slopes, surface_slopes
 from gelpolight_core.reconstruction.in_place.change import light_gain, reference
-from gelpolight_core.reconstruction.in_place.depth import depth_of, normals
+from gelpolight_core.reconstruction.in_place.depth import depth_of
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reconstruction.in_place.model import (
     COLOUR_CELLS,
@@ -66,7 +67,7 @@ def test_the_light_is_that_of_the_untouched_part_also_with_a_third_pressed() -> 
 
 def test_normals_are_those_of_the_depth_map() -> None:
     depth, slope_x, slope_y = pressed_ball((60, 70), Ball(34.0, 30.0, 14.0, 30.0), 6.0)
-    found = normals((0.5 * depth).astype(np.float32), 0.5)
+    found = normals_from_slopes(*surface_slopes((0.5 * depth).astype(np.float32), 0.5))
     wanted = np.stack([-slope_x, -slope_y, -np.ones_like(slope_x)], axis=-1)
     wanted /= np.linalg.norm(wanted, axis=-1, keepdims=True)
     y, x = np.mgrid[:60, :70]

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.near_light.solver import NearLightDepth, NearLightSolver
+from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.solver import Solved, Wanted
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
@@ -66,11 +67,9 @@ def press(session: Path, name: str = PRESSES[0]) -> Map:
     return read_image(session / "presses" / f"{name}.png").rgb
 
 
-def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> NearLightDepth:
+def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> Solved:
     """Solve the whole grid at full scale."""
-    assert calibration.full is not None
-    solver = NearLightSolver(calibration, calibration.full, workers=workers)
-    return solver.depth(rgb, everywhere=True)
+    return NearLightSolver(calibration, workers=workers).depth(rgb, Wanted(everywhere=True))
 
 
 @pytest.mark.parametrize("name", PRESSES)

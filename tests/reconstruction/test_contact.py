@@ -11,6 +11,7 @@ import pytest
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.checks import small_image_notes, visible_depth_notes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.studies.known_sensor import (
@@ -69,10 +70,10 @@ def test_the_stated_smallest_depth_is_seen_and_half_of_it_is_not() -> None:
 def test_noise_is_no_contact() -> None:
     known = sensor(0.25)
     bare = known.bare()
-    solver = Reconstructor(known.calibration).near_light
+    solver = Reconstructor(known.calibration).solver
     for seed in range(EMPTY_FRAMES):
-        found = solver.depth(known.noisy(bare, seed=seed), effort="fast", normals=False)
-        assert found.rounds is None
+        found = solver.depth(known.noisy(bare, seed=seed), Wanted("fast", normals=False))
+        assert "integration" in found.trace.left_out
 
 
 @pytest.mark.parametrize("off", [0.97, 1.03])
@@ -86,10 +87,10 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
     true = full.background * brighter
     filled = np.where(true > 1.0, off * true, true).astype(np.float32)
     calibration = replace(known.calibration, full=replace(full, background=filled))
-    solver = Reconstructor(calibration).near_light
+    solver = Reconstructor(calibration).solver
     frame = np.minimum(known.bare() * brighter, 1.0)
     assert (frame == 1.0).any(axis=2).sum() > 100
-    assert solver.depth(known.noisy(frame)).rounds is None
+    assert "integration" in solver.needs(known.noisy(frame), Wanted()).left_out
     led_x, led_y = np.argwhere((true > 1.0).any(axis=2)).mean(axis=0)[::-1]
     grid = calibration.table.grid
     at_mm = (
@@ -98,7 +99,8 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
     )
     press = known.pressed(Ball(3.0, 0.1), x_mm=at_mm[0], y_mm=at_mm[1], samples=1)
     pressed = np.minimum(press.frame * brighter, 1.0)
-    assert solver.depth(known.noisy(pressed)).rounds is not None, "other channels show it"
+    needed = solver.needs(known.noisy(pressed), Wanted())
+    assert "integration" in needed.done, "other channels show it"
 
 
 def test_a_shallow_face_beside_a_deep_one_is_seen() -> None:

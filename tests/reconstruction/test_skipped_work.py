@@ -9,6 +9,7 @@ import pytest
 
 from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
+from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.studies.known_sensor import known_sensor, matt_design
@@ -24,17 +25,14 @@ def test_skipped_work_changes_the_depth_by_no_more_than_stated(
     height_mm: float, without: dict[str, float], bound_um: float
 ) -> None:
     known = known_sensor(matt_design(0.25))
-    full = known.calibration.full
-    assert full is not None
     frame = known.noisy(known.pressed(Cylinder(3.0, height_mm), samples=1).frame)
     settings = {effort: replace(SETTINGS[effort], **without) for effort in EFFORTS}
     usual_solver, other_solver = (
-        NearLightSolver(known.calibration, full, workers=2, settings=s)
-        for s in (SETTINGS, settings)
+        NearLightSolver(known.calibration, workers=2, settings=s) for s in (SETTINGS, settings)
     )
     for effort in EFFORTS:
-        usual = usual_solver.depth(frame, effort=effort, normals=False).depth_mm
-        other = other_solver.depth(
-            frame, effort=effort, normals=False, everywhere=without is EVERYWHERE
-        ).depth_mm
+        wanted = Wanted(effort, normals=False)
+        usual = usual_solver.depth(frame, wanted).depth_mm
+        wanted = replace(wanted, everywhere=without is EVERYWHERE)
+        other = other_solver.depth(frame, wanted).depth_mm
         assert 1e3 * np.abs(usual - other).max() < bound_um

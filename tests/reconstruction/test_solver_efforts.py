@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
@@ -90,7 +92,7 @@ def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
     surface = pressed(indenter, x_mm=centre_mm[0], y_mm=centre_mm[1])
     image = shown(PressedMembrane(surface))
     region, whole = (
-        balanced.near_light.depth(image, effort=effort, normals=False, everywhere=e)
+        balanced.solver.depth(image, Wanted(effort, normals=False, everywhere=e))
         for e in (False, True)
     )
     assert region.depth_mm.max() > 0.5 * depth_mm
@@ -148,7 +150,8 @@ def test_a_trace_says_what_was_done_and_why(
     assert "of the field" in reasons["contact detection"]
     assert reasons["normals"]
     assert all(step.milliseconds is not None for step in trace.steps if step.done)
-    numbers = reconstruct.near_light.maps.membrane
+    assert isinstance(reconstruct.solver, NearLightSolver)
+    numbers = reconstruct.solver.maps.membrane
     assert ("gloss" in trace.left_out) is (numbers.gloss is None)
     assert ("interreflection" in trace.left_out) is (numbers.interreflection is None)
 

@@ -23,10 +23,10 @@ from gelpolight_core.calibration.file import read_open_calibration
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.misfit import direct_light
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps
-from gelpolight_core.reconstruction.near_light.region_solver import Solved
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps, brightness
+from gelpolight_core.reconstruction.near_light.region_solver import SolvedRegion
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
+from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered, ratio_reflected
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration
@@ -118,14 +118,14 @@ def explain(
     """Return height errors by press, light by side and slope, and both reflectances."""
     full = calibration.full
     assert full is not None
-    solver = NearLightSolver(calibration, full, workers=2)
+    solver = NearLightSolver(calibration, workers=2)
     losses, parts = [], []
     for press in presses:
-        solved = solver.solved(press.frame, effort="fast")
+        solved = solver.solved(press.frame, Wanted("fast"))
         assert solved is not None
         losses.append(_loss(press, solved, scored_radius_mm(calibration.sensor)))
         # Walls mirror even distant membrane: light is gathered from the whole field.
-        whole = solver.solved(press.frame, effort="fast", everywhere=True)
+        whole = solver.solved(press.frame, Wanted("fast", everywhere=True))
         assert whole is not None
         parts.append(_light_at(solver.maps, press.truth, whole))
     values = np.concatenate(parts)
@@ -142,7 +142,7 @@ def explain(
     )
 
 
-def _view(solved: Solved, truth: TrueDepth) -> tuple[TrueView, np.ndarray]:
+def _view(solved: SolvedRegion, truth: TrueDepth) -> tuple[TrueView, np.ndarray]:
     """Return the true surface at a region's rays, and their slopes (rows, columns, 2)."""
     scale, (top, left) = solved.scale, solved.region.corner
     rows, columns = solved.depth_mm.shape
@@ -153,7 +153,7 @@ def _view(solved: Solved, truth: TrueDepth) -> tuple[TrueView, np.ndarray]:
     return true_view(truth, x, y, ray_slope), ray_slope
 
 
-def _loss(press: TruePress, solved: Solved, radius_mm: float) -> dict[str, Any]:
+def _loss(press: TruePress, solved: SolvedRegion, radius_mm: float) -> dict[str, Any]:
     """Return the height error with the slopes found, with true ones, and with some of each."""
     view, _ = _view(solved, press.truth)
     found = solved.slopes.slope_x, solved.slopes.slope_y
@@ -181,7 +181,7 @@ def _loss(press: TruePress, solved: Solved, radius_mm: float) -> dict[str, Any]:
     }
 
 
-def _light_at(maps: SensorMaps, truth: TrueDepth, solved: Solved) -> np.ndarray:
+def _light_at(maps: SensorMaps, truth: TrueDepth, solved: SolvedRegion) -> np.ndarray:
     """Return side, slope, image, direct light, the model's addition and the gathered one (N, 6).
 
     Every second node along both axes, if it is tilted.
@@ -203,8 +203,8 @@ def _light_at(maps: SensorMaps, truth: TrueDepth, solved: Solved) -> np.ndarray:
     reflected = gathered(facets, at, leds, full.membrane, scale.pitch_mm, **options) / flat[thinned]
     points, normals = view.points_mm[thinned], view.normals[thinned]
     lit = lit_by(truth, view, leds)[thinned]
-    direct = direct_light(full, points[:, :2], -points[:, 2], normals, ray_slope[thinned])
-    direct *= 1.0 - np.moveaxis(maps.returned, 0, -1)[thinned]
+    view_to = view_directions(ray_slope[thinned])
+    direct = -brightness(full, points, normals, view_to) / flat[thinned]
     light, _ = light_directions(leds, points)
     tilted = np.einsum("nkc,nc->nk", light, normals) > -light[..., 2]
     side = np.where(lit, np.where(tilted, 0, 1), 2)

@@ -19,6 +19,7 @@ from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
+from gelpolight_core.calibration.status import StageState
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.translation import tr
 
@@ -142,7 +143,8 @@ def _curves(nodes: Nodes) -> dict[int, Curve]:
 
 
 def _gather(project: CalibrationProject) -> Material:
-    run = project.finish(model="paper")
+    known = project.statuses()[Stage.JOINT].state in (StageState.PASS, StageState.WARN)
+    run = project.finish(model="full" if known else "paper")
     session = project.session
     fitted = start_edit(project.results.reflectance.table)
     scatter = gather_scatter(run, session)

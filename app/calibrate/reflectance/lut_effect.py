@@ -1,13 +1,12 @@
 """The effect of edited reflectance curves on a ball press: depth along a line, and its error.
 
-It uses the paper's model, to which the curves belong. Everything that does not depend on the
-curves is computed once, so that results arrive while the user is still dragging.
+It uses the model of the calibration: the full model once the joint refinement is known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -16,11 +15,9 @@ from numpy.typing import NDArray
 from app.calibrate.reflectance.lut_model import CurveEdit
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.pipeline import CalibrationRun
-from gelpolight_core.reconstruction.paper.depth import LOOKUP_SIZE
-from gelpolight_core.reconstruction.paper.model import ShadingMaps, solve_slopes
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reflectance.press import BallPress
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.reconstruction.reconstructor import SOLVERS
+from gelpolight_core.reconstruction.solver import Wanted
+from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 
@@ -72,38 +69,36 @@ def ball_effect(run: CalibrationRun, session: Session) -> Callable[[CurveEdit, s
     session : Session
         Session with the ball images.
     """
-    reconstructor = Reconstructor(run.calibration, model="paper", workers=1)
-    presses = {press.name: press for press in run.reflectance.presses}
+    calibration = run.calibration
+    wanted = Wanted(effort=EFFORTS[0], normals=False, everywhere=True)
 
     @lru_cache(maxsize=2)
     def frame(name: str) -> NDArray[np.float32]:
-        return read_image(session.folder / name, response=run.calibration.response).rgb
+        return read_image(session.folder / name, response=calibration.response).rgb
 
     def effect(edit: CurveEdit, name: str) -> Effect:
-        maps = _maps(reconstructor.paper.maps, run.calibration, edit)
-        field = solve_slopes(frame(name), maps, workers=1)
-        depth = reconstructor.paper.integration.integrate(field.slope_x, field.slope_y).depth_mm
-        return _compare(np.asarray(depth, np.float64), presses[name], run)
+        curves = {
+            k: (np.array(c.curve.cosines), np.array(c.curve.values)) for k, c in enumerate(edit)
+        }
+        changed = edited(calibration, curves, operator="", made="")
+        solver = SOLVERS[calibration.model](changed, workers=1)
+        return _compare(solver.depth(frame(name), wanted).depth_mm.astype(np.float64), name, run)
 
     return effect
 
 
-def _maps(maps: ShadingMaps, calibration: Calibration, edit: CurveEdit) -> ShadingMaps:
-    """Return the maps with the edited curves, and with the reflectance factors that result."""
-    curves = {k: (np.array(c.curve.cosines), np.array(c.curve.values)) for k, c in enumerate(edit)}
-    changed = edited(calibration, curves, operator="", made="")
-    lookup, scale = changed.reflectance.lookup(LOOKUP_SIZE)
-    old, new = calibration.factors, changed.factors
-    gain = maps.gain * np.divide(old, new, out=np.zeros_like(old), where=new > 0.0)
-    return replace(maps, lookup=lookup, lookup_scale=scale, gain=gain)
-
-
-def _compare(depth: Array, press: BallPress, run: CalibrationRun) -> Effect:
-    """Compare with the ball where the paper's model shows it: straight below the seen contact."""
+def _compare(depth: Array, name: str, run: CalibrationRun) -> Effect:
+    """Compare with the ball where the model shows it."""
+    press = next(press for press in run.reflectance.presses if press.name == name)
     table = run.calibration.table
     grid, pose, contact = table.grid, press.pose, press.contact_radius_mm
-    column, row = np.round(grid.to_index(np.asarray(pose.centre_mm))).astype(int)
-    centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
+    if run.joint is not None and name in run.joint.ball_names:
+        pose = run.joint.balls[run.joint.ball_names.index(name)]
+        centre = np.asarray(pose.centre_mm)
+    else:
+        # The paper's model shows it straight below the seen contact.
+        column, row = np.round(grid.to_index(np.asarray(pose.centre_mm))).astype(int)
+        centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     x, y = grid.x_mm - centre[0], grid.y_mm - centre[1]
     away2 = x[None, :] ** 2 + y[:, None] ** 2
     inside = away2 < contact**2
@@ -113,7 +108,7 @@ def _compare(depth: Array, press: BallPress, run: CalibrationRun) -> Effect:
     line = int(np.abs(y).argmin())
     near = np.flatnonzero(np.abs(x) <= REACH * contact)
     return Effect(
-        press.name,
+        name,
         x[near],
         depth[line, near],
         ball[line, near],

@@ -191,7 +191,7 @@ def effect_sentence(before: Effect, after: Effect) -> str:
     if before is after:
         return tr(
             "Unchanged: error {rms:.1f} \N{MICRO SIGN}m RMS over the contact, {low:+.1f} "
-            "\N{MICRO SIGN}m at the deepest point (paper's model)."
+            "\N{MICRO SIGN}m at the deepest point."
         ).format(rms=UM * before.rms_mm, low=UM * before.lowest_mm)
     change = after.rms_mm - before.rms_mm
     if abs(change) < 0.005 * max(before.rms_mm, 1e-9):
@@ -201,8 +201,7 @@ def effect_sentence(before: Effect, after: Effect) -> str:
     moved = UM * float(np.abs(after.profile_mm - before.profile_mm).max())
     return tr(
         "{verdict}: RMS error {a:.1f} to {b:.1f} \N{MICRO SIGN}m, at the deepest point {c:+.1f} "
-        "to {d:+.1f} \N{MICRO SIGN}m. The depth changed by up to {moved:.1f} \N{MICRO SIGN}m "
-        "(paper's model)."
+        "to {d:+.1f} \N{MICRO SIGN}m. The depth changed by up to {moved:.1f} \N{MICRO SIGN}m."
     ).format(
         verdict=verdict,
         a=UM * before.rms_mm,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -73,6 +74,11 @@ class InPlaceCalibration:
     def table(self) -> ResamplingTable:
         """The camera pixel of each node."""
         return self.in_place.grid.table()
+
+    @cached_property
+    def bad_pixels(self) -> BadPixels:
+        """None: those of a closed sensor are not looked for."""
+        return no_bad_pixels(self.camera.height, self.camera.width)
 
     @cached_property
     def identity(self) -> str:

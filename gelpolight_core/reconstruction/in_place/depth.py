@@ -124,20 +124,3 @@ def _firm(rough_mm: Map, near: NDArray[np.bool_], least_mm: float) -> Map | None
         return None
     pressed = np.where(near, (rough_mm - ground) / (HELD * deepest), 0.0)
     return np.asarray(np.clip(2.0 - pressed, FREE, 1.0), np.float32)
-
-
-def surface_slopes(depth_mm: Map, pitch_mm: float) -> tuple[Map, Map]:
-    """Return the slopes (rows, columns) of a depth map along x and y.
-
-    They are those of a surface, unlike the slopes from the colours of single nodes. The integration
-    has removed the inconsistent part of those slopes, 0.4 to 1.5 degrees on real sensors.
-    """
-    slope_y, slope_x = np.gradient(depth_mm, np.float32(pitch_mm))
-    return np.asarray(slope_x, np.float32), np.asarray(slope_y, np.float32)
-
-
-def normals(depth_mm: Map, pitch_mm: float) -> Map:
-    """Return the unit normals (-dd/dx, -dd/dy, -1) / |.| (rows, columns, 3) of a depth map."""
-    slope_x, slope_y = surface_slopes(depth_mm, pitch_mm)
-    down = np.float32(-1.0) / np.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-    return np.asarray(np.stack([slope_x * down, slope_y * down, down], axis=-1), np.float32)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -10,13 +9,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.checks import Note, Notes, free_boundary_note
-from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.in_place.depth import depth_of, normals
-from gelpolight_core.reconstruction.in_place.model import InPlaceModel
+from gelpolight_core.reconstruction.height_map import (
+    Flag,
+    HeightMap,
+    normals_from_slopes,
+    surface_slopes,
+)
+from gelpolight_core.reconstruction.in_place.calibration import MODEL, InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.depth import depth_of
+from gelpolight_core.reconstruction.in_place.inverse import Inverse, inverse
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.linear import as_linear
+from gelpolight_core.reconstruction.linear import as_linear, linearised
+from gelpolight_core.reconstruction.solver import (
+    DepthNoise,
+    Gain,
+    Solved,
+    Wanted,
+    light_step,
+    thinned,
+)
 from gelpolight_core.reconstruction.threads import RowWorkers
-from gelpolight_core.reconstruction.trace import Trace, TraceRecorder
+from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -28,46 +41,10 @@ EXAMPLES = 6
 THINNED = 4
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
+STATED_CHANGE = 0.01
+"""Change of the light that is stated: images of a closed sensor scatter by less."""
+ONE_MODE = tr("calibration in place has one mode")
 STEPS = (tr("change of colour"), tr("slopes"), tr("integration"))
-
-
-@dataclass(frozen=True, slots=True)
-class InPlaceDepth:
-    """Result from an image of a closed sensor.
-
-    Attributes
-    ----------
-    depth_mm : (rows, columns) float32
-        Indentation.
-    normals : (rows, columns, 3) float32 or None
-        Unit normals.
-    flags : (rows, columns) uint8
-        Sums of :class:`Flag`.
-    notes : tuple of Note
-        For the user.
-    trace : Trace
-        What was done.
-    gain : (3,)
-        Light of each channel over that at calibration, which is corrected.
-    slope_sd, depth_sd_mm : (rows, columns) float32 or None
-        From the image's noise.
-    slope_model_sd, depth_model_sd_mm : (rows, columns) float32 or None
-        From the errors of presses that were left out.
-    noise_mm : (examples, rows / 4, columns / 4) float32 or None
-        Examples of depth errors that the image's noise can cause.
-    """
-
-    depth_mm: Map
-    normals: Map | None
-    flags: NDArray[np.uint8]
-    notes: Notes
-    trace: Trace
-    gain: NDArray[np.float64]
-    slope_sd: Map | None = None
-    depth_sd_mm: Map | None = None
-    slope_model_sd: Map | None = None
-    depth_model_sd_mm: Map | None = None
-    noise_mm: Map | None = None
 
 
 class InPlaceSolver:
@@ -75,52 +52,45 @@ class InPlaceSolver:
 
     Parameters
     ----------
-    model : InPlaceModel
+    calibration : InPlaceCalibration
         The sensor's.
-    noise : (3,)
-        Standard deviation of a pixel, per channel.
     workers : int, optional
         Threads; results do not depend on their number.
     """
 
-    def __init__(
-        self, model: InPlaceModel, *, noise: NDArray[np.float64], workers: int = 2
-    ) -> None:
-        self._model = model
-        self._noise = noise.astype(np.float32)
+    made_for = (MODEL,)
+    visible_mm = None
+
+    def __init__(self, calibration: InPlaceCalibration, *, workers: int = 2) -> None:
+        self.calibration = calibration
+        self._model = calibration.in_place
         self._threads = RowWorkers(workers)
 
-    def depth(
-        self,
-        frame: NDArray[Any],
-        *,
-        effort: str,
-        with_normals: bool,
-        uncertainty: bool,
-    ) -> InPlaceDepth:
-        """Reconstruct an image (height, width, 3) of linear light or a linear camera.
+    @staticmethod
+    def refuse_unfit(calibration: InPlaceCalibration) -> None:
+        """Refuse nothing: a closed sensor's calibration has one model."""
 
-        Parameters
-        ----------
-        frame : (height, width, 3)
-            RGB.
-        effort : str
-            Kept in the trace; there is one mode.
-        with_normals, uncertainty : bool
-            Results in addition to the depth.
-        """
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> None:
+        """Return that no fault is known."""
+
+    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
+        """Return which steps a frame needs; see :class:`Solver`."""
+        return Trace(wanted.effort, tuple(TraceStep(step, True, ONE_MODE) for step in STEPS))
+
+    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+        """Reconstruct a frame; see :class:`Solver`."""
         model, record = self._model, TraceRecorder()
-        why = tr("calibration in place has one mode")
-        with record.done(STEPS[0], frame.nbytes) as reason:
-            linear = as_linear(frame)
+        linear_frame = linearised(frame, self.calibration.response)
+        with record.done(STEPS[0], linear_frame.nbytes) as reason:
+            linear = as_linear(linear_frame)
             seen = model.change(linear)
-            reason.append(why)
+            reason.append(ONE_MODE)
         with record.done(STEPS[1], seen.change.nbytes) as reason:
             slope_x, slope_y = model.slopes(seen.change, self._threads)
             beyond = model.extrapolated(seen.change, slope_x, slope_y)
             weight = np.where(beyond, np.float32(EXTRAPOLATED_WEIGHT), np.float32(1.0))
             weight[~seen.usable] = 0.0
-            reason.append(why)
+            reason.append(ONE_MODE)
         with record.done(STEPS[2], 3 * slope_x.nbytes) as reason:
             depth, crossed = depth_of(
                 slope_x,
@@ -129,36 +99,64 @@ class InPlaceSolver:
                 weight=weight,
                 workers=self._threads,
             )
-            reason.append(why)
+            reason.append(ONE_MODE)
         flags = np.zeros(slope_x.shape, np.uint8)
         flags[beyond] |= np.uint8(Flag.EXTRAPOLATED.value)
         flags[seen.saturated] |= np.uint8(Flag.SATURATED.value)
         flags[~seen.usable & ~seen.saturated] |= np.uint8(Flag.INVALID.value)
-        crossed_notes = (free_boundary_note(),) if crossed else ()
-        if not with_normals:
+        if not wanted.normals:
             record.left_out(tr("normals"), tr("not requested"))
-        if not uncertainty:
+        if not wanted.uncertainty:
             record.left_out(tr("standard deviations"), tr("not requested"))
-        return InPlaceDepth(
+        light = light_step(seen.gain)
+        changed = np.abs(seen.gain - 1.0).max() > STATED_CHANGE
+        notes = [Note(light.reason, doubtful=False)] if changed else []
+        notes += [free_boundary_note()] if crossed else []
+        normals = None
+        if wanted.normals:
+            normals = normals_from_slopes(*surface_slopes(depth, model.grid.pitch_mm))
+        return Solved(
             depth,
-            normals(depth, model.grid.pitch_mm) if with_normals else None,
+            normals,
             flags,
-            (*crossed_notes, *_difference_notes(seen.change)),
-            Trace(effort, tuple(record.steps)),
-            seen.gain,
-            **(self._deviations(linear, depth, slope_x, slope_y) if uncertainty else {}),
+            (*notes, *_difference_notes(seen.change)),
+            Trace(wanted.effort, (light, *record.steps)),
+            self._deviations(linear, depth, slope_x, slope_y) if wanted.uncertainty else None,
+            # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
+            depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
+            lateral_scale_sd=model.scale_sd,
         )
 
-    def _deviations(self, frame: Map, depth_mm: Map, slope_x: Map, slope_y: Map) -> dict[str, Map]:
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
+        """Return 1 plus the change of colour of a surface; see :class:`Solver`."""
+        known = self._model.reference.known[..., None]
+        image = np.where(known, 1.0 + self._inverse(height_map).change, np.nan)
+        return np.asarray(image[thinned(step)], np.float32)
+
+    def residual(
+        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
+    ) -> Map:
+        """Return the change of colour minus the predicted one, in the known directions."""
+        seen = self._model.change(as_linear(linearised(frame, self.calibration.response)))
+        predicted = self._inverse(height_map)
+        left = predicted.in_known_directions(seen.change - predicted.change)
+        return np.asarray(np.where(seen.usable[..., None], left, np.nan)[thinned(step)], np.float32)
+
+    def _inverse(self, height_map: HeightMap) -> Inverse:
+        slopes = surface_slopes(height_map.depth_mm, height_map.pitch_mm)
+        return inverse(self._model, *slopes)
+
+    def _deviations(self, frame: Map, depth_mm: Map, slope_x: Map, slope_y: Map) -> DepthNoise:
         """Return the maps of standard deviations, and examples of the depth's noise."""
         errors = self._model.errors
         size = np.hypot(slope_x, slope_y)
         model_sd = np.interp(size, errors.slopes, errors.slope_sd).astype(np.float32)
         depth_model = np.hypot(errors.depth_floor_mm, errors.depth_share * depth_mm)
+        noise_sd = self.calibration.noise.astype(np.float32)
         random = np.random.default_rng(0)
         slopes, depths = [], []
         for _ in range(EXAMPLES):
-            noise = random.standard_normal(frame.shape, np.float32) * self._noise
+            noise = random.standard_normal(frame.shape, np.float32) * noise_sd
             seen = self._model.change(frame + noise)
             x, y = self._model.slopes(seen.change, self._threads)
             x, y = x - slope_x, y - slope_y
@@ -173,13 +171,13 @@ class InPlaceSolver:
         rows, columns = (n // THINNED for n in size.shape)
         thin = examples[:, : rows * THINNED, : columns * THINNED]
         blocks = thin.reshape(EXAMPLES, rows, THINNED, columns, THINNED)
-        return {
-            "slope_sd": np.sqrt(slope_noise),
-            "depth_sd_mm": np.sqrt(spread),
-            "slope_model_sd": model_sd,
-            "depth_model_sd_mm": np.asarray(depth_model, np.float32),
-            "noise_mm": np.asarray(blocks.mean(axis=(2, 4)), np.float32),
-        }
+        return DepthNoise(
+            np.sqrt(slope_noise),
+            np.sqrt(spread),
+            model_sd,
+            np.asarray(depth_model, np.float32),
+            np.asarray(blocks.mean(axis=(2, 4)), np.float32),
+        )
 
 
 def _difference_notes(change: Map) -> Notes:

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps
+from gelpolight_core.reconstruction.near_light.maps import COARSE, LEAST_SHARE, SensorMaps
 from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -63,7 +63,7 @@ class FromAround:
     def on(
         self,
         region: Region,
-        image: RatioImage,
+        ratio: Map,
         surface: tuple[Map, Map, Map],
         reflectance: float,
     ) -> tuple[Map, Map]:
@@ -73,8 +73,8 @@ class FromAround:
         ----------
         region : Region
             That is solved.
-        image : RatioImage
-            Of it, at the coarsest scale.
+        ratio : (3, rows, columns) float32
+            Its brightness over the background, at the coarsest scale.
         surface : 3 of (rows, columns)
             Depth along the rays, and x and y of the normals.
         reflectance : float
@@ -90,7 +90,10 @@ class FromAround:
         scale = self.maps.scale(COARSE)
         (top, left), (rows, columns) = region.at(1)
         at = np.s_[top : top + rows, left : left + columns]
-        whole = self._pressed(at, image, surface)
+        whole = self._pressed(at, ratio, surface)
+        clear = self._clearance(whole, at)
+        if reflectance <= LEAST_SHARE:
+            return np.zeros_like(ratio), clear
         membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
         tilted = whole.normals[at][..., 2] > LEVEL_NZ
         some = np.zeros_like(tilted)
@@ -109,10 +112,10 @@ class FromAround:
         reflected[tilted] = found[split:]
         around = np.moveaxis(reflected, -1, 0) / -scale.flat[(slice(None), *at)] * reflectance
         around *= scale.kind[at] == 2
-        return np.ascontiguousarray(around, np.float32), self._clearance(whole, at)
+        return np.ascontiguousarray(around, np.float32), clear
 
     def _pressed(
-        self, at: tuple[slice, slice], image: RatioImage, surface: tuple[Map, Map, Map]
+        self, at: tuple[slice, slice], ratio: Map, surface: tuple[Map, Map, Map]
     ) -> Surface:
         """Return the whole membrane with a region of it pressed."""
         scale = self.maps.scale(COARSE)
@@ -135,9 +138,7 @@ class FromAround:
         down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
         normals[at] = np.stack([nx, ny, down], axis=-1)
         known = (scale.kind[at] == 2)[..., None]
-        reflected = ratio_reflected(
-            np.moveaxis(image.ratio, 0, -1), known, self.maps.reflecting[at]
-        )
+        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), known, self.maps.reflecting[at])
         seen[at] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
         return Surface(points, normals, view, seen)
 
@@ -147,12 +148,9 @@ class FromAround:
         depth = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
         rows, columns = np.indices(depth.shape, dtype=np.float32)
         per_pitch = _single(1.0 / scale.pitch_mm)
-        # At true positions: half steps of the fixed point, as surfaces may fold.
-        place, home = np.stack([columns, rows]), np.stack([columns, rows])
-        slope, seen = np.moveaxis(self._ray_slope, -1, 0) * per_pitch, depth
-        for _ in range(PLACING):
-            place = _HALF * (place + home - seen * slope)
-            seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR))
+        slope = np.moveaxis(self._ray_slope, -1, 0) * per_pitch
+        place = meeting(depth, np.stack([columns, rows]), -slope)
+        seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR))
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
         clear = np.empty((3, *points.shape[:2]), np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
@@ -160,6 +158,27 @@ class FromAround:
         deepest = _single(seen.max())
         self._workers.run(len(points), clear_rows, points, seen, origin, leds, deepest, clear)
         return clear
+
+
+def meeting(depth_mm: Map, home: Map, slope: Map) -> Map:
+    """Return the nodes (2, ...), column and row, that are the depth there times a slope away.
+
+    Half steps of the fixed point, as surfaces may fold.
+
+    Parameters
+    ----------
+    depth_mm : (rows, columns) float32
+        Depth map.
+    home : (2, ...) float32
+        Nodes, column and row.
+    slope : (2, ...) float32
+        Nodes per mm of depth.
+    """
+    place = home
+    for _ in range(PLACING):
+        depth = cv2.remap(depth_mm, place[0], place[1], cv2.INTER_LINEAR)
+        place = _HALF * (place + home + depth * slope)
+    return place
 
 
 def _within(

@@ -284,12 +284,8 @@ def _flat_brightness(
     """Return `Scale.flat`, with the light that a slab reflects from the given nodes."""
     shape, membrane = (y.size, x.size), full.membrane
     view = view_directions(np.moveaxis(ray_slope, 0, -1))
-    up = np.tile([0.0, 0.0, -1.0], (y.size * x.size, 1))
     points = np.stack([*np.meshgrid(x, y), np.zeros(shape)], axis=-1)
-    light, distance = light_directions(full.led_positions_mm, points.reshape(-1, 3))
-    response = membrane.response(light, up, view.reshape(-1, 3))
-    direct = (response * light[..., 2] / distance**2).reshape(*shape, 3)
-    flat = direct
+    flat = direct = brightness(full, points, np.broadcast_to([0.0, 0.0, -1.0], points.shape), view)
     if returned is not None and membrane.interreflection > LEAST_SHARE:
         (slab, reflecting), pitch = returned, float(x[1] - x[0])
         for _ in range(2):
@@ -304,6 +300,21 @@ def _flat_brightness(
             )
             flat = direct - membrane.interreflection * more
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0), np.float32)
+
+
+def brightness(full: FullModel, points_mm: Array, normals: Array, view: Array) -> Array:
+    """Return the direct light of points (rows, columns, 3), below 0 as the LEDs' z.
+
+    Parameters
+    ----------
+    full : FullModel
+        Lights and membrane.
+    points_mm, normals, view : (rows, columns, 3)
+        Sensor frame; unit normals, and unit directions to the camera.
+    """
+    light, distance = light_directions(full.led_positions_mm, points_mm.reshape(-1, 3))
+    response = full.membrane.response(light, normals.reshape(-1, 3), view.reshape(-1, 3))
+    return np.asarray((response * light[..., 2] / distance**2).reshape(points_mm.shape))
 
 
 def block_average(values: NDArray[Any], factor: int) -> Map:

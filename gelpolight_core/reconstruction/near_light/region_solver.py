@@ -55,7 +55,7 @@ THIN = 2
 """Step along both axes of the nodes that are counted as solved or unsolved."""
 
 
-class Solved(NamedTuple):
+class SolvedRegion(NamedTuple):
     """A solved region at the scale of its last round, in the buffers of the solver.
 
     Attributes
@@ -135,14 +135,18 @@ class RegionSolver:
         Threads.
     buffers : Buffers
         Memory for its results, used again for each frame.
+    from_around : FromAround
+        Light and shadows of the membrane on itself.
     """
 
-    def __init__(self, maps: SensorMaps, workers: RowWorkers, buffers: Buffers) -> None:
+    def __init__(
+        self, maps: SensorMaps, workers: RowWorkers, buffers: Buffers, from_around: FromAround
+    ) -> None:
         self.maps = maps
         self._workers = workers
         self._take = buffers.take
         self._longest_mm = longest_step_mm(maps.full)
-        self._from_around = FromAround(maps, workers)
+        self._from_around = from_around
 
     def rounds(
         self, region: Region, compared: Compared, settings: Settings, terms: Terms
@@ -226,7 +230,7 @@ class RegionSolver:
         for number in range(settings.around_rounds):
             steep = number < STEEP_ROUNDS
             around = self._from_around.on(
-                region, compared.coarse, surface, max(own, 1.0) if steep else own
+                region, compared.coarse.ratio, surface, max(own, 1.0) if steep else own
             )
             begin = surface_normals(depth, at, scale.rays[:2], scale.pitch_mm)
             image = with_surroundings(compared.coarse, compared.coarse, *around)
@@ -236,7 +240,7 @@ class RegionSolver:
             boundary = boundary if steep else known
             depth = held_back(depth, found, self._longest_mm).copy()
             surface = (depth, slopes.normal_x.copy(), slopes.normal_y.copy())
-        around = self._from_around.on(region, compared.coarse, surface, own)
+        around = self._from_around.on(region, compared.coarse.ratio, surface, own)
         begin = surface_normals(depth, at, scale.rays[:2], scale.pitch_mm)
         return Start(depth, begin, boundary or Boundary(), around)
 
@@ -270,13 +274,13 @@ class RegionSolver:
         boundary: Boundary,
         settings: Settings,
         terms: Terms,
-    ) -> Solved:
+    ) -> SolvedRegion:
         """Integrate what :meth:`last_slopes` has returned."""
         (compared, depth, slopes), scale = solved, self.maps.scale(settings.factor)
         corner, shape = region.at(COARSE // settings.factor)
         weighted = _weighted(scale, corner, slopes, boundary.free)
         found = self._integrated(scale, weighted, depth, settings.tolerance, terms)
-        return Solved(
+        return SolvedRegion(
             region,
             compared,
             scale,
@@ -327,7 +331,7 @@ class RegionSolver:
         )
 
 
-def unsolved_share(solved: Solved) -> float:
+def unsolved_share(solved: SolvedRegion) -> float:
     """Return the share of nodes of the field that the light does not determine, from a sample."""
     kind, factor = solved.scale.kind, solved.scale.factor
     (top, left), (rows, columns) = solved.region.at(COARSE // factor)

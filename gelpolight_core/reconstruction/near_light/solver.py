@@ -7,19 +7,32 @@ by tests.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.health.finding import LightGain
+from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.buffers import Buffers
-from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.near_light.boundary import Boundary
+from gelpolight_core.reconstruction.checks import (
+    free_boundary_note,
+    refuse_coplanar_lights,
+    refuse_dark_membrane,
+    rounds_notes,
+    small_image_notes,
+    unanchored_note,
+    unsolved_notes,
+    visible_depth_notes,
+)
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.linear import linearised
 from gelpolight_core.reconstruction.near_light.contact import ContactFinder, contact_finder
+from gelpolight_core.reconstruction.near_light.from_around import FromAround
 from gelpolight_core.reconstruction.near_light.image_noise import image_noise
 from gelpolight_core.reconstruction.near_light.maps import COARSE, MISSING_CODE, SensorMaps
 from gelpolight_core.reconstruction.near_light.placement import (
@@ -31,22 +44,27 @@ from gelpolight_core.reconstruction.near_light.ratio import Compared, PressSampl
 from gelpolight_core.reconstruction.near_light.region import Region, padded_region
 from gelpolight_core.reconstruction.near_light.region_solver import (
     RegionSolver,
-    Solved,
+    SolvedRegion,
     Start,
     unsolved_share,
 )
 from gelpolight_core.reconstruction.near_light.rounds import Rounds
 from gelpolight_core.reconstruction.near_light.settings import MOVED, SETTINGS, Settings
 from gelpolight_core.reconstruction.near_light.structures import Slopes
-from gelpolight_core.reconstruction.near_light.uncertainty import (
+from gelpolight_core.reconstruction.near_light.surface_image import surface_image
+from gelpolight_core.reconstruction.near_light.uncertainty import depth_noise, no_contact_noise
+from gelpolight_core.reconstruction.solver import (
     DepthNoise,
-    depth_noise,
-    no_contact_noise,
+    Gain,
+    OpenSolver,
+    Solved,
+    Wanted,
 )
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
-from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.stated_lengths import stated_sd
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -72,70 +90,19 @@ LAST_ROUND = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class NearLightDepth:
-    """A reconstruction by the near-light model, at true positions on the metric grid.
-
-    Attributes
-    ----------
-    depth_mm : (rows, columns) float32
-        At the grid's own (x, y).
-    normals : (rows, columns, 3) float32 or None
-        Unit normals, z < 0; None where they were not requested.
-    flags : (rows, columns) uint8
-        Bits of :class:`Flag`.
-    boundary : Boundary
-        Where the boundary was fixed at depth 0.
-    rounds : Rounds or None
-        The rounds at the coarsest scale, and how they ended; None where nothing is pressed.
-    trace : Trace
-        What was done and what was left out.
-    noise : DepthNoise or None
-        Its uncertainty, if requested.
-    unsolved : float
-        Share of the usable nodes that light does not decide: less than two lights, or turned away.
-    visible_mm : float
-        Smallest depth of a flat face that is found.
-    """
-
-    depth_mm: Map
-    normals: Map | None
-    flags: NDArray[np.uint8]
-    boundary: Boundary
-    rounds: Rounds | None
-    trace: Trace
-    noise: DepthNoise | None = None
-    unsolved: float = 0.0
-    visible_mm: float = 0.0
-
-
-class Wanted(NamedTuple):
-    """The request of the caller."""
-
-    effort: str
-    terms: Terms
-    normals: bool
-    uncertainty: bool
-
-
 class Image(NamedTuple):
     """An image (height, width, 3) in whole numbers.
 
-    `linear` says whether they are linear light; `light` how the light differs from that at
-    calibration.
+    `linear` says whether they are linear light; `gain` is the light of each channel (3,) over that
+    at calibration, None: the same.
     """
 
     raw: NDArray[Any]
     linear: bool
-    light: LightGain | None = None
-
-    @property
-    def gain(self) -> NDArray[np.float64] | None:
-        """Light of each channel (3,) over that at calibration; None: the same."""
-        return None if self.light is None else self.light.share
+    gain: Gain | None = None
 
 
-class NearLightSolver:
+class NearLightSolver(OpenSolver):
     """Reconstructs frames by the near-light model, doing for each what it needs.
 
     Work buffers are kept from frame to frame; results are always new. It may be called from
@@ -144,8 +111,8 @@ class NearLightSolver:
 
     Parameters
     ----------
-    calibration, full
-        The sensor's.
+    calibration : Calibration
+        The sensor's, with its full model.
     workers : int
         Threads.
     settings : mapping, optional
@@ -155,96 +122,67 @@ class NearLightSolver:
     def __init__(
         self,
         calibration: Calibration,
-        full: FullModel,
         *,
         workers: int,
         settings: Mapping[str, Settings] = SETTINGS,
     ) -> None:
+        full = calibration.full
+        assert full is not None
         self._settings = settings
-        self.calibration = calibration
         self.maps = SensorMaps(calibration, full)
+        super().__init__(calibration, full.led_positions_mm, self.maps.usable)
         self.workers = RowWorkers(workers)
         self._margin_mm = max(MARGIN_DECAYS * full.decay_mm, LEAST_MARGIN_MM)
         self._finders: dict[bool, ContactFinder] = {}
-        self.visible_mm = self._finder(False).visible_mm
         buffers = Buffers()
         self._take = buffers.take
         self._sampler = PressSampler(self.maps, self.workers, buffers)
-        self._solver = RegionSolver(self.maps, self.workers, buffers)
+        self._around = FromAround(self.maps, self.workers)
+        self._solver = RegionSolver(self.maps, self.workers, buffers, self._around)
         self._lock = Lock()
 
-    def depth(
-        self,
-        frame: NDArray[Any],
-        *,
-        effort: str = "best",
-        terms: Terms = ALL_TERMS,
-        normals: bool = True,
-        uncertainty: bool = False,
-        everywhere: bool = False,
-        light: LightGain | None = None,
-    ) -> NearLightDepth:
-        """Reconstruct a raw frame (height, width, 3), uint8, uint16 or float.
+    @cached_property
+    def visible_mm(self) -> float:
+        """Smallest depth of a flat face that is found."""
+        return self._finder(False).visible_mm
 
-        Parameters
-        ----------
-        frame
-            RGB, as the camera encodes it; floats linear light 0..1.
-        effort : str, optional
-            ``best``, ``balanced`` or ``fast``.
-        terms : Terms, optional
-            What the model includes; by default everything.
-        normals : bool, optional
-            Whether they are wanted.
-        uncertainty : bool, optional
-            Whether to find out how far the depth may be off; needs ``best``.
-        everywhere : bool, optional
-            Whether to solve the whole grid without looking for a contact.
-        light : LightGain, optional
-            How the light differs from that at calibration, which is undone.
+    @staticmethod
+    def refuse_unfit(calibration: Calibration) -> None:
+        """Refuse a calibration without full model, lights nearly in one plane, and no light."""
+        if calibration.full is None:
+            raise InputError(
+                tr("the calibration was made for the paper's model only"),
+                where=calibration.identity,
+                advice=tr("Calibrate again with --model full, or use --model paper"),
+            )
+        refuse_coplanar_lights(calibration, calibration.full.led_positions_mm)
+        refuse_dark_membrane(calibration, calibration.full.background)
 
-        Raises
-        ------
-        ValueError
-            If standard deviations are wanted of a coarser scale.
-        """
-        if uncertainty and self._settings[effort].factor != 1:
-            raise ValueError(f"standard deviations need the effort best, not {effort}")
-        record, used = TraceRecorder(), self.effort_for(effort)
-        self._note_effort(record, effort, used)
-        wanted = Wanted(used, terms, normals, uncertainty)
+    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+        """Reconstruct a frame; see :class:`Solver`."""
+        wanted, record = self._begin(wanted)
         with self._lock:
-            image = _image(frame, light)
-            region = self._region(image, record, everywhere)
+            image = self._image(frame, wanted)
+            region = self._region(image, record, wanted.everywhere)
             return self._depth(image, region, wanted, record)
 
-    def needs(
-        self,
-        frame: NDArray[Any],
-        *,
-        effort: str = "best",
-        terms: Terms = ALL_TERMS,
-        light: LightGain | None = None,
-    ) -> Trace:
-        """Return which steps a frame needs, by looking for a contact only.
-
-        Parameters
-        ----------
-        frame, effort, terms, light
-            As in :meth:`depth`.
-        """
-        record, used = TraceRecorder(), self.effort_for(effort)
-        self._note_effort(record, effort, used)
-        factor = self._settings[used].factor
+    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
+        """Return which steps a frame needs, by looking for a contact only; see :class:`Solver`."""
+        wanted, record = self._begin(wanted)
+        factor = self._settings[wanted.effort].factor
         with self._lock:
-            region = self._region(_image(frame, light), record, False)
+            region = self._region(self._image(frame, wanted), record, wanted.everywhere)
         if region is None:
             _nothing_pressed(record)
         else:
             names = (COMPARING, COARSE_ROUNDS, LAST_ROUND[factor], INTEGRATION, PLACING)
             record.steps += [TraceStep(n, True, tr("a contact was found")) for n in names]
-            self._left_out(record, factor, terms)
-        return Trace(used, tuple(record.steps))
+            self._left_out(record, factor, wanted.terms)
+        return Trace(wanted.effort, tuple(record.steps))
+
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
+        """Return the image of a surface by the whole model; see :class:`Solver`."""
+        return surface_image(height_map, self.maps, self._around, step)
 
     def effort_for(self, effort: str) -> str:
         """Return the effort, or the first finer one whose nodes resolve the membrane's drape."""
@@ -253,29 +191,33 @@ class NearLightSolver:
         fits = (e for e in finer if self._settings[e].factor * pitch_mm <= RESOLVED * decay_mm)
         return next(fits, EFFORTS[-1])
 
-    def _note_effort(self, record: TraceRecorder, wanted: str, used: str) -> None:
-        """Note that the images are too small for an effort."""
-        if wanted != used:
-            pitch_mm = self._settings[wanted].factor * self.calibration.table.grid.pitch_mm
+    def _begin(self, wanted: Wanted) -> tuple[Wanted, TraceRecorder]:
+        """Return what is done of what is wanted, and the record of the frame."""
+        record = wanted.record()
+        effort = wanted.effort
+        used = EFFORTS[-1] if wanted.uncertainty else self.effort_for(effort)
+        if used != effort and not wanted.uncertainty:
+            pitch_mm = self._settings[effort].factor * self.calibration.table.grid.pitch_mm
             why = tr("the images are too small: nodes of {p:.2f} mm are wider than the drape")
-            record.left_out(tr("effort {name}").format(name=wanted), why.format(p=pitch_mm))
+            record.left_out(tr("effort {name}").format(name=effort), why.format(p=pitch_mm))
+        return replace(wanted, effort=used), record
 
-    def solved(
-        self, frame: NDArray[Any], *, effort: str = "best", everywhere: bool = False
-    ) -> Solved | None:
+    def _image(self, frame: NDArray[Any], wanted: Wanted) -> Image:
+        """Return a frame in whole numbers."""
+        if wanted.effort == EFFORTS[-1]:
+            # Camera values and linear light use the same code, so that both give the same depth.
+            frame = linearised(frame, self.calibration.response)
+        return _image(frame, wanted.gain)
+
+    def solved(self, frame: NDArray[Any], wanted: Wanted) -> SolvedRegion | None:
         """Return the solved region of a frame, for studies; None where nothing is pressed.
 
         It lies in the solver's buffers, which the next frame overwrites.
-
-        Parameters
-        ----------
-        frame, effort, everywhere
-            As in :meth:`depth`.
         """
-        record, wanted = TraceRecorder(), Wanted(effort, ALL_TERMS, False, False)
+        record = TraceRecorder()
         with self._lock:
-            image = _image(frame)
-            region = self._region(image, record, everywhere)
+            image = self._image(frame, wanted)
+            region = self._region(image, record, wanted.everywhere)
             return None if region is None else self._solved(image, region, wanted, record)[1]
 
     def coarse_depth(self, frame: NDArray[Any]) -> Map:
@@ -296,18 +238,25 @@ class NearLightSolver:
 
     def _depth(
         self, image: Image, region: Region | None, wanted: Wanted, record: TraceRecorder
-    ) -> NearLightDepth:
+    ) -> Solved:
         depth = np.zeros(self.maps.flags.shape, np.float32)
         flags = self.maps.flags.copy()
         shown = flat_normals(depth.shape) if wanted.normals else None
-        rounds, boundary, noise, unsolved = None, Boundary(), None, 0.0
+        noise, notes = None, list(self._condition_notes)
         if region is None:
             _nothing_pressed(record)
             noise = no_contact_noise(depth.shape) if wanted.uncertainty else None
+            notes += visible_depth_notes(self.visible_mm)
         else:
             rounds, solved = self._solved(image, region, wanted, record)
             boundary = solved.boundary
-            unsolved = unsolved_share(solved)
+            notes += [] if boundary.free is None else [free_boundary_note()]
+            notes += [unanchored_note()] if boundary.level_sd_mm > 0.0 else []
+            notes += rounds_notes(rounds.stopped)
+            notes += unsolved_notes(unsolved_share(solved))
+            notes += small_image_notes(
+                self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
+            )
             with record.done(PLACING, depth.size * SHOWN_BYTES) as reason:
                 self._show(solved, wanted.terms, depth, flags, shown)
                 if boundary.level_sd_mm > 0.0:
@@ -315,18 +264,26 @@ class NearLightSolver:
                 reason.append(tr("and to the scale of the whole grid"))
             if wanted.uncertainty:
                 with record.done(tr("standard deviations"), depth.nbytes) as reason:
-                    noise = self._noise(image, solved, wanted.terms)
+                    noise = self._noise(image, solved, wanted)
                     reason.append(tr("requested"))
         if not wanted.normals:
             record.left_out(tr("normals"), tr("not requested"))
         if not wanted.uncertainty:
             record.left_out(tr("standard deviations"), tr("not requested"))
-        trace = Trace(wanted.effort, tuple(record.steps))
-        return NearLightDepth(
-            depth, shown, flags, boundary, rounds, trace, noise, unsolved, self.visible_mm
+        scale, stated = self.maps.full.scale_sd, stated_sd(self.calibration.stack)
+        return Solved(
+            depth,
+            shown,
+            flags,
+            tuple(notes),
+            Trace(wanted.effort, tuple(record.steps)),
+            noise,
+            depth_scale_sd=None if scale is None else math.hypot(scale.depth, stated.depth),
+            lateral_scale_sd=None if scale is None else math.hypot(scale.lateral, stated.lateral),
+            visible_depth_mm=None if wanted.everywhere else self.visible_mm,
         )
 
-    def _noise(self, image: Image, solved: Solved, terms: Terms) -> DepthNoise:
+    def _noise(self, image: Image, solved: SolvedRegion, wanted: Wanted) -> DepthNoise:
         """Return how far a solved region may be off."""
         compared, at = solved.compared.fine, (solved.scale, solved.region.at(COARSE)[0])
         # Solving again overwrites the slopes' buffers.
@@ -335,11 +292,11 @@ class NearLightSolver:
 
         def solve(ratio: Map, start: tuple[Map, Map]) -> Slopes:
             shaken = compared._replace(ratio=ratio)
-            return self._solver.slopes(at, shaken, solved.start_mm, MOVED, terms, start)
+            return self._solver.slopes(at, shaken, solved.start_mm, MOVED, wanted.terms, start)
 
         levels = self._sampler.levels(image.raw.dtype, image.linear)
         noise = image_noise(image.raw, levels, self.workers)
-        light_sd = None if image.light is None else image.light.sd
+        light_sd = None if wanted.light is None else wanted.light.sd
         return depth_noise(kept, self.maps, noise, solve, self.workers, light_sd=light_sd)
 
     def _finder(self, linear: bool) -> ContactFinder:
@@ -373,7 +330,7 @@ class NearLightSolver:
 
     def _solved(
         self, image: Image, region: Region, wanted: Wanted, record: TraceRecorder
-    ) -> tuple[Rounds, Solved]:
+    ) -> tuple[Rounds, SolvedRegion]:
         """Solve a region."""
         settings, terms = self._settings[wanted.effort], wanted.terms
         factor = settings.factor
@@ -444,7 +401,7 @@ class NearLightSolver:
 
     def _show(
         self,
-        solved: Solved,
+        solved: SolvedRegion,
         terms: Terms,
         depth: Map,
         flags: NDArray[np.uint8],
@@ -489,11 +446,11 @@ def flat_normals(shape: tuple[int, ...]) -> Map:
     return normals
 
 
-def _image(frame: NDArray[Any], light: LightGain | None = None) -> Image:
+def _image(frame: NDArray[Any], gain: Gain | None = None) -> Image:
     """Return a frame in whole numbers."""
     if frame.dtype.kind != "f":
         # numba would compile the kernel a second time for a read-only array.
-        return Image(np.require(frame, requirements=["C", "W"]), False, light)
+        return Image(np.require(frame, requirements=["C", "W"]), False, gain)
     finite = np.isfinite(frame)
     code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING_CODE - 1) + 0.5
-    return Image(np.where(finite, code, MISSING_CODE).astype(np.uint16), True, light)
+    return Image(np.where(finite, code, MISSING_CODE).astype(np.uint16), True, gain)

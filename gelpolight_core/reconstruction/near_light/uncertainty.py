@@ -28,8 +28,9 @@ from gelpolight_core.reconstruction.integration.weighted import integrate_weight
 from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
 from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, block_average
-from gelpolight_core.reconstruction.near_light.region_solver import Solved
+from gelpolight_core.reconstruction.near_light.region_solver import SolvedRegion
 from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, slopes_like
+from gelpolight_core.reconstruction.solver import DepthNoise
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
@@ -67,28 +68,6 @@ class SlopeNoise:
     moved: Map
 
 
-@dataclass(frozen=True, slots=True)
-class DepthNoise:
-    """Standard deviations of slopes and depth on the metric grid.
-
-    Attributes
-    ----------
-    slope_sd, depth_sd_mm : (rows, columns) float32
-        Standard deviations from the noise of a single image.
-    slope_model_sd, depth_model_sd_mm : (rows, columns) float32
-        Standard deviations from errors of the model.
-    examples_mm : (examples, rows / 4, columns / 4) float32
-        Examples of depth errors that this noise can cause. Each is a whole map, so that a standard
-        deviation can be computed for every quantity derived from a depth map.
-    """
-
-    slope_sd: Map
-    depth_sd_mm: Map
-    slope_model_sd: Map
-    depth_model_sd_mm: Map
-    examples_mm: Map
-
-
 def no_contact_noise(shape: tuple[int, ...]) -> DepthNoise:
     """Return the uncertainty of a map without a solved region."""
     rows, columns = shape
@@ -100,7 +79,7 @@ def no_contact_noise(shape: tuple[int, ...]) -> DepthNoise:
 
 
 def depth_noise(
-    answer: Solved,
+    answer: SolvedRegion,
     maps: SensorMaps,
     noise: ImageNoise,
     solve: Solve,
@@ -112,7 +91,7 @@ def depth_noise(
 
     Parameters
     ----------
-    answer : Solved
+    answer : SolvedRegion
         What was solved.
     maps : SensorMaps
         The sensor's.
@@ -167,7 +146,7 @@ def depth_noise(
         level_sd = np.hypot(level_sd, np.sqrt(len(moved)) * moved_sd)
     result.depth_model_sd_mm[here] = np.hypot(model_sd, level_sd)
     (top, left), (rows, columns) = answer.region.corner, answer.region.shape
-    result.examples_mm[:, top : top + rows, left : left + columns] = placed
+    result.noise_mm[:, top : top + rows, left : left + columns] = placed
     return result
 
 
@@ -272,7 +251,7 @@ def _half_differences(high, low, moved_x, moved_y, moved):  # type: ignore[no-un
 def depth_examples(
     noise: SlopeNoise,
     times: Map,
-    answer: Solved,
+    answer: SolvedRegion,
     pitch_mm: float,
     *,
     reach_mm: float = 0.0,
@@ -287,7 +266,7 @@ def depth_examples(
         At full scale.
     times : (3, rows, columns) or (rows, columns) float32
         Error of an average over 4 x 4 nodes, in standard deviations of `noise`.
-    answer : Solved
+    answer : SolvedRegion
         Its weights are used.
     pitch_mm : float
         Distance between nodes at quarter scale.
@@ -337,7 +316,7 @@ def depth_examples(
     return found
 
 
-def gain_errors(noise: SlopeNoise, times: Map, answer: Solved, coarse: Scale) -> Map:
+def gain_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Scale) -> Map:
     """Integrate the error of the gain of each channel, at quarter scale.
 
     Parameters
@@ -346,7 +325,7 @@ def gain_errors(noise: SlopeNoise, times: Map, answer: Solved, coarse: Scale) ->
         Slopes moved by each channel.
     times : (3, rows, columns) float32
         Error of the gain, in standard deviations of `noise`.
-    answer : Solved
+    answer : SolvedRegion
         Its weights are used.
     coarse : Scale
         Of the whole grid.
@@ -387,14 +366,14 @@ def model_times(ratio: Map, ratio_sd: Map, misfit: float) -> Map:
     return np.asarray(misfit * disturbed / ratio_sd, np.float32)
 
 
-def place_examples(examples_mm: Map, answer: Solved, coarse: Scale) -> Map:
+def place_examples(examples_mm: Map, answer: SolvedRegion, coarse: Scale) -> Map:
     """Bring examples (examples, rows / 4, columns / 4) from the rays to true positions.
 
     Parameters
     ----------
     examples_mm : (examples, rows / 4, columns / 4) float32
         Along the rays.
-    answer : Solved
+    answer : SolvedRegion
         Its normals and places.
     coarse : Scale
         Of the whole grid.

@@ -3,32 +3,42 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import usable
 from gelpolight_core.reconstruction.checks import (
     NearBoundary,
-    Notes,
     fixed_boundary_note,
     nodes_near_boundary,
     paper_notes,
+    refuse_coplanar_lights,
+    refuse_dark_membrane,
 )
-from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.height_map import (
+    Flag,
+    HeightMap,
+    normals_from_slopes,
+    surface_slopes,
+)
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linear import linearised
 from gelpolight_core.reconstruction.paper.kernel import blank_rows
 from gelpolight_core.reconstruction.paper.model import (
-    Gain,
     ShadingMaps,
-    SlopeField,
     SlopeSolver,
-    normals_from_slopes,
+)
+from gelpolight_core.reconstruction.solver import (
+    OpenSolver,
+    Solved,
+    Wanted,
+    thinned,
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
-from gelpolight_core.reconstruction.trace import TraceRecorder, TraceStep
+from gelpolight_core.reconstruction.trace import Trace, TraceStep
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
@@ -38,31 +48,7 @@ PAPER_REASON = tr("the paper's model has one mode")
 PAPER_STEPS = (tr("resampling, normals and their divergence"), tr("integration"))
 
 
-class PaperDepth(NamedTuple):
-    """A reconstruction by the paper's model.
-
-    Attributes
-    ----------
-    depth_mm : (rows, columns) float32
-        Intersection of each ray with the undeformed surface.
-    normals : (rows, columns, 3) float32 or None
-        Unit normals, z < 0; None where they were not requested.
-    flags : (rows, columns) uint8
-        Bits of :class:`Flag`.
-    notes : tuple of Note
-        Notes for the user.
-    steps : tuple of TraceStep
-        What was done.
-    """
-
-    depth_mm: Map
-    normals: Map | None
-    flags: NDArray[np.uint8]
-    notes: Notes
-    steps: tuple[TraceStep, ...]
-
-
-class PaperSolver:
+class PaperSolver(OpenSolver):
     """Reconstructs frames by the paper's model.
 
     Parameters
@@ -73,13 +59,22 @@ class PaperSolver:
         Threads.
     """
 
+    visible_mm = None
+
     def __init__(self, calibration: Calibration, *, workers: int) -> None:
-        self.calibration = calibration
+        known = usable(calibration.table.valid, calibration.radiance, calibration.factors)
+        super().__init__(calibration, calibration.led_positions_mm, known)
         self.maps = shading_maps(calibration)
         grid = calibration.table.grid
         self.integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
         self._threads = RowWorkers(workers)
-        self._slopes = SlopeSolver(self.maps, self._threads)
+        self.slopes = SlopeSolver(self.maps, self._threads)
+
+    @staticmethod
+    def refuse_unfit(calibration: Calibration) -> None:
+        """Refuse lights nearly in one plane, and a membrane without light."""
+        refuse_coplanar_lights(calibration, calibration.led_positions_mm)
+        refuse_dark_membrane(calibration, calibration.radiance)
 
     @cached_property
     def boundary_nodes(self) -> NearBoundary:
@@ -95,54 +90,67 @@ class PaperSolver:
         across = np.gradient(table.ray_slope[here][..., 0], axis=1)[table.valid[here]]
         return float(np.median(np.abs(across))) / table.grid.pitch_mm if across.size else 0.0
 
-    def slopes(self, frame: NDArray[Any], gain: Gain | None) -> SlopeField:
-        """Return the depth's slopes of a raw frame (height, width, 3).
+    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
+        """Return which steps a frame needs; see :class:`Solver`."""
+        record = wanted.record()
+        record.steps += [TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS]
+        return Trace(wanted.effort, tuple(record.steps))
 
-        Parameters
-        ----------
-        frame, gain
-            As in :meth:`depth`.
-        """
-        return self._slopes.solve(linearised(frame, self.calibration.response), gain=gain)
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
+        """Return the image of a surface by Eq. 6, with the light of the flat membrane."""
+        at, calibration = thinned(step), self.calibration
+        points = calibration.table.grid.points_mm()[at]
+        light, _ = light_directions(
+            calibration.led_positions_mm, np.dstack([points, np.zeros(points.shape[:2])])
+        )
+        slopes = surface_slopes(height_map.depth_mm, height_map.pitch_mm, step=step)
+        normals = normals_from_slopes(*(slope[at] for slope in slopes))
+        cosines = np.einsum("ijkc,ijc->ijk", light, normals)
+        ratio = np.stack(
+            [
+                calibration.reflectance.response(k, cosines[..., k])
+                / calibration.reflectance.response(k, -light[..., k, 2])
+                for k in range(3)
+            ],
+            axis=-1,
+        )
+        return np.asarray(np.where(self._known[at][..., None], ratio, np.nan), np.float32)
 
-    def depth(self, frame: NDArray[Any], *, normals: bool, gain: Gain | None) -> PaperDepth:
-        """Reconstruct a raw frame.
-
-        Parameters
-        ----------
-        frame : (height, width, 3) uint8, uint16 or float32
-            RGB, as the camera encodes it; floats linear light 0..1.
-        normals : bool
-            Whether they are wanted.
-        gain : (3,) or None
-            Light of each channel over that at calibration; None: the same.
-        """
-        light, record = frame, TraceRecorder()
+    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+        """Reconstruct a frame; see :class:`Solver`."""
+        light, record = frame, wanted.record()
         response = self.calibration.response
         if response is not None and frame.dtype.kind != "f":
             with record.done(tr("linear light"), frame.nbytes) as reason:
                 light = linearised(frame, response)
                 reason.append(tr("the camera's response is not linear"))
         with record.done(PAPER_STEPS[0], frame.nbytes) as reason:
-            divergence, field = self._slopes.divergence(
-                light, self.integration, slopes=normals, gain=gain
+            divergence, field = self.slopes.divergence(
+                light, self.integration, slopes=wanted.normals, gain=wanted.gain
             )
             reason.append(PAPER_REASON)
         with record.done(PAPER_STEPS[1], 2 * divergence.nbytes) as reason:
             depth_mm = self.integration.depth_of(divergence)
             self._threads.run(len(depth_mm), blank_rows, field.flags, depth_mm)
             reason.append(PAPER_REASON)
-        if not normals:
+        if not wanted.normals:
             record.left_out(tr("normals"), tr("not requested"))
         record.left_out(tr("standard deviations"), tr("the paper's model states none"))
-        shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
+        normals = normals_from_slopes(field.slope_x, field.slope_y) if wanted.normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         height_mm = float(-self.calibration.led_positions_mm[:, 2].max())
-        notes = paper_notes(depth_mm, field.flags, height_mm)
+        notes = (*self._condition_notes, *paper_notes(depth_mm, field.flags, height_mm))
         if self.boundary_nodes.pressed(depth_mm):
             notes += (fixed_boundary_note(),)
             field.flags[(field.flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
-        return PaperDepth(depth_mm, shown, field.flags, notes, tuple(record.steps))
+        return Solved(
+            depth_mm,
+            normals,
+            field.flags,
+            notes,
+            Trace(wanted.effort, tuple(record.steps)),
+            lateral_per_mm=self.ray_spread_per_mm,
+        )
 
 
 def shading_maps(calibration: Calibration) -> ShadingMaps:

@@ -41,7 +41,7 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
             # What two threads need is made by both and written by one.
             own = first <= loaded + top < last
             marks = flags[loaded] if own else others
-            solve_row(loaded, image, sensor, work, ring_x[at], ring_y[at], marks, None)
+            solve_row(loaded, image, sensor, work, ring_x[at], ring_y[at], marks)
             if keep and own:
                 slope_x[loaded], slope_y[loaded] = ring_x[at], ring_y[at]
             loaded += 1

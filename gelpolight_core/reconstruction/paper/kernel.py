@@ -32,9 +32,9 @@ _F_HIDDEN, _F_INVALID = _single(Flag.NOT_OBSERVABLE), _single(Flag.INVALID)
 _BYTE, _HALF_WORD = np.uint32(255), np.uint64(32)
 
 # Planes of the work array: place between pixels (2), light, then place in the table (3), brightest
-# pixel, beyond the table, not a number; slopes (2), flags, error of the normal's length.
+# pixel, beyond the table, not a number; slopes (2), flags.
 _SEEN, _TOP, _FAR, _BAD, _OUT = 2, 5, 6, 7, 8
-_PLANES = 12
+_PLANES = 11
 
 _flags = {"nsz", "arcp", "contract"}
 _part = numba.njit(nogil=True, fastmath=_flags, error_model="numpy", forceinline=True, cache=True)
@@ -235,7 +235,6 @@ def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, 
         w[_OUT * _B + j] = nx * short
         w[(_OUT + 1) * _B + j] = ny * short
         w[(_OUT + 2) * _B + j] = ok * flag + (_1 - ok) * _F_OUTSIDE
-        w[(_OUT + 3) * _B + j] = ok * abs(size / (side * whole) - _1)
 
 
 @_part
@@ -262,8 +261,8 @@ def work_arrays():  # type: ignore[no-untyped-def]  # pragma: no cover - compile
 
 
 @_part
-def solve_row(i, image, sensor, work, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Solve row `i` into lines (columns,); `length_error` may be None.
+def solve_row(i, image, sensor, work, slope_x, slope_y, flags):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Solve row `i` into lines (columns,).
 
     `image` is: pixels (pixels, 3); of one of bytes two neighbours in each word (pixels,), else
     None; width, height; the value that counts as saturated. `sensor` is: `static` (rows, blocks,
@@ -295,19 +294,9 @@ def solve_row(i, image, sensor, work, slope_x, slope_y, flags, length_error):  #
         count = min(_B, columns - begin)
         _put(w, _OUT, slope_x, begin, count)
         _put(w, _OUT + 1, slope_y, begin, count)
-        if length_error is not None:
-            _put(w, _OUT + 3, length_error, begin, count)
         marks = flags[begin : begin + count]
         for j in range(count):
             marks[j] = np.uint8(_int(w[(_OUT + 2) * _B + j]))
-
-
-@_whole
-def solve_rows(first, last, image, sensor, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Solve rows `first` to `last` of maps (rows, columns); else as `solve_row`."""
-    work = work_arrays()
-    for i in range(first, last):
-        solve_row(i, image, sensor, work, slope_x[i], slope_y[i], flags[i], length_error[i])
 
 
 @_whole

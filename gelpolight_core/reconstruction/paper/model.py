@@ -18,11 +18,7 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.paper.divergence import paper_divergence_rows
-from gelpolight_core.reconstruction.paper.kernel import (
-    BLOCK,
-    STATIC_PLANES,
-    solve_rows,
-)
+from gelpolight_core.reconstruction.paper.kernel import BLOCK, STATIC_PLANES
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
@@ -72,16 +68,13 @@ class SlopeField:
         d(depth)/dx and d(depth)/dy.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
-    length_error : (rows, columns) float32
-        | |n| - 1 | of the solved normal, a check that costs little; 0 outside.
 
-    Maps that were not requested have size 0.
+    Slopes that were not requested have size 0.
     """
 
     slope_x: Map
     slope_y: Map
     flags: NDArray[np.uint8]
-    length_error: Map
 
 
 class SlopeSolver:
@@ -111,25 +104,6 @@ class SlopeSolver:
         self._take = Buffers().take
         self._lock = Lock()
 
-    def solve(self, raw: NDArray[Any], *, gain: Gain | None = None) -> SlopeField:
-        """Return the slopes of the depth.
-
-        Parameters
-        ----------
-        raw : (height, width, 3) uint8, uint16 or float32
-            Raw image in RGB order; float images are 0..1.
-        gain : (3,), optional
-            Light of each channel over that at calibration.
-        """
-        slope_x, slope_y, length = (np.empty(self._shape, np.float32) for _ in range(3))
-        flags = np.empty(self._shape, np.uint8)
-        with self._lock:
-            image, sensor = self._of_image(raw, gain)
-            self._workers.run(
-                self._shape[0], solve_rows, image, sensor, slope_x, slope_y, flags, length
-            )
-        return SlopeField(slope_x, slope_y, flags, length)
-
     def divergence(
         self,
         raw: NDArray[Any],
@@ -140,20 +114,17 @@ class SlopeSolver:
     ) -> tuple[Map, SlopeField]:
         """Return the divergence of the slopes for `solver`, and the slopes if requested.
 
-        One pass, which is quicker than :meth:`solve` and :meth:`PoissonSolver.integrate`.
-
         Parameters
         ----------
         raw : (height, width, 3) uint8, uint16 or float32
-            As in :meth:`solve`.
+            Raw image in RGB order; float images are 0..1.
         solver : PoissonSolver
             Of the same grid, in single precision.
         slopes : bool, optional
-            Whether the slopes are returned, too; the error of the length is not computed.
+            Whether the slopes are returned, too.
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
-        none = np.empty((0, 0), np.float32)
         shape = self._shape if slopes else (0, 0)
         slope_x, slope_y = np.empty(shape, np.float32), np.empty(shape, np.float32)
         flags = np.empty(self._shape, np.uint8)
@@ -173,7 +144,7 @@ class SlopeSolver:
                 flags,
                 field,
             )
-        return field, SlopeField(slope_x, slope_y, flags, none)
+        return field, SlopeField(slope_x, slope_y, flags)
 
     def _of_image(
         self, raw: NDArray[Any], gain: Gain | None
@@ -211,21 +182,6 @@ class SlopeSolver:
         return np.ndarray((height * width,), np.uint64, words, strides=(4,))
 
 
-def solve_slopes(raw: NDArray[Any], maps: ShadingMaps, *, workers: int = 1) -> SlopeField:
-    """Solve one image; for many of one sensor make a :class:`SlopeSolver`.
-
-    Parameters
-    ----------
-    raw : (height, width, 3) uint8, uint16 or float32
-        Raw image in RGB order; float images are 0..1.
-    maps : ShadingMaps
-        The calibration.
-    workers : int, optional
-        Threads.
-    """
-    return SlopeSolver(maps, RowWorkers(workers)).solve(raw)
-
-
 def _blocks(maps: ShadingMaps) -> tuple[Map, NDArray[np.bool_]]:
     """Return pixels and gains, block by block, and which blocks have usable nodes.
 
@@ -249,19 +205,3 @@ def _steps(lookup: Map) -> NDArray[np.uint64]:
     both[..., 0] = lookup
     both[:, :-1, 1] = np.diff(lookup, axis=1)
     return both.view(np.uint64).ravel()
-
-
-def normals_from_slopes(slope_x: Map, slope_y: Map) -> Map:
-    """Return unit normals (rows, columns, 3) towards the camera (z < 0), sensor frame.
-
-    Parameters
-    ----------
-    slope_x, slope_y : (rows, columns) float32
-        d(depth)/dx and d(depth)/dy.
-    """
-    normals = np.empty((*slope_x.shape, 3), dtype=np.float32)
-    scale = -1.0 / np.sqrt(1.0 + slope_x**2 + slope_y**2)
-    normals[..., 0] = slope_x * scale
-    normals[..., 1] = slope_y * scale
-    normals[..., 2] = scale
-    return normals

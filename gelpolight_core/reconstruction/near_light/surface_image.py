@@ -1,0 +1,101 @@
+"""The image of a surface by the full model: direct light, shadows, interreflection, crosstalk.
+
+Nothing of it comes from an image: the light that the membrane reflects onto itself follows from the
+light that falls on it.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.masks import LEAST_LIGHT
+from gelpolight_core.reconstruction.height_map import (
+    HeightMap,
+    normals_from_slopes,
+    surface_slopes,
+)
+from gelpolight_core.reconstruction.near_light.from_around import CLEAR, FromAround, meeting
+from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, brightness
+from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.solver import thinned
+from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.sensor_calibration import FullModel
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+BOUNCES = 3
+"""Rounds of interreflection: each adds light that was reflected once more."""
+
+
+def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, step: int) -> Map:
+    """Return the brightness of a surface over that of the flat membrane (rows, columns, 3).
+
+    Parameters
+    ----------
+    height_map : HeightMap
+        At true positions.
+    maps : SensorMaps
+        The sensor's.
+    around : FromAround
+        Light and shadows of its membrane on itself.
+    step : int
+        Nodes of the grid to a node of the image.
+    """
+    at, calibration, scale = thinned(step), maps.calibration, maps.scale(COARSE)
+    grid, flat = calibration.table.grid, np.moveaxis(maps.scale(1).flat, 0, -1)
+    rows, columns = scale.kind.shape
+    x, y = (
+        first + scale.pitch_mm * np.arange(n)
+        for first, n in ((scale.x_mm, columns), (scale.y_mm, rows))
+    )
+    rays = np.moveaxis(scale.rays[:2], 0, -1)
+    depth, normals, direct = _lit(height_map, maps.full, x, y, rays, COARSE)
+    coarse = np.moveaxis(direct, -1, 0) / scale.flat
+    reflected, clear = np.zeros_like(coarse), np.full_like(coarse, 2.0 * CLEAR)
+    # Without interreflection, one round finds the shadows.
+    for _ in range(BOUNCES if maps.membrane.interreflection is not None else 1):
+        lit = np.where(clear < CLEAR, 0.0, coarse) + reflected
+        reflected, clear = around.on(
+            Region((0, 0), (rows, columns)),
+            np.asarray(lit, np.float32),
+            (depth, normals[..., 0], normals[..., 1]),
+            maps.full.membrane.interreflection,
+        )
+    x, y = grid.x_mm[at[1]], grid.y_mm[at[0]]
+    rays = np.nan_to_num(calibration.table.ray_slope[at])
+    _, _, direct = _lit(height_map, maps.full, x, y, rays, step)
+    column, row = np.meshgrid((x - scale.x_mm) / scale.pitch_mm, (y - scale.y_mm) / scale.pitch_mm)
+    place = np.asarray(column, np.float32), np.asarray(row, np.float32)
+    planes = (
+        np.stack([cv2.remap(plane, *place, cv2.INTER_LINEAR) for plane in source], axis=-1)
+        for source in (reflected, clear)
+    )
+    reflected_here, clear_here = planes
+    ratio = np.where(clear_here < CLEAR, 0.0, direct / flat[at]) + reflected_here
+    background = maps.full.background[at]
+    crosstalk = calibration.crosstalk.T
+    image = (background * ratio) @ crosstalk / np.maximum(background @ crosstalk, LEAST_LIGHT)
+    return np.asarray(np.where(maps.usable[at][..., None], image, np.nan), np.float32)
+
+
+def _lit(
+    height_map: HeightMap, full: FullModel, x_mm: Array, y_mm: Array, ray_slope: Map, step: int
+) -> tuple[Map, Map, Array]:
+    """Return depth, normals and direct light of the surface that the rays of flat nodes meet."""
+    pitch = height_map.pitch_mm
+    axes = (x_mm - height_map.x_mm[0]) / pitch, (y_mm - height_map.y_mm[0]) / pitch
+    home = np.asarray(np.stack(np.meshgrid(*axes)), np.float32)
+    per_depth = np.asarray(np.moveaxis(ray_slope, -1, 0) / pitch, np.float32)
+    place = meeting(height_map.depth_mm, home, per_depth)
+    slopes = surface_slopes(height_map.depth_mm, pitch, step=step)
+    depth, slope_x, slope_y = (
+        np.asarray(cv2.remap(values, place[0], place[1], cv2.INTER_LINEAR), np.float32)
+        for values in (height_map.depth_mm, *slopes)
+    )
+    normals = normals_from_slopes(slope_x, slope_y)
+    flat = np.dstack([*np.meshgrid(x_mm, y_mm), np.zeros(depth.shape)])
+    points = flat + depth[..., None] * np.dstack([ray_slope, -np.ones(depth.shape)])
+    view = view_directions(np.asarray(ray_slope, np.float64))
+    return depth, normals, brightness(full, points, normals, view)

@@ -1,0 +1,235 @@
+"""What every model does: the depth of a frame, the image of a surface, and what a frame needs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.health.check import HealthCheck
+from gelpolight_core.health.expected import raw_background
+from gelpolight_core.health.finding import Health, LightGain
+from gelpolight_core.masks import LEAST_LIGHT, SATURATED
+from gelpolight_core.reconstruction.checks import Notes, condition_notes
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.linear import as_linear, linearised
+from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
+from gelpolight_core.sensor_calibration import MODELS, Calibration
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+Gain = NDArray[np.float64]
+LIGHT = tr("light of the image")
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the caller asks of a solver.
+
+    Attributes
+    ----------
+    effort : str
+        One of `EFFORTS`; only the full model has more than one.
+    terms : Terms
+        What the full model includes.
+    normals, uncertainty : bool
+        Results in addition to the depth. Standard deviations are those of effort ``best``.
+    everywhere : bool
+        Whether the whole field is solved, without contact detection.
+    light : LightGain or None
+        Change of the light since the calibration, which is undone; None: no change is known.
+    """
+
+    effort: str = "best"
+    terms: Terms = ALL_TERMS
+    normals: bool = True
+    uncertainty: bool = False
+    everywhere: bool = False
+    light: LightGain | None = None
+
+    @property
+    def gain(self) -> Gain | None:
+        """Light of each channel (3,) over that at calibration; None: the same."""
+        return None if self.light is None else self.light.share
+
+    def record(self) -> TraceRecorder:
+        """Return the record of a frame, which begins with its light."""
+        record = TraceRecorder()
+        if self.gain is None:
+            record.left_out(LIGHT, tr("it is as at calibration, or cannot be corrected"))
+        else:
+            record.steps.append(light_step(self.gain))
+        return record
+
+
+@dataclass(frozen=True, slots=True)
+class DepthNoise:
+    """Standard deviations of slopes and depth on the metric grid.
+
+    Attributes
+    ----------
+    slope_sd, depth_sd_mm : (rows, columns) float32
+        Standard deviations from the noise of a single image.
+    slope_model_sd, depth_model_sd_mm : (rows, columns) float32
+        Standard deviations from errors of the model.
+    noise_mm : (examples, rows / 4, columns / 4) float32
+        Examples of depth errors that this noise can cause. Each is a whole map, so that a standard
+        deviation can be computed for every quantity derived from a depth map.
+    """
+
+    slope_sd: Map
+    depth_sd_mm: Map
+    slope_model_sd: Map
+    depth_model_sd_mm: Map
+    noise_mm: Map
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """The reconstruction of a frame, on the grid of the calibration.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float32
+        Indentation.
+    normals : (rows, columns, 3) float32 or None
+        Unit normals, z < 0; None where they were not requested.
+    flags : (rows, columns) uint8
+        Bits of :class:`Flag`.
+    notes : tuple of Note
+        For the user.
+    trace : Trace
+        What was done and what was left out.
+    noise : DepthNoise or None
+        Its uncertainty, if requested.
+    depth_scale_sd, lateral_scale_sd, visible_depth_mm, lateral_per_mm
+        As in :class:`HeightMap`.
+    """
+
+    depth_mm: Map
+    normals: Map | None
+    flags: NDArray[np.uint8]
+    notes: Notes
+    trace: Trace
+    noise: DepthNoise | None = None
+    depth_scale_sd: float | None = None
+    lateral_scale_sd: float | None = None
+    visible_depth_mm: float | None = None
+    lateral_per_mm: float = 0.0
+
+
+class Solver(Protocol):
+    """Reconstructs the frames of one sensor by one model.
+
+    Frames are (height, width, 3) in RGB: whole numbers as the camera encodes them, floats linear
+    light 0..1. Images of a surface are brightness over that of the untouched membrane, for each
+    channel of the camera, on the calibration's grid: (rows, columns, 3), 1 where nothing is
+    pressed, NaN where it is not known. A node shows what the camera sees there, in the direction
+    of the flat membrane's node.
+
+    Attributes
+    ----------
+    made_for : tuple of str
+        Models of the calibrations that it can use.
+    """
+
+    made_for: ClassVar[tuple[str, ...]]
+
+    @property
+    def visible_mm(self) -> float | None:
+        """Smallest depth of a flat face that is visible above the noise; None: not known."""
+
+    def __init__(self, calibration: Any, *, workers: int) -> None: ...
+
+    @staticmethod
+    def refuse_unfit(calibration: Any) -> None:
+        """Refuse a calibration that the model cannot use."""
+
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health | None:
+        """Return the faults of a frame, as :meth:`HealthCheck.check`; None: nothing is known."""
+
+    def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
+        """Reconstruct a frame."""
+
+    def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
+        """Return which steps a frame needs, and why the others are left out."""
+
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
+        """Return the image of a surface, at the nodes of :func:`thinned`."""
+
+    def residual(
+        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
+    ) -> Map:
+        """Return a frame's image minus :meth:`predict`, as far as the model knows the image."""
+
+
+class OpenSolver(ABC):
+    """What the models of open sensors share.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The sensor's.
+    leds_mm : (3, 3)
+        LED positions that the model uses.
+    known : (rows, columns) bool
+        Nodes that it can solve.
+    """
+
+    made_for: ClassVar[tuple[str, ...]] = MODELS
+
+    def __init__(
+        self, calibration: Calibration, leds_mm: NDArray[np.float64], known: NDArray[np.bool_]
+    ) -> None:
+        self.calibration = calibration
+        self._known = known
+        self._condition_notes = condition_notes(calibration, leds_mm)
+
+    @cached_property
+    def _health(self) -> HealthCheck:
+        return HealthCheck(self.calibration)
+
+    @cached_property
+    def _background(self) -> Map:
+        return raw_background(self.calibration)
+
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
+        """Return the faults of a frame; see :meth:`HealthCheck.check`."""
+        return self._health.check(frame, whole=whole)
+
+    @abstractmethod
+    def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
+        """Return the image of a surface; see :class:`Solver`."""
+
+    def residual(
+        self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
+    ) -> Map:
+        """Return a frame over the background minus the image of a surface; see :class:`Solver`."""
+        table, at = self.calibration.table, thinned(step)
+        linear = as_linear(linearised(frame, self.calibration.response))
+        seen = cv2.remap(linear, table.u_px, table.v_px, cv2.INTER_LINEAR)
+        background = self._background * np.asarray(1.0 if gain is None else gain, np.float32)
+        known = self._known[..., None] & (seen < SATURATED) & (self._background > LEAST_LIGHT)
+        ratio = np.where(known, seen / np.maximum(background, LEAST_LIGHT), np.float32(1.0))
+        # A node of the thinned grid represents its neighbours, and so does its brightness.
+        averaged = cv2.blur(ratio, (step, step)) if step > 1 else ratio
+        left = averaged[at] - self.predict(height_map, step=step)
+        return np.asarray(np.where(known[at], left, np.nan), np.float32)
+
+
+def thinned(step: int) -> tuple[slice, slice]:
+    """Return every `step`-th node along both axes, from the middle of the first block."""
+    return np.s_[step // 2 :: step, step // 2 :: step]
+
+
+def light_step(gain: Gain) -> TraceStep:
+    """Return the trace step about a light (3,), over that at calibration, that is corrected."""
+    shares = ", ".join(f"{share:.4f}" for share in gain)
+    reason = tr("red, green and blue are {shares} of those at calibration, which is corrected")
+    return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)
