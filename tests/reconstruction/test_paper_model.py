@@ -9,13 +9,12 @@ from reference.plain_paper import plain_depth, plain_slopes
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.paper.depth import PaperSolver
-from gelpolight_core.reconstruction.paper.model import SlopeField
+from gelpolight_core.reconstruction.paper.depth import PaperSolver, SlopeField
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 CALIBRATION = scene.calibration()
 SOLVER = PaperSolver(CALIBRATION, workers=1)
-MAPS = SOLVER.maps
+TABLE = CALIBRATION.table
 
 
 def solved(raw: np.ndarray) -> SlopeField:
@@ -67,7 +66,7 @@ def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
     assert (field.flags & int(Flag.DARK)).any()
     near = np.zeros_like(touched)
     for v, u in ((100, 120), (101, 140), (130, 160), (80, 150), (60, 170)):
-        near |= (np.abs(MAPS.v_px - v) < 1.001) & (np.abs(MAPS.u_px - u) < 1.001)
+        near |= (np.abs(TABLE.v_px - v) < 1.001) & (np.abs(TABLE.u_px - u) < 1.001)
     np.testing.assert_array_equal(field.slope_x[~near], clean.slope_x[~near])
     assert np.isfinite(Reconstructor(CALIBRATION).depth(bad).depth_mm).all()
 

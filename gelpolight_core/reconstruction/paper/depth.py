@@ -1,15 +1,23 @@
-"""From one image to depth by the paper's model: slopes, their divergence, integration."""
+"""From one image to depth by the paper's model: slopes (Eq. 10), their divergence, integration.
+
+Resampling, division by light and factor, the reflectance table and the 3x3 solve are done block by
+block of nodes, so that each byte of the image is read once. Lights are those of the flat membrane.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.masks import usable
+from gelpolight_core.masks import SATURATED, usable
+from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
     NearBoundary,
     fixed_boundary_note,
@@ -26,12 +34,10 @@ from gelpolight_core.reconstruction.height_map import (
 )
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linear import linearised
-from gelpolight_core.reconstruction.paper.kernel import blank_rows
-from gelpolight_core.reconstruction.paper.model import (
-    ShadingMaps,
-    SlopeSolver,
-)
+from gelpolight_core.reconstruction.paper.divergence import paper_divergence_rows
+from gelpolight_core.reconstruction.paper.kernel import BLOCK, STATIC_PLANES, blank_rows
 from gelpolight_core.reconstruction.solver import (
+    Gain,
     OpenSolver,
     Solved,
     Wanted,
@@ -64,11 +70,10 @@ class PaperSolver(OpenSolver):
     def __init__(self, calibration: Calibration, *, workers: int) -> None:
         known = usable(calibration.table.valid, calibration.radiance, calibration.factors)
         super().__init__(calibration, calibration.led_positions_mm, known)
-        self.maps = shading_maps(calibration)
         grid = calibration.table.grid
         self.integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
         self._threads = RowWorkers(workers)
-        self.slopes = SlopeSolver(self.maps, self._threads)
+        self.slopes = SlopeSolver(calibration, known, self._threads)
 
     @staticmethod
     def refuse_unfit(calibration: Calibration) -> None:
@@ -153,26 +158,160 @@ class PaperSolver(OpenSolver):
         )
 
 
-def shading_maps(calibration: Calibration) -> ShadingMaps:
-    """Return the maps of a calibration in the form for the fused pass."""
+@dataclass(frozen=True, slots=True)
+class SlopeField:
+    """Slopes of the depth, with the flags of each node.
+
+    Attributes
+    ----------
+    slope_x, slope_y : (rows, columns) float32
+        d(depth)/dx and d(depth)/dy.
+    flags : (rows, columns) uint8
+        Bits of :class:`Flag`.
+
+    Slopes that were not requested have size 0.
+    """
+
+    slope_x: Map
+    slope_y: Map
+    flags: NDArray[np.uint8]
+
+
+class SlopeSolver:
+    """Solves Eq. (10) for images of one sensor; constant data are prepared once.
+
+    Several threads can call it; they then wait for each other.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The sensor's.
+    known : (rows, columns) bool
+        Nodes that can be solved.
+    workers : RowWorkers
+        Threads; each takes blocks of rows, so that the result does not depend on their number.
+    """
+
+    def __init__(
+        self, calibration: Calibration, known: NDArray[np.bool_], workers: RowWorkers
+    ) -> None:
+        grid = calibration.table.grid
+        self._shape = grid.shape
+        self._static, self._lit = _blocks(calibration, known)
+        lookup, self._scale = calibration.reflectance.lookup(LOOKUP_SIZE)
+        self._table = _steps(lookup)
+        coverage = calibration.reflectance.coverage.astype(np.float32)
+        self._coverage = tuple((low, high) for low, high in coverage)
+        self._leds = tuple(tuple(led) for led in calibration.led_positions_mm.astype(np.float32))
+        x_mm = grid.x_mm.astype(np.float32)
+        self._x_first = float(x_mm[0])
+        self._pitch = float(x_mm[-1] - x_mm[0]) / max(x_mm.size - 1, 1)
+        self._y_mm = np.ascontiguousarray(grid.y_mm, np.float32)
+        self._workers = workers
+        self._take = Buffers().take
+        self._lock = Lock()
+
+    def divergence(
+        self,
+        raw: NDArray[Any],
+        solver: PoissonSolver,
+        *,
+        slopes: bool = False,
+        gain: Gain | None = None,
+    ) -> tuple[Map, SlopeField]:
+        """Return the divergence of the slopes for `solver`, and the slopes if requested.
+
+        Parameters
+        ----------
+        raw : (height, width, 3) uint8, uint16 or float32
+            Raw image in RGB order; float images are 0..1.
+        solver : PoissonSolver
+            Of the same grid, in single precision.
+        slopes : bool, optional
+            Whether the slopes are returned, too.
+        gain : (3,), optional
+            Light of each channel over that at calibration.
+        """
+        shape = self._shape if slopes else (0, 0)
+        slope_x, slope_y = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        flags = np.empty(self._shape, np.uint8)
+        edges = solver.edges
+        field = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
+        with self._lock:
+            self._workers.run(
+                len(field),
+                paper_divergence_rows,
+                *self._of_image(raw, gain),
+                (edges.start_x, edges.weight_x, edges.start_y, edges.weight_y),
+                edges.top,
+                edges.left,
+                slopes,
+                slope_x,
+                slope_y,
+                flags,
+                field,
+            )
+        return field, SlopeField(slope_x, slope_y, flags)
+
+    def _of_image(
+        self, raw: NDArray[Any], gain: Gain | None
+    ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """Return an image and the sensor in the form for the kernels."""
+        height, width = raw.shape[:2]
+        # numba would compile the kernel a second time for a read-only array.
+        raw = np.require(raw, requirements=["C", "W"])
+        full_scale = np.float32(1.0 if raw.dtype.kind == "f" else np.iinfo(raw.dtype).max)
+        pairs = self._pairs(raw) if raw.dtype == np.uint8 and width > 1 else None
+        limit = np.float32(SATURATED) * full_scale
+        scale = self._scale if gain is None else (self._scale / gain).astype(np.float32)
+        sensor = (
+            self._static,
+            self._lit,
+            self._table,
+            tuple(scale / full_scale),
+            self._coverage,
+            self._leds,
+            self._x_first,
+            self._pitch,
+            self._y_mm,
+        )
+        return (raw.reshape(-1, 3), pairs, width, height, limit), sensor
+
+    def _pairs(self, raw: NDArray[np.uint8]) -> NDArray[np.uint64]:
+        """Return (pixels,): of each pixel its three bytes and those of its right neighbour.
+
+        The words overlap, as each neighbour has its own.
+        """
+        height, width = raw.shape[:2]
+        words = self._take("words", (height * width + 1,), np.uint32)
+        pixels = words[:-1].view(np.uint8).reshape(height, width, 4)
+        cv2.cvtColor(raw, cv2.COLOR_RGB2RGBA, dst=pixels)
+        return np.ndarray((height * width,), np.uint64, words, strides=(4,))
+
+
+def _blocks(calibration: Calibration, known: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
+    """Return pixels and gains 1 / (rho |L|), block by block, and which blocks have known nodes.
+
+    Unknown nodes have gain 0.
+    """
     table = calibration.table
+    rows, columns = table.u_px.shape
+    count = -(-columns // BLOCK)
     strength = calibration.radiance * calibration.factors
-    known = usable(table.valid, calibration.radiance, calibration.factors)
-    gain = np.zeros_like(strength)
-    gain[known] = 1.0 / strength[known]
-    lookup, scale = calibration.reflectance.lookup(LOOKUP_SIZE)
+    planes = np.zeros((STATIC_PLANES, rows, count * BLOCK), np.float32)
+    seen = known & (table.u_px >= 0.0) & (table.v_px >= 0.0)
+    for plane, source in enumerate((table.u_px, table.v_px, *np.moveaxis(strength, 2, 0))):
+        values = source[seen]
+        planes[plane, :, :columns][seen] = values if plane < 2 else 1.0 / values
+    parted = planes.reshape(STATIC_PLANES, rows, count, BLOCK).transpose(1, 2, 0, 3)
+    lit = np.asarray((parted[:, :, 2] > 0.0).any(axis=2), np.bool_)
+    static = np.ascontiguousarray(parted, np.float32)
+    return static.reshape(rows, count, STATIC_PLANES * BLOCK), lit
 
-    def single(array: NDArray[Any]) -> NDArray[np.float32]:
-        return np.ascontiguousarray(array, dtype=np.float32)
 
-    return ShadingMaps(
-        table.u_px,
-        table.v_px,
-        single(gain),
-        lookup,
-        scale,
-        single(calibration.reflectance.coverage),
-        single(calibration.led_positions_mm),
-        single(table.grid.x_mm),
-        single(table.grid.y_mm),
-    )
+def _steps(lookup: Map) -> NDArray[np.uint64]:
+    """Return (3 * size,): of each entry its cosine and the step to the next, half a word each."""
+    both = np.zeros((*lookup.shape, 2), np.float32)
+    both[..., 0] = lookup
+    both[:, :-1, 1] = np.diff(lookup, axis=1)
+    return both.view(np.uint64).ravel()
