@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -58,7 +58,7 @@ class InPlaceSolver:
         Threads; results do not depend on their number.
     """
 
-    made_for = (MODEL,)
+    made_for: ClassVar[tuple[str, ...]] = (MODEL,)
     visible_mm = None
 
     def __init__(self, calibration: InPlaceCalibration, *, workers: int = 2) -> None:

@@ -47,12 +47,12 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
     grid, flat = calibration.table.grid, np.moveaxis(maps.scale(1).flat, 0, -1)
     rows, columns = scale.kind.shape
     x, y = (
-        first + scale.pitch_mm * np.arange(n)
+        first + scale.pitch_mm * np.arange(float(n))
         for first, n in ((scale.x_mm, columns), (scale.y_mm, rows))
     )
     rays = np.moveaxis(scale.rays[:2], 0, -1)
     depth, normals, direct = _lit(height_map, maps.full, x, y, rays, COARSE)
-    coarse = np.moveaxis(direct, -1, 0) / scale.flat
+    coarse = np.asarray(np.moveaxis(direct, -1, 0) / scale.flat, np.float32)
     reflected, clear = np.zeros_like(coarse), np.full_like(coarse, 2.0 * CLEAR)
     # Without interreflection, one round finds the shadows.
     for _ in range(BOUNCES if maps.membrane.interreflection is not None else 1):
@@ -65,7 +65,7 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
         )
     x, y = grid.x_mm[at[1]], grid.y_mm[at[0]]
     rays = np.nan_to_num(calibration.table.ray_slope[at])
-    _, _, direct = _lit(height_map, maps.full, x, y, rays, step)
+    _, _, fine = _lit(height_map, maps.full, x, y, rays, step)
     column, row = np.meshgrid((x - scale.x_mm) / scale.pitch_mm, (y - scale.y_mm) / scale.pitch_mm)
     place = np.asarray(column, np.float32), np.asarray(row, np.float32)
     planes = (
@@ -73,7 +73,7 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
         for source in (reflected, clear)
     )
     reflected_here, clear_here = planes
-    ratio = np.where(clear_here < CLEAR, 0.0, direct / flat[at]) + reflected_here
+    ratio = np.where(clear_here < CLEAR, 0.0, fine / flat[at]) + reflected_here
     background = maps.full.background[at]
     crosstalk = calibration.crosstalk.T
     image = (background * ratio) @ crosstalk / np.maximum(background @ crosstalk, LEAST_LIGHT)
@@ -98,4 +98,4 @@ def _lit(
     flat = np.dstack([*np.meshgrid(x_mm, y_mm), np.zeros(depth.shape)])
     points = flat + depth[..., None] * np.dstack([ray_slope, -np.ones(depth.shape)])
     view = view_directions(np.asarray(ray_slope, np.float64))
-    return depth, normals, brightness(full, points, normals, view)
+    return depth, normals, brightness(full, points, normals.astype(np.float64), view)
