@@ -16,7 +16,6 @@ from app.live.overlay import Overlay
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -42,10 +41,7 @@ def detect_background(
         compared = whiteboard is not None and whiteboard.shape == rgb.shape
         good = tr("The membrane is well lit and nothing touches it.")
         if not compared:
-            good = tr(
-                "The membrane is well lit. Contact can be checked once the whiteboard has been "
-                "captured."
-            )
+            good = tr("The membrane is well lit. Make sure nothing touches it, then click Capture.")
         marks = Overlay(
             lines=circle.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
         )
@@ -62,7 +58,10 @@ class BackgroundStep(ImageStep):
         "background",
         tr("Background"),
         (Stage.BACKGROUND,),
-        tr("Mount the membrane. Nothing must touch it. Do not change the exposure or the light."),
+        tr(
+            "The membrane is in place, and nothing touches it. Switch automatic exposure and white "
+            "balance off, and do not change the exposure or the light afterwards."
+        ),
         "membrane",
         frames=16,
         wanted=1,
@@ -72,12 +71,12 @@ class BackgroundStep(ImageStep):
         """Return the check of the bare membrane."""
         project = self.model.project
         known = KnownImage(project.session.found(FOLDERS[Stage.RADIANCE]))
-        return partial(_check, table=project.results.table, known=known)
+        return partial(_check, table=getattr(project.results, "table", None), known=known)
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the reflectance factor of each LED."""
         results = self.model.project.results
-        found, table = results.factors, results.table
+        found, table = (getattr(results, name, None) for name in ("factors", "table"))
         if found is None or table is None:
             return ()
         return three_maps(found.factors, found.usable, table.grid, tr("Reflectance factor"))
@@ -85,32 +84,3 @@ class BackgroundStep(ImageStep):
 
 def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detection:
     return or_refusal(lambda: detect_background(rgb, table=table, whiteboard=known.rgb))
-
-
-class ClosedBackgroundStep(ImageStep):
-    """Checks that the membrane is well lit."""
-
-    step = Step(
-        "background",
-        tr("Background"),
-        (Stage.BACKGROUND,),
-        tr(
-            "Nothing must touch the membrane. Switch automatic exposure and white balance "
-            "off, and do not change the exposure or the light afterwards."
-        ),
-        "membrane",
-        frames=16,
-        wanted=1,
-    )
-
-    def detector(self, name: str) -> Detector:
-        """Return the check of the light; without other images contact cannot be seen."""
-        return _check_light
-
-
-def _check_light(rgb: Rgb) -> Detection:
-    found = detect_background(rgb)
-    if not found.ready or QualityTable(found.figures).verdict is not Verdict.PASS:
-        return found
-    text = tr("The membrane is well lit. Make sure nothing touches it, then click Capture.")
-    return replace(found, sentence=text, warns=True)  # contact cannot be seen

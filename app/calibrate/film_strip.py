@@ -97,6 +97,7 @@ class FilmStrip(QListWidget):
             self.addItem(item)
             if capture.path.name == keep:
                 self.setCurrentItem(item)
+                self.scrollToItem(item)
         self.blockSignals(False)
 
     @property

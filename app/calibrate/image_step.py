@@ -182,7 +182,8 @@ class ImageStep(StepPresenter):
         if not force and _same(armed, self._armed):
             return
         self._armed = armed
-        self.model.live_detection.set_detector(None if name else self.detector(""))
+        foreign = self.model.camera_fault(ask=False)
+        self.model.live_detection.set_detector(None if name or foreign else self.detector(""))
         if name:
             self._detect_again(name)
 

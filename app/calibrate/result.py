@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,15 @@ from PySide6.QtWidgets import (
 )
 
 from app.calibrate.model import WizardModel
-from app.calibrate.states import RUNNING, is_done, state_icon, state_meaning, state_word
+from app.calibrate.states import (
+    RUNNING,
+    StepState,
+    is_done,
+    state_icon,
+    state_meaning,
+    state_word,
+    step_state,
+)
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from app.context.context import AppContext
@@ -321,6 +330,12 @@ class ResultStep(StepPresenter):
     def focus(self) -> QWidget:
         """Return the Save button."""
         return self.view.save
+
+    def state(self) -> StepState:
+        """Return the state of the last stage."""
+        last = (self.step.stages or tuple(self.model.statuses))[-1:]
+        step = replace(self.step, stages=last)
+        return step_state(step, self.model.statuses, self.model.running, count=0)
 
     def is_finished(self, state: str) -> bool:
         """Return whether the present captures are saved as a calibration."""

@@ -41,6 +41,10 @@ class SetupStep(StepPresenter):
         """The form."""
         return self.form
 
+    def state(self) -> StepState:
+        """Return whether what is stated can be used: a session is created with all values."""
+        return super().state() if self.step.stages else ("pass", tr("Stated"))
+
     def focus(self) -> QWidget:
         """Return the first value."""
         return self.form.first
@@ -76,19 +80,3 @@ class SetupStep(StepPresenter):
         self.form.show_session(project.session, new=False)
         text = tr("Applied. The stages that depend on these values are computed again.")
         self.panel.show_notice(text, "pass")
-
-
-class ClosedSetupStep(SetupStep):
-    """Shows the form of a closed sensor."""
-
-    step = Step(
-        "setup",
-        tr("Set-up"),
-        (),
-        tr("State the scale and the ball diameter. Both scale the result."),
-        "complete",
-    )
-
-    def state(self) -> StepState:
-        """Return that nothing is missing: a session is created with all values."""
-        return "pass", tr("Stated")

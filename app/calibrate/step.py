@@ -78,7 +78,8 @@ class StepPresenter(QObject):
 
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts.area)
-        self.step = self.describe()
+        described = self.describe()
+        self.step = next((s for s in parts.steps if s.key == described.key), described)
         self.model, self.context = parts.model, parts.context
         self.area, self.panel = parts.area, parts.panel
 
@@ -171,8 +172,9 @@ class StepPresenter(QObject):
         if state == RUNNING:
             panel.show_running()
             return
-        stale = bool(stages) and state in (StageState.STALE.value, StageState.WAITING.value)
-        offer = stale and not self.model.jobs.busy and self.model.project.stale(upto=stages[-1])
+        stale = state in (StageState.STALE.value, StageState.WAITING.value)
+        upto = stages[-1] if stages else None
+        offer = stale and not self.model.jobs.busy and self.model.project.stale(upto=upto)
         finished = self.is_finished(state)
         advance = finished and not panel.finished
         panel.show_state(state, sentence, self.tables(), recompute=bool(offer), finished=finished)
@@ -181,12 +183,12 @@ class StepPresenter(QObject):
             panel.next.setFocus()
 
     def live(self) -> None:
-        """Show the live image."""
+        """Show the live image, unless it is that of another sensor."""
         self.model.show("")
-        stream = self.model.live.stream
-        self.area.show_stream(stream)
-        if stream is None:
-            self.area.view.image.say(no_camera())
+        fault, stream = self.model.camera_fault(ask=False), self.model.live.stream
+        self.area.show_stream(None if fault else stream)
+        if fault or stream is None:
+            self.area.view.image.say(fault or no_camera())
         self.model.live_detection.set_detector(None)
 
     def camera_changed(self) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from app.calibrate.background import BackgroundStep, ClosedBackgroundStep
+from collections.abc import Container
+from dataclasses import replace
+
+from app.calibrate.background import BackgroundStep
 from app.calibrate.balls import BallsStep
 from app.calibrate.closed_balls import ClosedBallsStep
 from app.calibrate.lens import LensStep
@@ -11,12 +14,13 @@ from app.calibrate.radiance import RadianceStep
 from app.calibrate.reflectance.presenter import ReflectanceStep
 from app.calibrate.refraction import RefractionStep
 from app.calibrate.result import ResultStep
-from app.calibrate.setup import ClosedSetupStep, SetupStep
+from app.calibrate.setup import SetupStep
 from app.calibrate.step import StepPresenter
 from app.calibrate.step_data import Step
 from app.calibrate.top_pose import TopPoseStep
-from app.calibrate.validation import ClosedValidationStep, ValidationStep
+from app.calibrate.validation import ValidationStep
 from gelpolight_core.calibration.closed_project import ClosedProject
+from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 
 Route = tuple[type[StepPresenter], ...]
@@ -36,7 +40,7 @@ OPEN_ROUTE: Route = (
 )
 """For a sensor that can be opened."""
 
-CLOSED_ROUTE: Route = (ClosedSetupStep, ClosedBackgroundStep, ClosedBallsStep, ClosedValidationStep)
+CLOSED_ROUTE: Route = (SetupStep, BackgroundStep, ClosedBallsStep, ResultStep, ValidationStep)
 """For a sensor whose membrane is bonded: calibrated in place."""
 
 
@@ -45,6 +49,9 @@ def route_of(project: CalibrationProject | ClosedProject) -> Route:
     return CLOSED_ROUTE if isinstance(project, ClosedProject) else OPEN_ROUTE
 
 
-def steps_of(route: Route) -> tuple[Step, ...]:
-    """Return the data of the steps of a route."""
-    return tuple(presenter.describe() for presenter in route)
+def steps_of(route: Route, having: Container[Stage] | None = None) -> tuple[Step, ...]:
+    """Return the data of the steps of a route, with those of their stages that a session has."""
+    steps = (presenter.describe() for presenter in route)
+    if having is None:
+        return tuple(steps)
+    return tuple(replace(s, stages=tuple(x for x in s.stages if x in having)) for s in steps)

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.calibrate.detection import read_raw
 from app.calibrate.maps import depth_panel
-from app.calibrate.result import ResultView, Saving
 from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
@@ -150,8 +149,10 @@ class ValidationStep(StepPresenter):
 
     def measure(self) -> None:
         """Capture the press, then measure it."""
-        live = self.model.live
-        if live.stream is not None and not live.capturing and self._path is not None:
+        live, fault = self.model.live, self.model.camera_fault()
+        if fault:
+            self._refuse(fault)
+        elif live.stream is not None and not live.capturing and self._path is not None:
             self._drop_trial()
             self.form.say(tr("Capturing: hold the object still."))
             self.form.show_work(0.0)
@@ -301,46 +302,3 @@ def _known_in_folder(path: Path) -> KnownObject | None:
         if row.file == path.name:
             return KnownObject(row.truth.shape, row.truth.size_mm, row.truth.height_mm)
     return None
-
-
-class ClosedValidationStep(ValidationStep):
-    """Shows the figures until the calibration is saved, then the live image."""
-
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
-        self.view = ResultView(parts.steps)
-        self.view.step_wanted.connect(self.step_wanted)
-        self.saving = Saving(self.model, self.view, context=self.context)
-        self._shown = self.centre
-
-    step = Step(
-        "validation",
-        tr("Validation"),
-        (),
-        tr(
-            "Save the calibration. Then press an object of known size into the membrane. The "
-            "calibration is validated only if the measured size is within the limits."
-        ),
-        "indenter",
-    )
-
-    @property
-    def centre(self) -> QWidget:
-        """The figures of an unsaved calibration, or the image."""
-        return self.area if self.model.saved else self.view
-
-    def focus(self) -> QWidget:
-        """Return the Save or the Measure button."""
-        return self.form.measure if self.model.saved else self.view.save
-
-    def enter(self) -> None:
-        """Show the step."""
-        self._shown = self.centre
-        super().enter()
-
-    def refresh(self) -> None:
-        """Show the present figures; a saved calibration shows the image instead."""
-        model = self.model
-        self.view.show_states(model.states, model.statuses, busy=model.jobs.busy, saved=model.saved)
-        if self.centre is not self._shown:
-            self.step_wanted.emit(self.step.key)

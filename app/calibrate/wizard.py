@@ -61,9 +61,10 @@ class Wizard(QMainWindow):
         self.outside = OutsideBar(self.model)
         self.area, self.panel = ImageArea(), StepPanel()
         route = route_of(project)
-        self.step_list = StepList(steps_of(route))
+        steps = steps_of(route, self.model.statuses)
+        self.step_list = StepList(steps)
         self._lay_out()
-        parts = Parts(self.model, context, self.area, self.panel, steps_of(route))
+        parts = Parts(self.model, context, self.area, self.panel, steps)
         self.presenters: tuple[StepPresenter, ...] = tuple(make(parts) for make in route)
         self.open = self.presenters[0]
         for presenter in self.presenters:
