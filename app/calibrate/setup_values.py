@@ -158,7 +158,7 @@ class SetupValues:
             "x, y, width and height in pixels, if the image also shows the housing or mirror "
             "images of the membrane. Empty: the whole image"
         ),
-        example=tr("whole image; or for example 40, 0, 560, 480"),
+        example=tr("such as 40, 0, 560, 480; empty: all"),
         when=lambda v: not v.optics,
     )
 
