@@ -30,7 +30,6 @@ from app.view3d.surface import LIVE_NODES, ColourScale, Surface, surface_of
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import difference, usable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
@@ -240,7 +239,7 @@ class Maker:
         reconstructor = self.best if wanted.still else self.live
         assert reconstructor is not None
         nodes = MISFIT_NODES[wanted.still]
-        return solve_misfit(reconstructor, frame.rgb, heightmap, largest=nodes)
+        return reconstructor.misfit(frame.rgb, heightmap, largest=nodes)
 
     def _steady_top(self, misfit: Map, frame: Frame) -> float:
         known = misfit[np.isfinite(misfit)]

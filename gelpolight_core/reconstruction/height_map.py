@@ -103,7 +103,8 @@ class HeightMap:
         calibration does not state it.
     visible_depth_mm : float or None
         Smallest depth of a pressed flat face that is visible above the noise; a shallower face has
-        depth 0. None for the paper's model, which does not detect contacts.
+        depth 0. None where contacts were not looked for: the paper's model looks for one only in
+        images that show none at first sight.
     trace : Trace or None
         Which steps were done, and why the others were left out.
     faults : tuple of str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -201,6 +201,36 @@ class Reconstructor:
             self._accepted(frame, height_map.source), height_map, gain, step=step
         )
 
+    def misfit(
+        self, frame: NDArray[Any], height_map: HeightMap, *, largest: int = 200
+    ) -> NDArray[np.float32]:
+        """Return how far a raw frame is from the image of its surface.
+
+        Parameters
+        ----------
+        frame, height_map
+            As in :meth:`residual`.
+        largest : int, optional
+            Most nodes per side.
+
+        Returns
+        -------
+        (rows, columns) float32
+            Root mean square of :meth:`residual` over the channels, on a thinned grid; NaN where no
+            channel is known.
+
+        Raises
+        ------
+        InputError
+            As in :meth:`depth`.
+        """
+        step = max(-(-max(height_map.depth_mm.shape) // largest), 1)
+        left = self.residual(frame, height_map, step=step)
+        known = np.isfinite(left)
+        count = np.where(known.any(axis=-1), known.sum(axis=-1), np.nan)
+        square = (np.where(known, left, 0.0) ** 2).sum(axis=-1)
+        return np.asarray(np.sqrt(square / count), np.float32)
+
     def depth(
         self,
         frame: NDArray[Any],
@@ -267,8 +297,10 @@ class Reconstructor:
     def _wanted(
         self, health: Health | None, *, normals: bool = True, uncertainty: bool = False
     ) -> Wanted:
-        light = None if health is None else health.light
-        return Wanted(self.effort, self.terms, normals, uncertainty, light=light)
+        wanted = Wanted(self.effort, self.terms, normals, uncertainty)
+        if health is None:
+            return wanted
+        return replace(wanted, light=health.light, untouched=health.untouched == 1.0)
 
     def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
         """Return the faults of a frame, each with cause and remedy.

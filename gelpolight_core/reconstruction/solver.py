@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
@@ -18,7 +18,9 @@ from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reconstruction.checks import Notes, condition_notes
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.linear import as_linear, linearised
+from gelpolight_core.reconstruction.near_light.contact import ContactFinder, contact_finder
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.translation import tr
@@ -26,6 +28,9 @@ from gelpolight_core.translation import tr
 Map = NDArray[np.float32]
 Gain = NDArray[np.float64]
 LIGHT = tr("light of the image")
+LOOKING = tr("contact detection")
+INTEGRATION = tr("integration")
+NOTHING_PRESSED = tr("nothing is pressed into the membrane")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +49,9 @@ class Wanted:
         Whether the whole field is solved, without contact detection.
     light : LightGain or None
         Change of the light since the calibration, which is undone; None: no change is known.
+    untouched : bool
+        Whether the health check found the whole field as at calibration: only then does a solver
+        that solves no region spend time to look for a contact.
     """
 
     effort: str = "best"
@@ -52,6 +60,7 @@ class Wanted:
     uncertainty: bool = False
     everywhere: bool = False
     light: LightGain | None = None
+    untouched: bool = False
 
     @property
     def gain(self) -> Gain | None:
@@ -180,14 +189,22 @@ class OpenSolver(ABC):
         LED positions that the model uses.
     known : (rows, columns) bool
         Nodes that it can solve.
+    workers : int
+        Threads.
     """
 
     made_for: ClassVar[tuple[str, ...]] = MODELS
 
     def __init__(
-        self, calibration: Calibration, leds_mm: NDArray[np.float64], known: NDArray[np.bool_]
+        self,
+        calibration: Calibration,
+        leds_mm: NDArray[np.float64],
+        known: NDArray[np.bool_],
+        workers: int,
     ) -> None:
         self.calibration = calibration
+        self.workers = RowWorkers(workers)
+        self._finders: dict[bool, ContactFinder] = {}
         self._known = known
         self._condition_notes = condition_notes(calibration, leds_mm)
 
@@ -198,6 +215,16 @@ class OpenSolver(ABC):
     @cached_property
     def _background(self) -> Map:
         return raw_background(self.calibration)
+
+    def finder(self, linear: bool) -> ContactFinder:
+        """Return what looks for contacts in raw images, or in those of linear light."""
+        full = self.calibration.full
+        assert full is not None
+        straight = linear or self.calibration.response is None
+        if straight not in self._finders:
+            seen = replace(self.calibration, response=None) if straight else self.calibration
+            self._finders[straight] = contact_finder(seen, full)
+        return self._finders[straight]
 
     def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
         """Return the faults of a frame; see :meth:`HealthCheck.check`."""
@@ -223,9 +250,22 @@ class OpenSolver(ABC):
         return np.asarray(np.where(known[at], left, np.nan), np.float32)
 
 
+def unseen_reason(visible_mm: float) -> str:
+    """Return why an image without a contact is not solved."""
+    text = tr("the image equals the background; smallest visible depth {um:.0f} um")
+    return text.format(um=1e3 * visible_mm)
+
+
 def thinned(step: int) -> tuple[slice, slice]:
     """Return every `step`-th node along both axes, from the middle of the first block."""
     return np.s_[step // 2 :: step, step // 2 :: step]
+
+
+def flat_normals(shape: tuple[int, ...]) -> Map:
+    """Return normals (rows, columns, 3) of the flat membrane."""
+    normals = np.zeros((*shape, 3), np.float32)
+    normals[..., 2] = -1.0
+    return normals
 
 
 def light_step(gain: Gain) -> TraceStep:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.integration.poisson import PoissonSolver, integrate_slopes
+from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import MODELS
@@ -100,7 +100,7 @@ def _spoilt(value: float) -> Seen:
     depth, slope_x, slope_y, pitch = bump(240, 320)
     bad = np.random.default_rng(0).random(depth.shape) < 1e-3
     slope_x[bad] = value
-    found = integrate_slopes(slope_x, slope_y, pitch_mm=pitch)
+    found = PoissonSolver(*depth.shape, pitch_mm=pitch).integrate(slope_x, slope_y)
     error = rms_um((found.depth_mm - depth).astype(np.float64))
     counted = found.sanitised_count == np.count_nonzero(bad)
     summary = f"{error:.2f} um RMS; {found.sanitised_count} values counted"
@@ -111,7 +111,7 @@ def _one_steep() -> Seen:
     depth, _, _, pitch = bump(240, 320)
     slope_x = np.zeros_like(depth)
     slope_x[120, 160] = 1e4
-    found = integrate_slopes(slope_x, np.zeros_like(depth), pitch_mm=pitch)
+    found = PoissonSolver(*depth.shape, pitch_mm=pitch).integrate(slope_x, 0.0 * slope_x)
     peak_px = float(np.abs(found.depth_mm).max()) / pitch
     summary = f"a peak of {peak_px:.1f} pixels; {found.clipped_count} value clipped"
     return seen_once(peak_px < 5.0 and found.clipped_count == 1, summary)
@@ -119,8 +119,8 @@ def _one_steep() -> Seen:
 
 def _tiny() -> Seen:
     slope = np.full((64, 64), 1e-42, np.float32)
-    deepest = float(np.abs(integrate_slopes(slope, slope, pitch_mm=0.1).depth_mm).max())
-    return seen_once(deepest < 1e-30, f"at most {deepest:.1g} mm")
+    deepest = np.abs(PoissonSolver(64, 64, pitch_mm=0.1).integrate(slope, slope).depth_mm).max()
+    return seen_once(bool(deepest < 1e-30), f"at most {deepest:.1g} mm")
 
 
 def _walled() -> tuple[Map, Map, Map, float]:

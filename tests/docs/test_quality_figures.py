@@ -46,7 +46,7 @@ NOTES = {
     "HELD_DOWN_SHARE": "gelpolight_core/reconstruction/checks.py",
     "MOST_PITCH": "gelpolight_core/reconstruction/checks.py",
     "LEAST_HELD": "gelpolight_core/reconstruction/near_light/boundary.py",
-    "LONGEST_STEP": "gelpolight_core/reconstruction/near_light/rounds.py",
+    "LONGEST_STEP": "gelpolight_core/reconstruction/near_light/region_solver.py",
     "BETTER_SHAPE": "gelpolight_core/measurement/fit_checks.py",
     "GOOD_RESIDUAL": "gelpolight_core/measurement/fit_checks.py",
     "POOR_RESIDUAL": "gelpolight_core/measurement/fit_checks.py",

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.terms import design_rows, position_axes
-from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_image
 
@@ -70,7 +69,7 @@ def test_the_misfit_is_that_of_a_direct_computation(
     for name, frame in (("press", press), ("noise", noise), ("inverted", 255 - press)):
         height_map = reconstructor.depth(frame, normals=False)
         angle_deg, expected = direct(closed_run, frame, height_map)
-        misfit = solve_misfit(reconstructor, frame, height_map, largest=10_000)
+        misfit = reconstructor.misfit(frame, height_map, largest=10_000)
         found = misfit[np.isfinite(misfit)]
         assert found.size == expected.size
         angles[name], misfits[name] = np.mean(angle_deg), np.median(found)

@@ -17,7 +17,7 @@ from gelpolight_core.reconstruction.checks import (
     unanchored_note,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.surface import PressedSurface

@@ -12,7 +12,6 @@ from gelpolight_core.image.response import gamma_response
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder
@@ -91,7 +90,7 @@ def test_a_corrected_image_is_measured_well_and_says_what_was_done(
     assert (share > 0.8).mean() > 0.97
     assert share.mean() > 1.0
     left = [
-        solve_misfit(reconstructor, known.noisy(press.frame * np.float32(share)), heightmap)
+        reconstructor.misfit(known.noisy(press.frame * np.float32(share)), heightmap)
         for share, heightmap in ((1.0, still), (1.03, changed))
     ]
     assert np.nanmean(left[1]) == pytest.approx(np.nanmean(left[0]), rel=0.2)

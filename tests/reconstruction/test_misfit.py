@@ -12,7 +12,6 @@ import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
@@ -90,11 +89,11 @@ def test_a_true_surface_explains_its_image_and_a_false_one_does_not(
 ) -> None:
     reconstruct = Reconstructor(small_calibration, model=model, effort="best")
     heightmap = reconstruct.depth(press, normals=False)
-    true = solve_misfit(reconstruct, press, heightmap, largest=10_000)
+    true = reconstruct.misfit(press, heightmap, largest=10_000)
     assert true.shape == heightmap.depth_mm.shape
     assert np.nanmedian(true) < most
     assert np.isnan(true[heightmap.flags & 1 != 0]).all()
     lying = replace(heightmap, depth_mm=np.zeros_like(heightmap.depth_mm))
-    false = solve_misfit(reconstruct, press, lying, largest=10_000)
+    false = reconstruct.misfit(press, lying, largest=10_000)
     pressed = heightmap.depth_mm > 0.3 * heightmap.depth_mm.max()
     assert np.nanmean(false[pressed]) > 3.0 * np.nanmean(true[pressed])

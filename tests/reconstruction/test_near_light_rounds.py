@@ -9,7 +9,7 @@ from compiled import ShadedField, solve
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.near_light import rounds
+from gelpolight_core.reconstruction.near_light import region_solver as rounds
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.sensor_calibration import FullModel
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -11,10 +13,16 @@ from hypothesis import strategies as st
 
 from gelpolight_core.reconstruction.integration.poisson import (
     SLOPE_LIMIT,
+    Integration,
     PoissonSolver,
     good_length,
-    integrate_slopes,
 )
+
+
+def integrate_slopes(slope_x: np.ndarray, slope_y: np.ndarray, **options: Any) -> Integration:
+    solver = PoissonSolver(*slope_x.shape, dtype=slope_x.dtype, **options)
+    return solver.integrate(slope_x, slope_y)
+
 
 SIZES = st.integers(min_value=1, max_value=43)
 

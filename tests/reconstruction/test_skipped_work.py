@@ -9,6 +9,7 @@ import pytest
 
 from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Cylinder
@@ -36,3 +37,20 @@ def test_skipped_work_changes_the_depth_by_no_more_than_stated(
         wanted = replace(wanted, everywhere=without is EVERYWHERE)
         other = other_solver.depth(frame, wanted).depth_mm
         assert 1e3 * np.abs(usual - other).max() < bound_um
+
+
+@pytest.mark.parametrize(("share", "pressed"), [(0.0, False), (1.0, True)])
+def test_the_papers_model_leaves_out_an_untouched_image_and_no_visible_press(
+    share: float, pressed: bool
+) -> None:
+    known = known_sensor(matt_design(0.25))
+    visible_mm = Reconstructor(known.calibration).visible_depth_mm
+    assert visible_mm is not None
+    frame = known.noisy(known.pressed(Cylinder(4.0, share * visible_mm), samples=1).frame, seed=1)
+    reconstruct = Reconstructor(known.calibration, model="paper")
+    height_map = reconstruct.depth(frame)
+    assert height_map.trace is not None
+    assert ("integration" in height_map.trace.done) is pressed
+    assert ("integration" in reconstruct.needs(frame).done) is pressed
+    assert bool(height_map.depth_mm.any()) is pressed
+    assert height_map.depth_mm.max() == pytest.approx(share * visible_mm, abs=0.015)

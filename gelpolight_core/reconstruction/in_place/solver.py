@@ -21,6 +21,7 @@ from gelpolight_core.reconstruction.in_place.inverse import Inverse, inverse
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.reconstruction.solver import (
+    INTEGRATION,
     DepthNoise,
     Gain,
     Solved,
@@ -44,7 +45,7 @@ NOISE_REACH = 8.0
 STATED_CHANGE = 0.01
 """Change of the light that is stated: images of a closed sensor scatter by less."""
 ONE_MODE = tr("calibration in place has one mode")
-STEPS = (tr("change of colour"), tr("slopes"), tr("integration"))
+STEPS = (tr("change of colour"), tr("slopes"), INTEGRATION)
 
 
 class InPlaceSolver:

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-BLOCK = 64
+from gelpolight_core.reconstruction.compiled import BLOCK, whole
+
 # In decay lengths: the rest, exp(-2 * 12) and exp(-2 * 20), is below the rounding.
 _SETTLED = {np.dtype(np.float32): 12.0, np.dtype(np.float64): 20.0}
-
-_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
 
 
 def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) -> NDArray[np.int64]:
@@ -40,7 +38,7 @@ def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) ->
     return np.asarray(np.ceil(reach), np.int64)
 
 
-@_whole
+@whole
 def solve_columns(first, last, field, waves, settled, scale):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Solve ``-x[i-1] + (2 + wave) x[i] - x[i+1] = scale * field[i]`` in place, block by block.
 

@@ -220,46 +220,6 @@ class PoissonSolver:
         return np.asarray(transform(field, **options))
 
 
-def integrate_slopes(
-    slope_x: FloatArray,
-    slope_y: FloatArray,
-    *,
-    pitch_mm: float,
-    workers: int = 2,
-    stencil: Stencil = 4,
-    slope_limit: float = SLOPE_LIMIT,
-) -> Integration:
-    """Integrate one pair of slope maps; for many of one size make a :class:`PoissonSolver`.
-
-    Parameters
-    ----------
-    slope_x, slope_y : (rows, columns)
-        As in :meth:`PoissonSolver.integrate`; computed in float32 where both are float32, else
-        in float64.
-    pitch_mm, workers, stencil, slope_limit
-        As in :class:`PoissonSolver`.
-
-    Raises
-    ------
-    ValueError
-        If the slopes are not two maps of one shape, or an argument is out of range.
-    """
-    if np.ndim(slope_x) != 2:
-        raise ValueError(f"slopes of shape {np.shape(slope_x)}, expected (rows, columns)")
-    single = np.result_type(slope_x, slope_y) == np.float32
-    rows, columns = np.shape(slope_x)
-    solver = PoissonSolver(
-        rows,
-        columns,
-        pitch_mm=pitch_mm,
-        dtype=np.float32 if single else np.float64,
-        workers=workers,
-        stencil=stencil,
-        slope_limit=slope_limit,
-    )
-    return solver.integrate(slope_x, slope_y)
-
-
 def good_length(length: int) -> int:
     """Return the smallest length, not below `length`, without a prime factor above 5."""
     return int(scipy.fft.next_fast_len(length, real=True))

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.integration.columns import settled_rows, solve_columns
 from gelpolight_core.reconstruction.threads import RowWorkers
 
@@ -29,9 +30,7 @@ SHARED_NODES, SHARED_SUMS = 60_000, 200_000
 _flags = {"nsz", "arcp", "contract", "reassoc"}
 _whole = numba.njit(nogil=True, fastmath=_flags, cache=True)
 _part = numba.njit(nogil=True, fastmath=_flags, cache=True, forceinline=True)
-_single = np.float32
-_0, _HALF, _1 = _single(0.0), _single(0.5), _single(1.0)
-_SHARE = _single(1.0 / 24.0)
+_SHARE = single(1.0 / 24.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +96,11 @@ def integrate_weighted(
     rounds = 0
     while size > wanted and rounds < MAX_ROUNDS:
         along = solve.apply(direction)
-        solve.run(_advance, _single(size / along), direction, solve.image, depth, left)
+        solve.run(_advance, single(size / along), direction, solve.image, depth, left)
         rounds += 1
         better = solve.precondition(left)
         fresh = solve.product(left, better)
-        solve.run(_turn, _single(fresh / size), better, direction)
+        solve.run(_turn, single(fresh / size), better, direction)
         size = fresh
     return WeightedIntegration(depth, rounds, size <= wanted)
 
@@ -132,7 +131,7 @@ class _Solve:
         self._sums = np.empty(rows, np.float64)
         self.image = np.empty(weight.shape, np.float32)
         self.left = np.empty(weight.shape, np.float32)
-        self.run(_flow, slope_x, slope_y, weight, _single(pitch_mm), self.left)
+        self.run(_flow, slope_x, slope_y, weight, single(pitch_mm), self.left)
 
     def run(self, action: Callable[..., object], *arguments: Any) -> None:
         """Run a compiled function over all rows."""
@@ -170,7 +169,7 @@ def _run(
 def _products(first, last, a, b, sums):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     for i in range(first, last):
         p, q = a[i], b[i]
-        part = _0
+        part = ZERO
         for j in range(p.shape[0]):
             part += p[j] * q[j]
         sums[i] = part
@@ -205,10 +204,10 @@ def _integral(a, b, before, after, weight_before, weight_after):  # type: ignore
 
     Nodes without weight are left out.
     """
-    first = _1 if weight_before > _0 else _0
-    second = _1 if weight_after > _0 else _0
+    first = ONE if weight_before > ZERO else ZERO
+    second = ONE if weight_after > ZERO else ZERO
     bend = first * (a + a - b - before) + second * (b + b - a - after)
-    return _HALF * (a + b) + bend * (_SHARE if first * second > _0 else _SHARE + _SHARE)
+    return HALF * (a + b) + bend * (_SHARE if first * second > ZERO else _SHARE + _SHARE)
 
 
 @_part
@@ -223,7 +222,7 @@ def _down(i, slope, weight, edge):  # type: ignore[no-untyped-def]  # pragma: no
             edge[j] = own * _integral(a[j], b[j], c[j], d[j], x[j], y[j])
     else:
         for j in range(columns):
-            edge[j] = _HALF * (a[j] + b[j]) * _least(w[j], v[j])
+            edge[j] = HALF * (a[j] + b[j]) * _least(w[j], v[j])
 
 
 @_whole
@@ -235,7 +234,7 @@ def _flow(first, last, slope_x, slope_y, weight, pitch, out):  # type: ignore[no
     for i in range(first, last):
         s, w, target = slope_x[i], weight[i], out[i]
         for j in range(columns - 1):
-            edge[j] = _HALF * (s[j] + s[j + 1]) * _least(w[j], w[j + 1])
+            edge[j] = HALF * (s[j] + s[j + 1]) * _least(w[j], w[j + 1])
         for j in range(1, columns - 2):
             own = _least(w[j], w[j + 1])
             edge[j] = own * _integral(s[j], s[j + 1], s[j - 1], s[j + 2], w[j - 1], w[j + 2])
@@ -244,7 +243,7 @@ def _flow(first, last, slope_x, slope_y, weight, pitch, out):  # type: ignore[no
         if i < rows - 1:
             _down(i, slope_y, weight, low)
         else:
-            low[:] = _0
+            low[:] = ZERO
         for j in range(columns):
             target[j] = (up[j] - low[j]) * pitch
         for j in range(columns - 1):
@@ -283,7 +282,7 @@ def _apply(first, last, depth, weight, firm, out, sums):  # type: ignore[no-unty
             target[j + 1] += edge[j]
         target[0] += firm[2 * columns + i] * d[0]
         target[columns - 1] += firm[2 * columns + rows + i] * d[columns - 1]
-        part = _0
+        part = ZERO
         for j in range(columns):
             part += target[j] * d[j]
         sums[i] = part

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.near_light.structures import Region
 
 Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, SATURATED, lit
 from gelpolight_core.optics.refraction import camera_to_membrane
+from gelpolight_core.reconstruction.integration.poisson import good_length
 from gelpolight_core.reconstruction.near_light.sampling import block_means
+from gelpolight_core.reconstruction.near_light.structures import Region, Scale
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 
@@ -28,6 +30,9 @@ BLOCK_MM = 0.2
 CHANGE_BY_INTERREFLECTION = 6e-3
 # Of the nine blocks around one, so that a hot pixel does not count as a contact.
 NEIGHBOURS = 3
+MARGIN_DECAYS = 1.5
+"""Margin of the region around a contact; the drape falls by a factor e over its decay length."""
+LEAST_MARGIN_MM = 0.8
 AREAS_MM = (0.6, 1.4)
 """Widths of the areas over which a shallow contact is looked for: the drape's, and twice that."""
 AREA_CHANGE = 2.5e-3
@@ -206,7 +211,12 @@ def _corners(points_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArr
     return points_mm.min(axis=0), points_mm.max(axis=0)
 
 
-def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: float) -> ContactFinder:
+def margin_mm(full: FullModel) -> float:
+    """Return the margin of the region around a contact."""
+    return max(MARGIN_DECAYS * full.decay_mm, LEAST_MARGIN_MM)
+
+
+def contact_finder(calibration: Calibration, full: FullModel) -> ContactFinder:
     """Bring a calibration's background into the camera's image, in blocks."""
     camera, table = calibration.camera, calibration.table
     grid = table.grid
@@ -279,7 +289,7 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
         most,
         middle,
         tuple(areas),
-        beside_mm,
+        2.0 * margin_mm(full),
         _visible_mm(full, middle, areas, side_mm),
         calibration.response,
     )
@@ -338,3 +348,22 @@ def _encoded(light: Map, response: CameraResponse | None) -> Map:
     for k, curve in enumerate(response.curves):
         encoded[..., k] = np.interp(light[..., k], curve, np.linspace(0.0, 1.0, curve.size))
     return encoded
+
+
+def padded_region(contact: Contact, scale: Scale, margin_mm: float) -> Region:
+    """Return a contact's region with a margin, its sides of lengths that the transform likes."""
+    spans = []
+    for axis in (1, 0):
+        origin = (scale.x_mm, scale.y_mm)[axis]
+        first = (contact.low[axis] - margin_mm - origin) / scale.pitch_mm
+        last = (contact.high[axis] + margin_mm - origin) / scale.pitch_mm
+        spans.append(_span(first, last, scale.kind.shape[1 - axis]))
+    (top, rows), (left, columns) = spans
+    return Region((top, left), (rows, columns))
+
+
+def _span(first: float, last: float, length: int) -> tuple[int, int]:
+    """Return begin and count of a span of nodes about `first` to `last`, of a good length."""
+    begin, end = max(int(np.floor(first)), 0), min(int(np.ceil(last)) + 1, length)
+    count = min(good_length(max(end - begin, 8)), length)
+    return min(max((begin + end - count) // 2, 0), length - count), count

@@ -12,10 +12,10 @@ from collections.abc import Callable
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.compiled import single, whole
 from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
 
@@ -37,9 +37,6 @@ LOUD, FEW = 1.25, 1e-3
 `CALM`."""
 EVEN = 0.5
 """Largest share of its own value that a node in a uniform area keeps."""
-
-_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
-_single = np.float32
 
 
 def quieted(
@@ -91,7 +88,7 @@ def quieted(
         grown = np.asarray(cv2.dilate(edge, np.ones((reach, reach), np.uint8)), np.float32)
         spread = np.empty_like(edge)
         _blurred(grown, 1.5 * width / QUIET_PX, spread)
-        share = _single(1.0 / (2.0 * np.sqrt(np.pi) * width))
+        share = single(1.0 / (2.0 * np.sqrt(np.pi) * width))
         everywhere = width == QUIET_PX
         workers.run(rows, _mixed, narrow, spread, base, sd, share, everywhere, ratio, noise)
         narrow = wide
@@ -136,7 +133,7 @@ def _left(width_px: float) -> np.float32:
     """Return the significant difference between two averages, for white noise of sd 1."""
     wide = 2.0 * width_px
     left = np.sqrt(1.0 / width_px**2 + 1.0 / wide**2 - 4.0 / (width_px**2 + wide**2))
-    return _single(SIGNIFICANT * left / np.sqrt(4.0 * np.pi))
+    return single(SIGNIFICANT * left / np.sqrt(4.0 * np.pi))
 
 
 def _average(planes: Map, width_px: float, result: Map) -> Map:
@@ -167,7 +164,7 @@ def _noisy(noise: Map, base: Map, edge: Map) -> bool:
     return bool(np.count_nonzero(loud) > FEW * loud[0].size)
 
 
-@_whole
+@whole
 def _parted(first, last, ratio, noise, sd, light, base):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write light and background of each node; next to 0 where it is not usable."""
     for i in range(first, last):
@@ -180,11 +177,11 @@ def _parted(first, last, ratio, noise, sd, light, base):  # type: ignore[no-unty
                 l[j] = r[j] * below
 
 
-@_whole
+@whole
 def _excess(first, last, narrow, wide, base, own, limit, edge):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write how far two averages differ beyond what noise makes of them, 0..1."""
     (light, below), (wide_light, wide_below) = narrow, wide
-    least, none, one = _single(LEAST), _single(0.0), _single(1.0)
+    least, none, one = single(LEAST), single(0.0), single(1.0)
     line = np.empty(edge.shape[1], np.float32)
     for i in range(first, last):
         line[:] = none
@@ -203,12 +200,12 @@ def _excess(first, last, narrow, wide, base, own, limit, edge):  # type: ignore[
             edge[i, j] = line[j] if line[j] < one else one
 
 
-@_whole
+@whole
 def _mixed(first, last, narrow, edge, base, sd, left, everywhere, ratio, noise):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Move ratio and noise towards the average's, where there is no edge and need of it."""
     light, below = narrow
-    least, none, one = _single(LEAST), _single(0.0), _single(1.0)
-    per_calm = _single(1.0 / CALM)
+    least, none, one = single(LEAST), single(0.0), single(1.0)
+    per_calm = single(1.0 / CALM)
     always = one if everywhere else none
     for i in range(first, last):
         kept = edge[i]

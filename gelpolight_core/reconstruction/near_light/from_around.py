@@ -7,13 +7,12 @@ the membrane is flat, and looks as in the background.
 from __future__ import annotations
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.compiled import HALF, single, whole
 from gelpolight_core.reconstruction.near_light.maps import COARSE, LEAST_SHARE, SensorMaps
-from gelpolight_core.reconstruction.near_light.region import Region
-from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
+from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage, Region
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reflectance.gathered_light import (
     WIDE,
@@ -38,10 +37,6 @@ FIRST_STEP, STEP = 1.5, 0.75
 GUIDE_NODES, GUIDE_SD, MOST_GUIDE = 1, 0.03, 4.0
 """Window around a node for this guidance, the noise of the image, and the highest press over
 background."""
-
-_single = np.float32
-_HALF = _single(0.5)
-_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
 
 
 class FromAround:
@@ -147,15 +142,15 @@ class FromAround:
         scale = self.maps.scale(COARSE)
         depth = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
         rows, columns = np.indices(depth.shape, dtype=np.float32)
-        per_pitch = _single(1.0 / scale.pitch_mm)
+        per_pitch = single(1.0 / scale.pitch_mm)
         slope = np.moveaxis(self._ray_slope, -1, 0) * per_pitch
         place = meeting(depth, np.stack([columns, rows]), -slope)
         seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR))
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
         clear = np.empty((3, *points.shape[:2]), np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
-        origin = (_single(scale.x_mm), _single(scale.y_mm), _single(scale.pitch_mm))
-        deepest = _single(seen.max())
+        origin = (single(scale.x_mm), single(scale.y_mm), single(scale.pitch_mm))
+        deepest = single(seen.max())
         self._workers.run(len(points), clear_rows, points, seen, origin, leds, deepest, clear)
         return clear
 
@@ -177,7 +172,7 @@ def meeting(depth_mm: Map, home: Map, slope: Map) -> Map:
     place = home
     for _ in range(PLACING):
         depth = cv2.remap(depth_mm, place[0], place[1], cv2.INTER_LINEAR)
-        place = _HALF * (place + home + depth * slope)
+        place = HALF * (place + home + depth * slope)
     return place
 
 
@@ -276,7 +271,7 @@ def surface_normals(
     return (n[0] / size).astype(np.float32), (n[1] / size).astype(np.float32)
 
 
-@_whole
+@whole
 def clear_rows(first, last, points, depth, place, leds, deepest, clear):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find how far the rays from points to the lights clear the surface, rows `first` to `last`.
 
@@ -296,27 +291,27 @@ def clear_rows(first, last, points, depth, place, leds, deepest, clear):  # type
         Written.
     """
     x0, y0, pitch = place
-    none, one, most = _single(0.0), _single(1.0), _single(2.0 * CLEAR)
+    none, one, most = single(0.0), single(1.0), single(2.0 * CLEAR)
     rows, columns = depth.shape
     for i in range(first, last):
         for k in range(3):
             for j in range(points.shape[1]):
                 px, py, d = points[i, j, 0], points[i, j, 1], -points[i, j, 2]
                 dx, dy = leds[k, 0] - px, leds[k, 1] - py
-                far = np.sqrt(dx * dx + dy * dy) + _single(1e-6)
+                far = np.sqrt(dx * dx + dy * dy) + single(1e-6)
                 # The ray goes down towards the light: its depth grows.
                 fall = (-leds[k, 2] - d) / far
                 ux, uy = dx / far, dy / far
-                least, t = most, _single(FIRST_STEP) * pitch
+                least, t = most, single(FIRST_STEP) * pitch
                 while t < far and d + fall * t < deepest:
                     x, y = (px + ux * t - x0) / pitch, (py + uy * t - y0) / pitch
                     if x < none or y < none or x > columns - one or y > rows - one:
                         break
                     m, n = min(int(y), rows - 2), min(int(x), columns - 2)
-                    fx, fy = x - _single(n), y - _single(m)
+                    fx, fy = x - single(n), y - single(m)
                     up = depth[m, n] + fx * (depth[m, n + 1] - depth[m, n])
                     low = depth[m + 1, n] + fx * (depth[m + 1, n + 1] - depth[m + 1, n])
                     slope = fall - (up + fy * (low - up) - d) / t
                     least = slope if slope < least else least
-                    t += _single(STEP) * pitch
+                    t += single(STEP) * pitch
                 clear[k, i, j] = least

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.masks import LEAST_LIGHT, saturated
+from gelpolight_core.reconstruction.compiled import whole
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def image_noise(raw: NDArray[Any], light: Map, workers: RowWorkers) -> ImageNois
     return ImageNoise((fits[0][0], fits[1][0], fits[2][0]), (fits[0][1], fits[1][1], fits[2][1]))
 
 
-@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+@whole
 def _block_noise(first, last, raw, light, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write variance, mean and maximum of blocks of pixels, block rows `first` to `last`."""
     half = np.float32(0.5)

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
+from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
 
 STEEPEST_NZ = 0.15
@@ -43,31 +44,30 @@ BAD_FIT = 25.0
 """From this misfit on, in squared standard deviations, a normal is searched for again."""
 
 
-_B = 64
-# Planes of a block's array: what is read, what is worked with, and what is written.
-_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND = 0, 3, 6, 9, 12, 13, 17, 21
-_SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE = 22, 25, 28, 37, 40
-_TRUST, _FLAG, _MOVED = 42, 43, 44
-# Of a glossy membrane: the best normal so far, its misfit, the step from it, and where the steps
-# from another start ended.
-_BEST, _MISFIT, _STEP, _OTHER, _OTHER_MISFIT, _PLANES = 45, 48, 49, 52, 55, 56
-_single = np.float32
-_0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
-_PI = _single(pi)
-_LEAST_COSINE, _LEAST_VIEW = _single(1e-3), _single(1e-2)
-_STEEPEST = _single(STEEPEST_NZ)
-_LEVEL = _single(sqrt(1.0 - STEEPEST_NZ**2))
-_LEAST_ALONG = _single(LEAST_ALONG_RAY)
-_ELSEWHERE = _single(cos(radians(SEARCHED_DEG)))
-_LEAST_DISTANCE = _single(0.1)
-_ONE_DARK, _UNSOLVED = _single(ONE_DARK_WEIGHT), _single(UNSOLVED_WEIGHT)
-_MODEL2 = _single(MODEL_ERROR**2)
-_SIGMAS, _SHARE = _single(DARK_SIGMAS), _single(DARK_SHARE)
-_LONGEST, _SHORTER, _WORST, _BAD = _single(0.3), _single(0.5), _single(1e30), _single(BAD_FIT)
-_DAMP, _TINY = _single(1e-6), _single(1e-12)
-_F_OUTSIDE, _F_SATURATED = _single(Flag.OUTSIDE), _single(Flag.SATURATED)
-_F_DARK, _F_HIDDEN = _single(Flag.DARK), _single(Flag.NOT_OBSERVABLE)
-_F_FAR, _F_INVALID = _single(Flag.EXTRAPOLATED), _single(Flag.INVALID)
+_B = BLOCK
+# Planes of a block's array: what is read, what is worked with, and what is written; of a glossy
+# membrane, the best normal so far, its misfit, the step from it, and where the steps from another
+# start ended.
+_WIDTHS = (3, 3, 3, 3, 1, 4, 4, 1, 3, 3, 9, 3, 2, 1, 1, 1, 3, 1, 3, 3, 1)
+_FIRST = (np.cumsum(_WIDTHS) - _WIDTHS).tolist()
+_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND, *_LATER = _FIRST
+_SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE, _TRUST, _FLAG, _MOVED, *_GLOSSY = _LATER
+_BEST, _MISFIT, _STEP, _OTHER, _OTHER_MISFIT = _GLOSSY
+_PI = single(pi)
+_LEAST_COSINE, _LEAST_VIEW = single(1e-3), single(1e-2)
+_STEEPEST = single(STEEPEST_NZ)
+_LEVEL = single(sqrt(1.0 - STEEPEST_NZ**2))
+_LEAST_ALONG = single(LEAST_ALONG_RAY)
+_ELSEWHERE = single(cos(radians(SEARCHED_DEG)))
+_LEAST_DISTANCE = single(0.1)
+_ONE_DARK, _UNSOLVED = single(ONE_DARK_WEIGHT), single(UNSOLVED_WEIGHT)
+_MODEL2 = single(MODEL_ERROR**2)
+_SIGMAS, _SHARE = single(DARK_SIGMAS), single(DARK_SHARE)
+_LONGEST, _WORST, _BAD = single(0.3), single(1e30), single(BAD_FIT)
+_DAMP, _TINY = single(1e-6), single(1e-12)
+_F_OUTSIDE, _F_SATURATED = single(Flag.OUTSIDE), single(Flag.SATURATED)
+_F_DARK, _F_HIDDEN = single(Flag.DARK), single(Flag.NOT_OBSERVABLE)
+_F_FAR, _F_INVALID = single(Flag.EXTRAPOLATED), single(Flag.INVALID)
 
 START_RINGS = ((8.0, 5), (20.0, 8), (33.0, 10), (47.0, 12), (60.0, 12))
 """Tilt in degrees, and how many normals that much tilted a search tries."""
@@ -103,10 +103,10 @@ def _least(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the diffuse share at a cosine, and its derivative."""
     if table is not None:
-        position = c * _single(table.shape[1] - 1)
+        position = c * single(table.shape[1] - 1)
         below = min(int(position), table.shape[1] - 2)
         rise = table[k, below + 1] - table[k, below]
-        return table[k, below] + (position - _single(below)) * rise, rise * _single(
+        return table[k, below] + (position - single(below)) * rise, rise * single(
             table.shape[1] - 1
         )
     v = p[7]
@@ -134,29 +134,29 @@ def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # p
     """
     facing = l[0] * n[0] + l[1] * n[1] + l[2] * n[2]
     c = _most(facing, _LEAST_COSINE)
-    f, by_c = _curve(_least(c, _1), p, table, k)
+    f, by_c = _curve(_least(c, ONE), p, table, k)
     if gloss is None:
-        on = _1 if facing > _0 else _0
+        on = ONE if facing > ZERO else ZERO
         return f * on, by_c * l[0] * on, by_c * l[1] * on, by_c * l[2] * on
     share, a2 = gloss
     hx, hy, hz = l[0] + v[0], l[1] + v[1], l[2] + v[2]
-    short = _1 / sqrt(hx * hx + hy * hy + hz * hz)
+    short = ONE / sqrt(hx * hx + hy * hy + hz * hz)
     hx, hy, hz = hx * short, hy * short, hz * short
-    t = _most(hx * n[0] + hy * n[1] + hz * n[2], _0)
+    t = _most(hx * n[0] + hy * n[1] + hz * n[2], ZERO)
     s = _most(v[0] * n[0] + v[1] * n[1] + v[2] * n[2], _LEAST_VIEW)
-    b2 = _1 - a2
-    width = _1 / (_1 - t * t * b2)
+    b2 = ONE - a2
+    width = ONE / (ONE - t * t * b2)
     rc = sqrt(a2 + b2 * c * c)
     rs = sqrt(a2 + b2 * s * s)
-    lit = _1 / (c + rc)
-    shown = _1 / (s + rs)
+    lit = ONE / (c + rc)
+    shown = ONE / (s + rs)
     # D(t) * 2c / (c + rc) * 2s / (s + rs) / (4 s)
     lobe = share * a2 / _PI * width * width * lit * shown
     g = lobe * c
-    on = _1 if facing > _0 else _0
-    by_c = (by_c + lobe * (_1 - c * lit * (_1 + b2 * c / rc))) * on
-    by_t = g * _single(4.0) * b2 * t * width * on
-    by_s = -g * shown * (_1 + b2 * s / rs) * on
+    on = ONE if facing > ZERO else ZERO
+    by_c = (by_c + lobe * (ONE - c * lit * (ONE + b2 * c / rc))) * on
+    by_t = g * single(4.0) * b2 * t * width * on
+    by_s = -g * shown * (ONE + b2 * s / rs) * on
     return (
         (f + g) * on,
         by_c * l[0] + by_t * hx + by_s * v[0],
@@ -168,7 +168,7 @@ def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # p
 @_part
 def _limited(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the normal at unit length and not steeper than can be seen."""
-    size = _1 / sqrt(nx * nx + ny * ny + nz * nz + _TINY)
+    size = ONE / sqrt(nx * nx + ny * ny + nz * nz + _TINY)
     nx, ny, nz = nx * size, ny * size, nz * size
     stretch = _LEVEL / sqrt(nx * nx + ny * ny + _TINY)
     steep = nz > -_STEEPEST
@@ -188,7 +188,7 @@ def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - 
     ax, ay = led[0] - x, led[1] - y
     az = _least(led[2] + d, -_LEAST_DISTANCE)
     r2 = ax * ax + ay * ay + az * az
-    short = _1 / sqrt(r2)
+    short = ONE / sqrt(r2)
     return (ax * short, ay * short, az * short), r2 * r2 * short / az
 
 
@@ -202,11 +202,11 @@ def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, interr
     direct = ratio if interreflection is None else ratio - around
     direct = direct * scale
     low = _most(dark, _least(_SIGMAS * sigma, _SHARE) * scale)
-    lit = _1 if direct >= low else _0
-    lit = _1 - hidden if judged > _0 else lit
+    lit = ONE if direct >= low else ZERO
+    lit = ONE - hidden if judged > ZERO else lit
     if not shadows:
-        lit = _1
-    return direct, lit, _0 if sat > _0 else lit
+        lit = ONE
+    return direct, lit, ZERO if sat > ZERO else lit
 
 
 @_part
@@ -232,11 +232,11 @@ def _chosen(first, second, a, b, c):  # type: ignore[no-untyped-def]  # pragma: 
 def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a first normal from equivalent cosines: three lights, or two and |n| = 1."""
     p, q, r = _cross(l1, l2), _cross(l2, l0), _cross(l0, l1)
-    short = _1 / _inner(l0, p)
+    short = ONE / _inner(l0, p)
     ax = (e0 * p[0] + e1 * q[0] + e2 * r[0]) * short
     ay = (e0 * p[1] + e1 * q[1] + e2 * r[1]) * short
     az = (e0 * p[2] + e1 * q[2] + e2 * r[2]) * short
-    is0, is1 = w0 == _0, w1 == _0
+    is0, is1 = w0 == ZERO, w1 == ZERO
     a, b, c = (
         _chosen(is0, is1, l1, l2, l0),
         _chosen(is0, is1, l2, l0, l1),
@@ -247,16 +247,16 @@ def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignor
     bright = lit0 if is0 else (lit1 if is1 else lit2)
     ex, ey, ez = _chosen(is0, is1, p, q, r)
     between = _inner(a, b)
-    det = _1 / (_1 - between * between)
+    det = ONE / (ONE - between * between)
     ka, kb = (ea - between * eb) * det, (eb - between * ea) * det
     bx, by, bz = ka * a[0] + kb * b[0], ka * a[1] + kb * b[1], ka * a[2] + kb * b[2]
-    left = (_1 - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
-    step = sqrt(_most(left, _single(1e-4)))
+    left = (ONE - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
+    step = sqrt(_most(left, single(1e-4)))
     # Away from a dark light, towards a saturated one.
     side = ex * c[0] + ey * c[1] + ez * c[2]
-    towards = side if bright > _0 else -side
-    step = step if towards > _0 else -step
-    one = w0 + w1 + w2 < _single(2.5)
+    towards = side if bright > ZERO else -side
+    step = step if towards > ZERO else -step
+    one = w0 + w1 + w2 < single(2.5)
     return _limited(
         bx + step * ex if one else ax,
         by + step * ey if one else ay,
@@ -312,13 +312,13 @@ def _begin_block(w, rays, position, leds, dark, curves, table, gloss, reflected,
 
     Started `warm`, the stored normals are used where all three lights count.
     """
-    flat = (_0, _0, -_1)
+    flat = (ZERO, ZERO, -ONE)
     y, x_first, pitch = position
     for j in range(_B):
-        d, at = w[_DEPTH * _B + j], _single(j)
+        d, at = w[_DEPTH * _B + j], single(j)
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
         x = x_first + pitch * at + d * wx
-        short = _1 / sqrt(wx * wx + wy * wy + _1)
+        short = ONE / sqrt(wx * wx + wy * wy + ONE)
         v = (wx * short, wy * short, -short)
         l0, near0 = _light(leds[0], x, y + d * wy, d)
         l1, near1 = _light(leds[1], x, y + d * wy, d)
@@ -329,14 +329,14 @@ def _begin_block(w, rays, position, leds, dark, curves, table, gloss, reflected,
         f0 = _response(l0, flat, v, curves[0], table, gloss, 0)[0]
         f1 = _response(l1, flat, v, curves[1], table, gloss, 1)[0]
         f2 = _response(l2, flat, v, curves[2], table, gloss, 2)[0]
-        e0 = _least(-l0[2] * _most(d0, _0) / _most(f0, _DAMP), _1)
-        e1 = _least(-l1[2] * _most(d1, _0) / _most(f1, _DAMP), _1)
-        e2 = _least(-l2[2] * _most(d2, _0) / _most(f2, _DAMP), _1)
+        e0 = _least(-l0[2] * _most(d0, ZERO) / _most(f0, _DAMP), ONE)
+        e1 = _least(-l1[2] * _most(d1, ZERO) / _most(f1, _DAMP), ONE)
+        e2 = _least(-l2[2] * _most(d2, ZERO) / _most(f2, _DAMP), ONE)
         b0, b1, b2 = _triple(w, _MARKS, j)
         nx, ny, nz = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, b0, b1, b2)
         px, py = w[_NORMAL * _B + j], w[(_NORMAL + 1) * _B + j]
-        on = warm * (k0 + k1 + k2 + w[(_HIDDEN + 3) * _B + j]) > _single(2.5)
-        pz = -sqrt(_most(_1 - px * px - py * py, _TINY))
+        on = warm * (k0 + k1 + k2 + w[(_HIDDEN + 3) * _B + j]) > single(2.5)
+        pz = -sqrt(_most(ONE - px * px - py * py, _TINY))
         _put(w, _NORMAL, j, (px if on else nx, py if on else ny, pz if on else nz))
         _put(w, _LIGHT, j, l0)
         _put(w, _LIGHT + 3, j, l1)
@@ -368,11 +368,11 @@ def _search_block(w, dark, curves, table, gloss, interreflection, shadows):  # t
     Under a glossy lobe, brightness rises and falls with slope: steps from a bad start end at a
     normal that fits worse than the true one. Returns whether any node starts again.
     """
-    worst = _0
+    worst = ZERO
     for j in range(_B):
         (_, _, k0), (_, _, k1), (_, _, k2) = _channels(w, j, dark, interreflection, shadows)
-        judged = (k0 + k1 + k2 > _single(2.5)) & (w[_KIND * _B + j] > _single(1.5))
-        misfit = w[_MISFIT * _B + j] if judged else _0
+        judged = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
+        misfit = w[_MISFIT * _B + j] if judged else ZERO
         w[_OTHER_MISFIT * _B + j] = misfit
         _put(w, _OTHER, j, _triple(w, _NORMAL, j))
         w[_MISFIT * _B + j] = _WORST
@@ -423,21 +423,21 @@ def _step_block(w, dark, curves, table, gloss, interreflection, shadows):  # typ
         h1, h2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
         damp = _DAMP * (m11 + m22) + _TINY
         m11, m22 = m11 + damp, m22 + damp
-        short = _1 / (m11 * m22 - m12 * m12)
+        short = ONE / (m11 * m22 - m12 * m12)
         m1, m2 = (m22 * h1 - m12 * h2) * short, (m11 * h2 - m12 * h1) * short
         dx, dy, dz = -n[2] * m1, -n[2] * m2, n[0] * m1 + n[1] * m2
         move = dx * dx + dy * dy + dz * dz + _TINY
-        held = _least(_LONGEST / sqrt(move), _1)
+        held = _least(_LONGEST / sqrt(move), ONE)
         step, base = (held * dx, held * dy, held * dz), n
         if gloss is not None:
             step, base = _kept(w, j, n, step, am + bm + cm)
         nx, ny, nz = _limited(base[0] + step[0], base[1] + step[1], base[2] + step[2])
         # The real movement: a normal at the slope limit would be moved in every step.
         move = (nx - n[0]) * (nx - n[0]) + (ny - n[1]) * (ny - n[1])
-        solved = (w[_KIND * _B + j] > _single(1.5)) & (k0 + k1 + k2 > _single(1.5))
-        w[_MOVED * _B + j] = move if solved else _0
+        solved = (w[_KIND * _B + j] > single(1.5)) & (k0 + k1 + k2 > single(1.5))
+        w[_MOVED * _B + j] = move if solved else ZERO
         _put(w, _NORMAL, j, (nx, ny, nz))
-    longest = _0
+    longest = ZERO
     for j in range(_B):
         longest = _most(longest, w[_MOVED * _B + j])
     return longest
@@ -451,7 +451,7 @@ def _kept(w, j, n, step, misfit):  # type: ignore[no-untyped-def]  # pragma: no 
     """
     better = misfit <= _most(w[_MISFIT * _B + j], _BAD)
     old, best = _triple(w, _STEP, j), _triple(w, _BEST, j)
-    shorter = (_SHORTER * old[0], _SHORTER * old[1], _SHORTER * old[2])
+    shorter = (HALF * old[0], HALF * old[1], HALF * old[2])
     step, base = _chosen(better, better, step, step, shorter), _chosen(better, better, n, n, best)
     w[_MISFIT * _B + j] = misfit if better else w[_MISFIT * _B + j]
     _put(w, _BEST, j, base)
@@ -475,33 +475,33 @@ def _best_block(w, dark, curves, table, gloss, interreflection, shadows):  # typ
 def _unseen(w, light, n, j, range_of, counts):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return 1 where a used channel has a cosine outside the range of the ball presses."""
     c = _inner(_triple(w, light, j), n)
-    return counts if (c < range_of[0]) | (c > range_of[1]) else _0
+    return counts if (c < range_of[0]) | (c > range_of[1]) else ZERO
 
 
 @_part
 def _end_block(w, rays, dark, interreflection, coverage, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Turn a block's normals into slopes along the rays, their weights and their flags."""
     for j in range(_B):
-        d, at = w[_DEPTH * _B + j], _single(j)
+        d, at = w[_DEPTH * _B + j], single(j)
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
         n = _triple(w, _NORMAL, j)
         (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(
             w, j, dark, interreflection, shadows
         )
         known = k0 + k1 + k2
-        solved = known > _single(1.5)
-        nx, ny, nz = n[0] if solved else _0, n[1] if solved else _0, n[2] if solved else -_1
+        solved = known > single(1.5)
+        nx, ny, nz = n[0] if solved else ZERO, n[1] if solved else ZERO, n[2] if solved else -ONE
         along = nx * wx + ny * wy - nz
         hidden = (nz > -_STEEPEST - _DAMP) or (along < _LEAST_ALONG)
-        trust = _1 if known > _single(2.5) else _ONE_DARK
+        trust = ONE if known > single(2.5) else _ONE_DARK
         trust = _UNSOLVED if hidden or not solved else trust
-        along = _1 / _most(along, _LEAST_ALONG)
+        along = ONE / _most(along, _LEAST_ALONG)
         # d_u = - n . (P0_u + d w_u) / (n . w): the surface point moves along its own ray.
         slope_x = (
-            -(nx * (_1 + d * (rays[4] + at * rays[5])) + ny * d * (rays[6] + at * rays[7])) * along
+            -(nx * (ONE + d * (rays[4] + at * rays[5])) + ny * d * (rays[6] + at * rays[7])) * along
         )
         slope_y = (
-            -(nx * d * (rays[8] + at * rays[9]) + ny * (_1 + d * (rays[10] + at * rays[11])))
+            -(nx * d * (rays[8] + at * rays[9]) + ny * (ONE + d * (rays[10] + at * rays[11])))
             * along
         )
         far = (
@@ -511,22 +511,22 @@ def _end_block(w, rays, dark, interreflection, coverage, shadows):  # type: igno
         )
         b0, b1, b2 = _triple(w, _MARKS, j)
         invalid = w[(_MARKS + 3) * _B + j]
-        unlit = lit0 * lit1 * lit2 < _HALF
+        unlit = lit0 * lit1 * lit2 < HALF
         flag = (
-            (_F_HIDDEN if hidden else _0)
-            + (_F_SATURATED if b0 + b1 + b2 - _single(3.0) * invalid > _0 else _0)
-            + (_F_DARK if unlit else _0)
-            + (_F_FAR if solved and far > _0 else _0)
+            (_F_HIDDEN if hidden else ZERO)
+            + (_F_SATURATED if b0 + b1 + b2 - single(3.0) * invalid > ZERO else ZERO)
+            + (_F_DARK if unlit else ZERO)
+            + (_F_FAR if solved and far > ZERO else ZERO)
             + _F_INVALID * invalid
         )
         kind = w[_KIND * _B + j]
-        usable = kind > _single(1.5)
-        w[_SLOPE * _B + j] = slope_x if usable else _0
-        w[(_SLOPE + 1) * _B + j] = slope_y if usable else _0
-        w[_TRUST * _B + j] = trust if usable else (_UNSOLVED if kind > _HALF else _1)
-        w[_FLAG * _B + j] = flag if usable else (_F_OUTSIDE + (_F_INVALID if kind > _HALF else _0))
-        w[_NORMAL * _B + j] = nx if usable else _0
-        w[(_NORMAL + 1) * _B + j] = ny if usable else _0
+        usable = kind > single(1.5)
+        w[_SLOPE * _B + j] = slope_x if usable else ZERO
+        w[(_SLOPE + 1) * _B + j] = slope_y if usable else ZERO
+        w[_TRUST * _B + j] = trust if usable else (_UNSOLVED if kind > HALF else ONE)
+        w[_FLAG * _B + j] = flag if usable else (_F_OUTSIDE + (_F_INVALID if kind > HALF else ZERO))
+        w[_NORMAL * _B + j] = nx if usable else ZERO
+        w[(_NORMAL + 1) * _B + j] = ny if usable else ZERO
 
 
 @_part
@@ -534,7 +534,7 @@ def _ray_value(rays, k, y, x):  # type: ignore[no-untyped-def]  # pragma: no cov
     """Return a ray map between its nodes, continued straight beyond the outermost ones."""
     i = min(max(int(np.floor(y)), 0), rays.shape[1] - 2)
     j = min(max(int(np.floor(x)), 0), rays.shape[2] - 2)
-    fy, fx = _single(y - i), _single(x - j)
+    fy, fx = single(y - i), single(x - j)
     up = rays[k, i, j] + fx * (rays[k, i, j + 1] - rays[k, i, j])
     low = rays[k, i + 1, j] + fx * (rays[k, i + 1, j + 1] - rays[k, i + 1, j])
     return up + fy * (low - up)
@@ -556,7 +556,7 @@ def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # p
     y = (row + 0.5) * step - 0.5
     x = (position + 0.5) * step - 0.5
     last = (position + count - 0.5) * step - 0.5
-    share = _1 / _single(max(count - 1, 1))
+    share = ONE / single(max(count - 1, 1))
     a, a1 = _ramp(rays, 0, y, x, last, share)
     b, b1 = _ramp(rays, 1, y, x, last, share)
     c, c1 = _ramp(rays, 2, y, x, last, share)
@@ -588,15 +588,15 @@ def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # typ
         w[_DEPTH * _B + j] = depth[i, begin + j]
     for j in range(count):
         bits = marks[i, begin + j]
-        w[_MARKS * _B + j] = _single(bits & 1)
-        w[(_MARKS + 1) * _B + j] = _single((bits >> 1) & 1)
-        w[(_MARKS + 2) * _B + j] = _single((bits >> 2) & 1)
-        w[(_MARKS + 3) * _B + j] = _single((bits >> 3) & 1)
-        w[_HIDDEN * _B + j] = _single((bits >> 4) & 1)
-        w[(_HIDDEN + 1) * _B + j] = _single((bits >> 5) & 1)
-        w[(_HIDDEN + 2) * _B + j] = _single((bits >> 6) & 1)
-        w[(_HIDDEN + 3) * _B + j] = _single((bits >> 7) & 1)
-        w[_KIND * _B + j] = _single(kind[row, position + j])
+        w[_MARKS * _B + j] = single(bits & 1)
+        w[(_MARKS + 1) * _B + j] = single((bits >> 1) & 1)
+        w[(_MARKS + 2) * _B + j] = single((bits >> 2) & 1)
+        w[(_MARKS + 3) * _B + j] = single((bits >> 3) & 1)
+        w[_HIDDEN * _B + j] = single((bits >> 4) & 1)
+        w[(_HIDDEN + 1) * _B + j] = single((bits >> 5) & 1)
+        w[(_HIDDEN + 2) * _B + j] = single((bits >> 6) & 1)
+        w[(_HIDDEN + 3) * _B + j] = single((bits >> 7) & 1)
+        w[_KIND * _B + j] = single(kind[row, position + j])
     if warm:
         for j in range(count):
             w[_NORMAL * _B + j] = slopes.normal_x[i, begin + j]
@@ -604,7 +604,7 @@ def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # typ
             w[(_NORMAL + 1) * _B + j] = slopes.normal_y[i, begin + j]
     # Data of an earlier block must not affect the number of steps.
     for j in range(count, _B):
-        w[_KIND * _B + j] = _0
+        w[_KIND * _B + j] = ZERO
 
 
 @_part
@@ -631,16 +631,16 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     columns = depth.shape[1]
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
     gloss, interreflection, coverage = membrane.gloss, membrane.interreflection, membrane.coverage
-    most, settled, shadows, warm = steps.most, _single(steps.settled), steps.shadows, steps.warm
-    w = np.zeros(_PLANES * _B, np.float32)
-    begun, pitch = _1 if warm else _0, _single(scale.pitch_mm)
+    most, settled, shadows, warm = steps.most, single(steps.settled), steps.shadows, steps.warm
+    w = np.zeros(sum(_WIDTHS) * _B, np.float32)
+    begun, pitch = ONE if warm else ZERO, single(scale.pitch_mm)
     for i in range(first, last):
-        y = _single(scale.y_mm + scale.pitch_mm * (i + corner[0]))
+        y = single(scale.y_mm + scale.pitch_mm * (i + corner[0]))
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
             position = corner[1] + begin
             _load(w, image, depth, scale, corner, slopes, warm, i, begin, count)
-            at = (y, _single(scale.x_mm + scale.pitch_mm * position), pitch)
+            at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
             _begin_block(
                 w, rays, at, leds, dark, curves, table, gloss, interreflection, shadows, begun

@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.near_light.kernel import ray_ramps
 
-_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
-_single = np.float32
-_0, _HALF, _1 = _single(0.0), _single(0.5), _single(1.0)
-_BLOCK = 64
 PLACE_ROUNDS = 14
 PLACED = 0.01
 FOLDED = 0.55
 
 
-@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True, forceinline=True)
+@part
 def _between(values, c, r, fc, fr):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     top = values[r, c] + fc * (values[r, c + 1] - values[r, c])
     low = values[r + 1, c] + fc * (values[r + 1, c + 1] - values[r + 1, c])
     return (
         top + fr * (low - top),
-        (values[r, c + 1] - values[r, c]) * (_1 - fr)
+        (values[r, c + 1] - values[r, c]) * (ONE - fr)
         + (values[r + 1, c + 1] - values[r + 1, c]) * fr,
         low - top,
     )
 
 
-@_whole
+@whole
 def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     first, last, depth, scale, corner, true_positions, flags, hidden, placed, marks, position
 ):
@@ -51,50 +47,50 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         Column and row of the ray that sees each position, written.
     """
     rows, columns = depth.shape
-    per_pitch = _1 / _single(scale.pitch_mm)
+    per_pitch = ONE / single(scale.pitch_mm)
     if not true_positions:
-        per_pitch = _0
+        per_pitch = ZERO
     for i in range(first, last):
-        for begin in range(0, columns, _BLOCK):
-            count = min(_BLOCK, columns - begin)
+        for begin in range(0, columns, BLOCK):
+            count = min(BLOCK, columns - begin)
             ramps = ray_ramps(scale, i + corner[0], begin + corner[1], count)
             for j in range(begin, begin + count):
-                at = _single(j - begin)
+                at = single(j - begin)
                 wx = (ramps[0] + at * ramps[1]) * per_pitch
                 wy = (ramps[2] + at * ramps[3]) * per_pitch
                 wxx, wyx = ramps[4] + at * ramps[5], ramps[6] + at * ramps[7]
                 wxy, wyy = ramps[8] + at * ramps[9], ramps[10] + at * ramps[11]
                 d = depth[i, j]
-                c, r = _single(j), _single(i)
+                c, r = single(j), single(i)
                 x, y = c - d * wx, r - d * wy
-                missed = _0
+                missed = ZERO
                 n, m = j, i
                 for step in range(PLACE_ROUNDS):
-                    x = min(max(x, _0), _single(columns - 1))
-                    y = min(max(y, _0), _single(rows - 1))
+                    x = min(max(x, ZERO), single(columns - 1))
+                    y = min(max(y, ZERO), single(rows - 1))
                     n, m = min(int(x), columns - 2), min(int(y), rows - 2)
-                    d, by_x, by_y = _between(depth, n, m, x - _single(n), y - _single(m))
+                    d, by_x, by_y = _between(depth, n, m, x - single(n), y - single(m))
                     off_x, off_y = x - c, y - r
                     ex = off_x + d * (wx + wxx * off_x + wxy * off_y)
                     ey = off_y + d * (wy + wyx * off_x + wyy * off_y)
                     missed = max(abs(ex), abs(ey))
                     if missed < PLACED:
                         break
-                    det = _1 + by_x * wx + by_y * wy
-                    if step < 5 and det > _single(0.3):
+                    det = ONE + by_x * wx + by_y * wy
+                    if step < 5 and det > single(0.3):
                         along = (by_x * ex + by_y * ey) / det
                         x -= ex - along * wx
                         y -= ey - along * wy
                     else:
-                        x -= _HALF * ex
-                        y -= _HALF * ey
+                        x -= HALF * ex
+                        y -= HALF * ey
                 placed[i, j] = d
-                near = flags[min(int(y + _HALF), rows - 1), min(int(x + _HALF), columns - 1)]
+                near = flags[min(int(y + HALF), rows - 1), min(int(x + HALF), columns - 1)]
                 marks[i, j] = near | (hidden if missed > FOLDED else 0)
                 position[0, i, j], position[1, i, j] = x, y
 
 
-@_whole
+@whole
 def show_depth(first, last, placed, placed_flags, factor, corner, outside, kind, depth, flags):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Bring depth and flags from a coarser region to rows of the whole grid, bilinear.
 
@@ -102,12 +98,12 @@ def show_depth(first, last, placed, placed_flags, factor, corner, outside, kind,
     """
     rows, columns = placed.shape
     line = np.empty(columns, np.float32)
-    share = _1 / _single(factor)
+    share = ONE / single(factor)
     for i in range(first, last):
-        y = (_single(i) + _HALF) * share - _HALF
+        y = (single(i) + HALF) * share - HALF
         m = min(max(int(np.floor(y)), 0), rows - 1)
         m1 = min(m + 1, rows - 1)
-        f = min(max(y - _single(m), _0), _1)
+        f = min(max(y - single(m), ZERO), ONE)
         a, b = placed[m], placed[m1]
         for j in range(columns):
             line[j] = a[j] + f * (b[j] - a[j])
@@ -119,28 +115,28 @@ def show_depth(first, last, placed, placed_flags, factor, corner, outside, kind,
             mark = source[n] & ~outside
             for k in range(factor):
                 at = corner[1] + n * factor + k
-                t = (_single(k) + _HALF) * share - _HALF
+                t = (single(k) + HALF) * share - HALF
                 value = here + t * (right - here) if t > 0.0 else here + t * (here - left)
-                out[at] = value if seen[at] > 0 else _0
+                out[at] = value if seen[at] > 0 else ZERO
                 marks[at] = marks[at] | mark
 
 
-@_whole
+@whole
 def show_normals(first, last, normal_x, normal_y, position, factor, corner, normals):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Bring normals to their true positions on rows of the whole grid."""
     rows, columns = normal_x.shape
-    share = _1 / _single(factor)
+    share = ONE / single(factor)
     for i in range(first, last):
-        y = min(max((_single(i) + _HALF) * share - _HALF, _0), _single(rows - 1))
+        y = min(max((single(i) + HALF) * share - HALF, ZERO), single(rows - 1))
         m = min(int(y), rows - 2)
         for j in range(columns * factor):
-            x = min(max((_single(j) + _HALF) * share - _HALF, _0), _single(columns - 1))
+            x = min(max((single(j) + HALF) * share - HALF, ZERO), single(columns - 1))
             n = min(int(x), columns - 2)
-            u = _between(position[0], n, m, x - _single(n), y - _single(m))[0]
-            v = _between(position[1], n, m, x - _single(n), y - _single(m))[0]
+            u = _between(position[0], n, m, x - single(n), y - single(m))[0]
+            v = _between(position[1], n, m, x - single(n), y - single(m))[0]
             c, r = min(int(u), columns - 2), min(int(v), rows - 2)
-            nx = _between(normal_x, c, r, u - _single(c), v - _single(r))[0]
-            ny = _between(normal_y, c, r, u - _single(c), v - _single(r))[0]
+            nx = _between(normal_x, c, r, u - single(c), v - single(r))[0]
+            ny = _between(normal_y, c, r, u - single(c), v - single(r))[0]
             to = normals[corner[0] + i, corner[1] + j]
             to[0], to[1] = nx, ny
-            to[2] = -np.sqrt(max(_1 - nx * nx - ny * ny, _0))
+            to[2] = -np.sqrt(max(ONE - nx * nx - ny * ny, ZERO))

@@ -14,9 +14,8 @@ from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.near_light.denoise import quieted
 from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, light_levels
-from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.near_light.sampling import halve, sample_rows
-from gelpolight_core.reconstruction.near_light.structures import RatioImage
+from gelpolight_core.reconstruction.near_light.structures import RatioImage, Region
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE
 
-_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
-_part = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True, forceinline=True)
-_single = np.float32
-_0, _HALF, _1 = _single(0.0), _single(0.5), _single(1.0)
-_MISSING = _single(1.5)
-_UNKNOWN_NOISE = _single(1e6)
+_MISSING = single(1.5)
+_UNKNOWN_NOISE = single(1e6)
 
 
-@_whole
+@whole
 def block_means(first, last, raw, scale, block, means):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Average blocks of raw pixels, block rows `first` to `last`."""
     width = means.shape[1] * block * 3
     line = np.empty(width, np.float32)
-    share = scale / _single(block * block)
+    share = scale / single(block * block)
     for i in range(first, last):
         line[:] = 0.0
         for r in range(i * block, (i + 1) * block):
             source = raw[r]
             for c in range(width):
-                line[c] += _single(source[c])
+                line[c] += single(source[c])
         for j in range(means.shape[1]):
             at = 3 * block * j
-            a, b, d = _single(0.0), _single(0.0), _single(0.0)
+            a, b, d = single(0.0), single(0.0), single(0.0)
             for c in range(block):
                 a += line[at + 3 * c]
                 b += line[at + 3 * c + 1]
@@ -37,7 +33,7 @@ def block_means(first, last, raw, scale, block, means):  # type: ignore[no-untyp
             means[i, j, 0], means[i, j, 1], means[i, j, 2] = a * share, b * share, d * share
 
 
-@_part
+@part
 def _near(light, raw, k, c, r, fu, fv):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the bilinear light among four pixels, and the brightest of them."""
     p00, p01 = light[k, raw[r, c, k]], light[k, raw[r, c + 1, k]]
@@ -46,7 +42,7 @@ def _near(light, raw, k, c, r, fu, fv):  # type: ignore[no-untyped-def]  # pragm
     return upper + fv * (lower - upper), max(max(p00, p01), max(p10, p11))
 
 
-@_part
+@part
 def _wide(light, raw, k, c, r, fu, fv):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the bilinear light between averages of 2 x 2 pixels, and the brightest pixel."""
     c1, r1 = c + 1, r + 1
@@ -55,8 +51,8 @@ def _wide(light, raw, k, c, r, fu, fv):  # type: ignore[no-untyped-def]  # pragm
     p10, p11, p12 = light[k, raw[r1, c, k]], light[k, raw[r1, c1, k]], light[k, raw[r1, c2, k]]
     p20, p21, p22 = light[k, raw[r2, c, k]], light[k, raw[r2, c1, k]], light[k, raw[r2, c2, k]]
     top = max(max(max(p00, p01), max(p02, p10)), max(max(p11, p12), max(p20, p21)))
-    a, b = _1 - fu, _1 - fv
-    seen = _single(0.25) * (
+    a, b = ONE - fu, ONE - fv
+    seen = single(0.25) * (
         b * (a * p00 + p01 + fu * p02)
         + (a * p10 + p11 + fu * p12)
         + fv * (a * p20 + p21 + fu * p22)
@@ -64,7 +60,7 @@ def _wide(light, raw, k, c, r, fu, fv):  # type: ignore[no-untyped-def]  # pragm
     return seen, max(top, p22)
 
 
-@_whole
+@whole
 def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corner, image):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Compare a raw image with the background, rows `first` to `last` of a region.
 
@@ -93,7 +89,7 @@ def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corn
     unmix, sd = sensor
     ratio, noise, marks = image.ratio, image.noise, image.marks
     height, width = raw.shape[0], raw.shape[1]
-    back = _HALF if wide else _0
+    back = HALF if wide else ZERO
     seen = np.empty(3, np.float32)
     for i in range(first, last):
         at = i + corner[0]
@@ -101,13 +97,13 @@ def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corn
             to = j + corner[1]
             if kind[at, to] != 2:
                 for k in range(3):
-                    ratio[k, i, j], noise[k, i, j] = _1, _UNKNOWN_NOISE
+                    ratio[k, i, j], noise[k, i, j] = ONE, _UNKNOWN_NOISE
                 marks[i, j] = 0
                 continue
-            u = min(max(u_px[at, to] - back, _0), _single(width - 1.001))
-            v = min(max(v_px[at, to] - back, _0), _single(height - 1.001))
+            u = min(max(u_px[at, to] - back, ZERO), single(width - 1.001))
+            v = min(max(v_px[at, to] - back, ZERO), single(height - 1.001))
             c, r = min(int(u), width - 2), min(int(v), height - 2)
-            fu, fv = u - _single(c), v - _single(r)
+            fu, fv = u - single(c), v - single(r)
             bits = 0
             for k in range(3):
                 if wide:
@@ -120,13 +116,13 @@ def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corn
                         bits |= NOT_FINITE
             for k in range(3):
                 own = unmix[k][0] * seen[0] + unmix[k][1] * seen[1] + unmix[k][2] * seen[2]
-                gain = _1 / background[at, to, k]
+                gain = ONE / background[at, to, k]
                 ratio[k, i, j] = own * gain
                 noise[k, i, j] = sd[k] * gain
             marks[i, j] = bits
 
 
-@_part
+@part
 def _finite_mean(fine, coarse, i, j):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write the mean ratio of those of four nodes that are numbers; 1 where none is."""
     count = 0
@@ -134,22 +130,22 @@ def _finite_mean(fine, coarse, i, j):  # type: ignore[no-untyped-def]  # pragma:
         for c in range(2 * j, 2 * j + 2):
             count += not fine.marks[r, c] & NOT_FINITE
     for k in range(3):
-        total = _0
+        total = ZERO
         for r in range(2 * i, 2 * i + 2):
             for c in range(2 * j, 2 * j + 2):
                 if not fine.marks[r, c] & NOT_FINITE:
                     total += fine.ratio[k, r, c]
-        coarse.ratio[k, i, j] = total / _single(count) if count else _1
+        coarse.ratio[k, i, j] = total / single(count) if count else ONE
 
 
-@_whole
+@whole
 def halve(first, last, fine, coarse):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Average an image over 2 x 2 nodes; a channel is saturated where most of them are.
 
     Nodes that are no number are left out of the average.
     """
     columns = coarse.marks.shape[1]
-    quarter, eighth = _single(0.25), _single(0.125)
+    quarter, eighth = single(0.25), single(0.125)
     for i in range(first, last):
         for k in range(3):
             a, b, out = fine.ratio[k, 2 * i], fine.ratio[k, 2 * i + 1], coarse.ratio[k, i]

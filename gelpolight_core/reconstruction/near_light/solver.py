@@ -31,7 +31,7 @@ from gelpolight_core.reconstruction.checks import (
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.linear import linearised
-from gelpolight_core.reconstruction.near_light.contact import ContactFinder, contact_finder
+from gelpolight_core.reconstruction.near_light.contact import margin_mm, padded_region
 from gelpolight_core.reconstruction.near_light.from_around import FromAround
 from gelpolight_core.reconstruction.near_light.image_noise import image_noise
 from gelpolight_core.reconstruction.near_light.maps import COARSE, MISSING_CODE, SensorMaps
@@ -41,36 +41,36 @@ from gelpolight_core.reconstruction.near_light.placement import (
     show_normals,
 )
 from gelpolight_core.reconstruction.near_light.ratio import Compared, PressSampler
-from gelpolight_core.reconstruction.near_light.region import Region, padded_region
 from gelpolight_core.reconstruction.near_light.region_solver import (
     RegionSolver,
+    Rounds,
     SolvedRegion,
     Start,
     unsolved_share,
 )
-from gelpolight_core.reconstruction.near_light.rounds import Rounds
 from gelpolight_core.reconstruction.near_light.settings import MOVED, SETTINGS, Settings
-from gelpolight_core.reconstruction.near_light.structures import Slopes
+from gelpolight_core.reconstruction.near_light.structures import Region, Slopes
 from gelpolight_core.reconstruction.near_light.surface_image import surface_image
 from gelpolight_core.reconstruction.near_light.uncertainty import depth_noise, no_contact_noise
 from gelpolight_core.reconstruction.solver import (
+    INTEGRATION,
+    LOOKING,
+    NOTHING_PRESSED,
     DepthNoise,
     Gain,
     OpenSolver,
     Solved,
     Wanted,
+    flat_normals,
+    unseen_reason,
 )
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
-from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.stated_lengths import stated_sd
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
-MARGIN_DECAYS = 1.5
-"""Margin of the region around a contact; the drape falls by a factor e over its decay length."""
-LEAST_MARGIN_MM = 0.8
 RESOLVED = 0.5
 """Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with
 0.28 2 %."""
@@ -78,10 +78,8 @@ WHOLE = 0.85
 """A region with this share of the grid is extended to all of it."""
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 45, 88, 6
 """Bytes that a sampled, a solved and a shown node must read and write once."""
-LOOKING = tr("contact detection")
 COMPARING = tr("resampling and comparing")
 COARSE_ROUNDS = tr("near light, quarter scale")
-INTEGRATION = tr("integration")
 PLACING = tr("true positions")
 LAST_ROUND = {
     1: tr("near light, full scale"),
@@ -130,10 +128,7 @@ class NearLightSolver(OpenSolver):
         assert full is not None
         self._settings = settings
         self.maps = SensorMaps(calibration, full)
-        super().__init__(calibration, full.led_positions_mm, self.maps.usable)
-        self.workers = RowWorkers(workers)
-        self._margin_mm = max(MARGIN_DECAYS * full.decay_mm, LEAST_MARGIN_MM)
-        self._finders: dict[bool, ContactFinder] = {}
+        super().__init__(calibration, full.led_positions_mm, self.maps.usable, workers)
         buffers = Buffers()
         self._take = buffers.take
         self._sampler = PressSampler(self.maps, self.workers, buffers)
@@ -144,7 +139,7 @@ class NearLightSolver(OpenSolver):
     @cached_property
     def visible_mm(self) -> float:
         """Smallest depth of a flat face that is found."""
-        return self._finder(False).visible_mm
+        return self.finder(False).visible_mm
 
     @staticmethod
     def refuse_unfit(calibration: Calibration) -> None:
@@ -299,15 +294,6 @@ class NearLightSolver(OpenSolver):
         light_sd = None if wanted.light is None else wanted.light.sd
         return depth_noise(kept, self.maps, noise, solve, self.workers, light_sd=light_sd)
 
-    def _finder(self, linear: bool) -> ContactFinder:
-        """Return what looks for contacts in raw images, or in those of linear light."""
-        straight = linear or self.calibration.response is None
-        if straight not in self._finders:
-            seen = replace(self.calibration, response=None) if straight else self.calibration
-            beside_mm = 2.0 * self._margin_mm
-            self._finders[straight] = contact_finder(seen, self.maps.full, beside_mm=beside_mm)
-        return self._finders[straight]
-
     def _region(self, image: Image, record: TraceRecorder, everywhere: bool) -> Region | None:
         scale = self.maps.scale(COARSE)
         whole = Region((0, 0), scale.kind.shape)
@@ -315,15 +301,11 @@ class NearLightSolver(OpenSolver):
             record.left_out(LOOKING, tr("the whole field is requested"))
             return whole
         with record.done(LOOKING, image.raw.nbytes) as reason:
-            contact = self._finder(image.linear).find(image.raw, self.workers, image.gain)
+            contact = self.finder(image.linear).find(image.raw, self.workers, image.gain)
             if contact is None:
-                reason.append(
-                    tr(
-                        "the image equals the background; smallest visible depth {um:.0f} um"
-                    ).format(um=1e3 * self.visible_mm)
-                )
+                reason.append(unseen_reason(self.visible_mm))
                 return None
-            region = padded_region(contact, scale, self._margin_mm)
+            region = padded_region(contact, scale, margin_mm(self.maps.full))
             share = region.nodes / whole.nodes
             reason.append(tr("{share:.0%} of the field is solved").format(share=share))
         return whole if share > WHOLE else region
@@ -436,14 +418,7 @@ class NearLightSolver(OpenSolver):
 
 def _nothing_pressed(record: TraceRecorder) -> None:
     for name in (COMPARING, tr("near light"), INTEGRATION):
-        record.left_out(name, tr("nothing is pressed into the membrane"))
-
-
-def flat_normals(shape: tuple[int, ...]) -> Map:
-    """Return normals (rows, columns, 3) of the flat membrane."""
-    normals = np.zeros((*shape, 3), np.float32)
-    normals[..., 2] = -1.0
-    return normals
+        record.left_out(name, NOTHING_PRESSED)
 
 
 def _image(frame: NDArray[Any], gain: Gain | None = None) -> Image:

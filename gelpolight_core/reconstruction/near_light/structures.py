@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,24 @@ NOT_FINITE = 8
 HIDDEN, JUDGED = 16, 128
 """Bits of `RatioImage.marks`: the first of three bits for lights hidden by the present surface, and
 the bit that shows that these are known. Otherwise a channel without light is dark."""
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A rectangle of quarter-scale nodes: its first row and column, and its size."""
+
+    corner: tuple[int, int]
+    shape: tuple[int, int]
+
+    def at(self, factor: int) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Return corner and shape at a finer scale, `factor` nodes to a quarter-scale node."""
+        (top, left), (rows, columns) = self.corner, self.shape
+        return (factor * top, factor * left), (factor * rows, factor * columns)
+
+    @property
+    def nodes(self) -> int:
+        """Quarter-scale nodes in it."""
+        return self.shape[0] * self.shape[1]
 
 
 class RatioImage(NamedTuple):

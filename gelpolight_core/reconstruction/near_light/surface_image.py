@@ -18,7 +18,7 @@ from gelpolight_core.reconstruction.height_map import (
 )
 from gelpolight_core.reconstruction.near_light.from_around import CLEAR, FromAround, meeting
 from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, brightness
-from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.solver import thinned
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel

@@ -18,12 +18,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate2d
 
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reconstruction.compiled import whole
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
@@ -183,7 +183,7 @@ def _ratio_sd(
     return sd
 
 
-@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+@whole
 def _noise_of_ratio(first, last, ratio, base, mix, unmix, table, share, sd):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     least = np.float32(LEAST_NOISE)
     variance = np.empty(3, np.float32)
@@ -233,7 +233,7 @@ def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> Slop
     return SlopeNoise(moved_x, moved_y, moved)
 
 
-@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+@whole
 def _half_differences(high, low, moved_x, moved_y, moved):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     half, least, one = np.float32(0.5), np.float32(1e-6), np.float32(1.0)
     for i in range(moved.shape[0]):

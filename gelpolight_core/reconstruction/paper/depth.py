@@ -25,7 +25,9 @@ from gelpolight_core.reconstruction.checks import (
     paper_notes,
     refuse_coplanar_lights,
     refuse_dark_membrane,
+    visible_depth_notes,
 )
+from gelpolight_core.reconstruction.compiled import BLOCK
 from gelpolight_core.reconstruction.height_map import (
     Flag,
     HeightMap,
@@ -35,23 +37,28 @@ from gelpolight_core.reconstruction.height_map import (
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linear import linearised
 from gelpolight_core.reconstruction.paper.divergence import paper_divergence_rows
-from gelpolight_core.reconstruction.paper.kernel import BLOCK, STATIC_PLANES, blank_rows
+from gelpolight_core.reconstruction.paper.kernel import STATIC_PLANES, blank_rows
 from gelpolight_core.reconstruction.solver import (
+    INTEGRATION,
+    LOOKING,
+    NOTHING_PRESSED,
     Gain,
     OpenSolver,
     Solved,
     Wanted,
+    flat_normals,
     thinned,
+    unseen_reason,
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
-from gelpolight_core.reconstruction.trace import Trace, TraceStep
+from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 LOOKUP_SIZE = 2048
 PAPER_REASON = tr("the paper's model has one mode")
-PAPER_STEPS = (tr("resampling, normals and their divergence"), tr("integration"))
+PAPER_STEPS = (tr("resampling, normals and their divergence"), INTEGRATION)
 
 
 class PaperSolver(OpenSolver):
@@ -69,11 +76,10 @@ class PaperSolver(OpenSolver):
 
     def __init__(self, calibration: Calibration, *, workers: int) -> None:
         known = usable(calibration.table.valid, calibration.radiance, calibration.factors)
-        super().__init__(calibration, calibration.led_positions_mm, known)
+        super().__init__(calibration, calibration.led_positions_mm, known, workers)
         grid = calibration.table.grid
         self.integration = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=workers)
-        self._threads = RowWorkers(workers)
-        self.slopes = SlopeSolver(calibration, known, self._threads)
+        self.slopes = SlopeSolver(calibration, known, self.workers)
 
     @staticmethod
     def refuse_unfit(calibration: Calibration) -> None:
@@ -98,8 +104,40 @@ class PaperSolver(OpenSolver):
     def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
         """Return which steps a frame needs; see :class:`Solver`."""
         record = wanted.record()
-        record.steps += [TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS]
+        if self._contact(frame, wanted, record):
+            record.steps += [TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS]
         return Trace(wanted.effort, tuple(record.steps))
+
+    def _contact(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> bool:
+        """Return whether something may be pressed, as the full model finds it."""
+        if wanted.everywhere or not wanted.untouched or self.calibration.full is None:
+            return True
+        linear = frame.dtype.kind == "f"
+        if linear and not np.isfinite(frame).all():
+            return True
+        with record.done(LOOKING, frame.nbytes) as reason:
+            finder = self.finder(linear)
+            contact = finder.find(
+                np.require(frame, requirements=["C", "W"]), self.workers, wanted.gain
+            )
+            reason.append(unseen_reason(finder.visible_mm) if contact is None else PAPER_REASON)
+        if contact is None:
+            for step in PAPER_STEPS:
+                record.left_out(step, NOTHING_PRESSED)
+        return contact is not None
+
+    def _flat(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> Solved:
+        """Return the result where nothing is pressed."""
+        visible_mm = self.finder(frame.dtype.kind == "f").visible_mm
+        return Solved(
+            np.zeros(self._known.shape, np.float32),
+            flat_normals(self._known.shape) if wanted.normals else None,
+            np.where(self._known, np.uint8(0), np.uint8(Flag.OUTSIDE)),
+            (*self._condition_notes, *visible_depth_notes(visible_mm)),
+            Trace(wanted.effort, tuple(record.steps)),
+            visible_depth_mm=visible_mm,
+            lateral_per_mm=self.ray_spread_per_mm,
+        )
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
         """Return the image of a surface by Eq. 6, with the light of the flat membrane."""
@@ -124,6 +162,8 @@ class PaperSolver(OpenSolver):
     def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
         """Reconstruct a frame; see :class:`Solver`."""
         light, record = frame, wanted.record()
+        if not self._contact(frame, wanted, record):
+            return self._flat(frame, wanted, record)
         response = self.calibration.response
         if response is not None and frame.dtype.kind != "f":
             with record.done(tr("linear light"), frame.nbytes) as reason:
@@ -136,7 +176,7 @@ class PaperSolver(OpenSolver):
             reason.append(PAPER_REASON)
         with record.done(PAPER_STEPS[1], 2 * divergence.nbytes) as reason:
             depth_mm = self.integration.depth_of(divergence)
-            self._threads.run(len(depth_mm), blank_rows, field.flags, depth_mm)
+            self.workers.run(len(depth_mm), blank_rows, field.flags, depth_mm)
             reason.append(PAPER_REASON)
         if not wanted.normals:
             record.left_out(tr("normals"), tr("not requested"))

@@ -14,27 +14,26 @@ import numba
 import numpy as np
 
 from gelpolight_core.masks import DARK_COSINE
+from gelpolight_core.reconstruction.compiled import BLOCK, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.integration.poisson import SLOPE_LIMIT
 
-BLOCK = 64
 STATIC_PLANES = 5
 
 _B = BLOCK
-_single, _int = np.float32, np.int32
-_0, _1 = _single(0.0), _single(1.0)
-_LEAST_NZ = _single(1.0 / SLOPE_LIMIT)
-_DARK = _single(DARK_COSINE)
+_int = np.int32
+_LEAST_NZ = single(1.0 / SLOPE_LIMIT)
+_DARK = single(DARK_COSINE)
 _OUTSIDE = np.uint8(Flag.OUTSIDE)
-_F_OUTSIDE, _F_SATURATED = _single(Flag.OUTSIDE), _single(Flag.SATURATED)
-_F_DARK, _F_FAR = _single(Flag.DARK), _single(Flag.EXTRAPOLATED)
-_F_HIDDEN, _F_INVALID = _single(Flag.NOT_OBSERVABLE), _single(Flag.INVALID)
+_F_OUTSIDE, _F_SATURATED = single(Flag.OUTSIDE), single(Flag.SATURATED)
+_F_DARK, _F_FAR = single(Flag.DARK), single(Flag.EXTRAPOLATED)
+_F_HIDDEN, _F_INVALID = single(Flag.NOT_OBSERVABLE), single(Flag.INVALID)
 _BYTE, _HALF_WORD = np.uint32(255), np.uint64(32)
 
 # Planes of the work array: place between pixels (2), light, then place in the table (3), brightest
 # pixel, beyond the table, not a number; slopes (2), flags.
-_SEEN, _TOP, _FAR, _BAD, _OUT = 2, 5, 6, 7, 8
-_PLANES = 11
+_WIDTHS = (2, 3, 1, 1, 1, 3)
+_PLACE, _SEEN, _TOP, _FAR, _BAD, _OUT = (np.cumsum(_WIDTHS) - _WIDTHS).tolist()
 
 _flags = {"nsz", "arcp", "contract"}
 _part = numba.njit(nogil=True, fastmath=_flags, error_model="numpy", forceinline=True, cache=True)
@@ -55,7 +54,7 @@ def _pixels(i, block, static, width, height, w, pixel):  # type: ignore[no-untyp
         c = max(min(_int(u), right), _int(0))
         r = max(min(_int(v), low), _int(0))
         pixel[j] = r * _int(width) + c
-        w[j], w[_B + j] = u - _single(c), v - _single(r)
+        w[j], w[_B + j] = u - single(c), v - single(r)
 
 
 @_part
@@ -78,7 +77,7 @@ def _between(a, b, c, d, fu, fv):  # type: ignore[no-untyped-def]  # pragma: no 
 
 @_part
 def _byte(words, at, shift):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    return _single(_int((words[at] >> np.uint32(shift)) & _BYTE))
+    return single(_int((words[at] >> np.uint32(shift)) & _BYTE))
 
 
 @_part
@@ -111,13 +110,13 @@ def _resample_any(pixel, raw, right, below, w):  # type: ignore[no-untyped-def] 
     """As `_pick` and `_resample_bytes`, for pixels (pixels, 3) of any kind."""
     for j in range(_B):
         at = pixel[j]
-        brightest = _0
+        brightest = ZERO
         for k in range(3):
             light, top = _between(
-                _single(raw[at, k]),
-                _single(raw[at + right, k]),
-                _single(raw[at + below, k]),
-                _single(raw[at + below + right, k]),
+                single(raw[at, k]),
+                single(raw[at + right, k]),
+                single(raw[at + below, k]),
+                single(raw[at + below + right, k]),
                 w[j],
                 w[_B + j],
             )
@@ -138,8 +137,8 @@ def _resample(pixel, raw, pairs, right, below, words, w):  # type: ignore[no-unt
 @_part
 def _limited(position, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a place within the table, whether it was no number or below, and whether beyond."""
-    bad = not (position >= _0)
-    position = _0 if bad else position
+    bad = not (position >= ZERO)
+    position = ZERO if bad else position
     far = position > last
     return last if far else position, bad, far
 
@@ -147,7 +146,7 @@ def _limited(position, last):  # type: ignore[no-untyped-def]  # pragma: no cove
 @_part
 def _positions(i, block, static, scale, size, w, entry):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Divide by light and factor (Eq. 7), and find the place in each channel's table."""
-    last, top = _single(size - 1), _int(size - 2)
+    last, top = single(size - 1), _int(size - 2)
     one, two = _int(size), _int(2 * size)
     for j in range(_B):
         a, bad0, far0 = _limited(w[_SEEN * _B + j] * static[i, block, 2 * _B + j] * scale[0], last)
@@ -159,11 +158,11 @@ def _positions(i, block, static, scale, size, w, entry):  # type: ignore[no-unty
         )
         m, n, o = min(_int(a), top), min(_int(b), top), min(_int(c), top)
         entry[j], entry[_B + j], entry[2 * _B + j] = m, n + one, o + two
-        w[_SEEN * _B + j] = a - _single(m)
-        w[(_SEEN + 1) * _B + j] = b - _single(n)
-        w[(_SEEN + 2) * _B + j] = c - _single(o)
-        w[_FAR * _B + j] = _1 if far0 | far1 | far2 else _0
-        w[_BAD * _B + j] = _1 if bad0 | bad1 | bad2 else _0
+        w[_SEEN * _B + j] = a - single(m)
+        w[(_SEEN + 1) * _B + j] = b - single(n)
+        w[(_SEEN + 2) * _B + j] = c - single(o)
+        w[_FAR * _B + j] = ONE if far0 | far1 | far2 else ZERO
+        w[_BAD * _B + j] = ONE if bad0 | bad1 | bad2 else ZERO
 
 
 @_part
@@ -199,11 +198,11 @@ def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, 
     pz0, qz0, rz0 = bx * c1 - b1 * cx, cx * a1 - c1 * ax, ax * b1 - a1 * bx
     pz1, qz1, rz1 = b1 - c1, c1 - a1, a1 - b1
     for j in range(_B):
-        ok = _1 if static[i, block, 2 * _B + j] > _0 else _0
+        ok = ONE if static[i, block, 2 * _B + j] > ZERO else ZERO
         ka, dark0, far0 = _cosine(w, found, 0, j, coverage)
         kb, dark1, far1 = _cosine(w, found, 1, j, coverage)
         kc, dark2, far2 = _cosine(w, found, 2, j, coverage)
-        x = x_first + pitch * _single(j)
+        x = x_first + pitch * single(j)
         a0, b0, c0 = ax - x, bx - x, cx - x
         ka = ka * sqrt(a0 * a0 + a2)
         kb = kb * sqrt(b0 * b0 + b2)
@@ -211,7 +210,7 @@ def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, 
         pz, qz, rz = pz0 + pz1 * x, qz0 + qz1 * x, rz0 + rz1 * x
         py = py0 + py1 * x
         whole = a0 * px + a1 * py + az * pz
-        side = _1 if whole > _0 else -_1
+        side = ONE if whole > ZERO else -ONE
         ka, kb, kc = side * ka, side * kb, side * kc
         nx = ka * px + kb * qx + kc * rx
         ny = ka * py + kb * (qy0 + qy1 * x) + kc * (ry0 + ry1 * x)
@@ -220,21 +219,21 @@ def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, 
         least = -_LEAST_NZ * size
         hidden = not (nz < least)
         nz = least if hidden else nz
-        solved = size > _0
-        short = ok / (nz if solved else _1)
+        solved = size > ZERO
+        short = ok / (nz if solved else ONE)
         saturated = w[_TOP * _B + j] >= limit
-        far = far0 | far1 | far2 | (w[_FAR * _B + j] > _0)
-        bad = (not solved) | (w[_BAD * _B + j] > _0)
+        far = far0 | far1 | far2 | (w[_FAR * _B + j] > ZERO)
+        bad = (not solved) | (w[_BAD * _B + j] > ZERO)
         flag = (
-            (_F_SATURATED if saturated else _0)
-            + (_F_DARK if dark0 | dark1 | dark2 else _0)
-            + (_F_FAR if far else _0)
-            + (_F_HIDDEN if hidden else _0)
-            + (_F_INVALID if bad else _0)
+            (_F_SATURATED if saturated else ZERO)
+            + (_F_DARK if dark0 | dark1 | dark2 else ZERO)
+            + (_F_FAR if far else ZERO)
+            + (_F_HIDDEN if hidden else ZERO)
+            + (_F_INVALID if bad else ZERO)
         )
         w[_OUT * _B + j] = nx * short
         w[(_OUT + 1) * _B + j] = ny * short
-        w[(_OUT + 2) * _B + j] = ok * flag + (_1 - ok) * _F_OUTSIDE
+        w[(_OUT + 2) * _B + j] = ok * flag + (ONE - ok) * _F_OUTSIDE
 
 
 @_part
@@ -252,7 +251,7 @@ def _put(w, plane, line, begin, count):  # type: ignore[no-untyped-def]  # pragm
 def work_arrays():  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return what `solve_row` works in, made by its caller once for many rows."""
     return (
-        np.zeros(_PLANES * _B, np.float32),
+        np.zeros(sum(_WIDTHS) * _B, np.float32),
         np.zeros(_B, np.uint32),
         np.zeros(3 * _B, np.uint32),
         np.zeros(4 * _B, np.uint32),
@@ -285,11 +284,11 @@ def solve_row(i, image, sensor, work, slope_x, slope_y, flags):  # type: ignore[
             _resample(pixel, raw, pairs, right, below, words, w)
             _positions(i, block, static, scale, entries, w, entry)
             _look_up(entry, table, found)
-            x = _single(x_first + pitch * begin)
-            step, y = _single(pitch), y_mm[i]
+            x = single(x_first + pitch * begin)
+            step, y = single(pitch), y_mm[i]
             _normals(i, block, static, shares, coverage, leds, limit, x, step, y, w)
         else:
-            w[_OUT * _B :] = _0
+            w[_OUT * _B :] = ZERO
             w[(_OUT + 2) * _B : (_OUT + 3) * _B] = _F_OUTSIDE
         count = min(_B, columns - begin)
         _put(w, _OUT, slope_x, begin, count)
@@ -304,4 +303,4 @@ def blank_rows(first, last, flags, depth):  # type: ignore[no-untyped-def]  # pr
     """Set the depth of rows `first` to `last` to 0 where there is no membrane."""
     for i in range(first, last):
         for j in range(depth.shape[1]):
-            depth[i, j] = _0 if flags[i, j] & _OUTSIDE else depth[i, j]
+            depth[i, j] = ZERO if flags[i, j] & _OUTSIDE else depth[i, j]

@@ -47,9 +47,8 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(
 @pytest.mark.parametrize("model", ["full", "in-place"])
 def test_the_legend_states_the_median_misfit(model: str, dome: HeightMap, qtbot: QtBot) -> None:
     class Explained(Reconstruction):
-        def residual(self, _frame: object, height_map: HeightMap, *, step: int) -> np.ndarray:
-            shape = height_map.depth_mm[step // 2 :: step, step // 2 :: step].shape
-            return np.full((*shape, 3), 0.05, np.float32)
+        def misfit(self, _frame: object, height_map: HeightMap, *, largest: int) -> np.ndarray:
+            return np.full(height_map.depth_mm[:largest, :largest].shape, 0.05, np.float32)
 
     panel = QualityPanel()
     qtbot.addWidget(panel)
