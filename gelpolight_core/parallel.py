@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -40,10 +41,13 @@ def in_parallel(
     """
     todo = list(items)
     wanted = min(usable_cores(), MOST_THREADS) if threads is None else threads
-    pool = ThreadPoolExecutor(max(min(wanted, len(todo)), 1), "parallel")
+    name = f"parallel-{id(todo)}"
+    pool = ThreadPoolExecutor(max(min(wanted, len(todo)), 1), name)
     try:
         waiting = [pool.submit(function, item) for item in todo]
         for future in waiting:
             yield future.result()
     finally:
-        pool.shutdown(cancel_futures=True)
+        # Python may collect a generator that was left early in a thread of its own pool.
+        own = threading.current_thread().name.startswith(name)
+        pool.shutdown(wait=not own, cancel_futures=True)

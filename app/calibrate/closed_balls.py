@@ -118,7 +118,7 @@ def detect_closed_ball(
 
     def detect() -> Detection:
         grid = untouched.grid
-        _refuse_size(rgb, grid.image)
+        refuse_size(rgb, (grid.image.width, grid.image.height))
         seen = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
         radius = radius_mm / grid.pitch_mm
         found, _ = find_contact(seen, untouched.base, ball_radius=radius, name=tr("Image"))
@@ -135,11 +135,12 @@ def detect_closed_ball(
     return or_refusal(detect, marks=marks)
 
 
-def _refuse_size(rgb: Rgb, size: ImageSize) -> None:
-    if (rgb.shape[1], rgb.shape[0]) != (size.width, size.height):
+def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
+    """Raise InputError if the image does not have the (width, height) of the background."""
+    if (rgb.shape[1], rgb.shape[0]) != size:
         raise InputError(
             tr("The image has {a} x {b} pixels, but the background has {c} x {d}").format(
-                a=rgb.shape[1], b=rgb.shape[0], c=size.width, d=size.height
+                a=rgb.shape[1], b=rgb.shape[0], c=size[0], d=size[1]
             ),
             where=tr("Image"),
             advice=tr("Set the camera to the image size of the background"),
@@ -246,7 +247,6 @@ def _write(rgb: np.ndarray, text: str, at: tuple[int, int], colour: tuple[int, .
     cv2.putText(rgb, text, corner, font, 0.45, colour, 1, cv2.LINE_AA)
 
 
-USUAL_MM_PER_PX = 0.06
 ASKED = ("next_ball_gain_percent", "balls_used")
 """Figures whose advice is in the sentence about the next press."""
 
@@ -275,13 +275,15 @@ class ClosedBallsStep(BallsStep):
         files = session.found(FOLDERS[Stage.BACKGROUND])
         if not files:
             return too_early
-        run = self._run()
-        stated = session.in_place.mm_per_px
-        measured = USUAL_MM_PER_PX if run is None else run.result.model.grid.mm_per_px
-        scale = measured if stated is None else stated[0]
+        run, stated = self._run(), session.in_place.mm_per_px
+        if stated is None:
+            measured = self.model.project.results.scale
+            if measured is None:
+                return too_early
+            stated = (measured.mm_per_px, measured.mm_per_px)
         detect = partial(
             detect_closed_ball,
-            untouched=Untouched(files[-1], scale, session.response),
+            untouched=Untouched(files[-1], stated[0], session.response),
             radius_mm=self.radius.radius_mm,
         )
         if name:

@@ -201,10 +201,12 @@ class CalibratePage(QWidget):
         self.start.show_problem("")
         self.wizard = Wizard(project, context=self.context)
         self.wizard.left.connect(self._leave_session)
+        self.wizard.renewed.connect(lambda step: self._show_wizard(project, step=step))
         self._stack.addWidget(self.wizard)
         self._stack.setCurrentWidget(self.wizard)
         self.context.settings.add_recent("sessions", project.session.folder)
-        self.wizard.go_to(step or self.wizard.first_open_step())
+        known = step in [one.step.key for one in self.wizard.presenters]
+        self.wizard.go_to(step if known else self.wizard.first_open_step())
         if self._shown:
             self.wizard.enter()
 

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.calibrate.setup_values import (
+    OTHER,
     PRESETS,
     USUAL_RADIUS_MM,
     SetupValues,
@@ -167,7 +168,8 @@ class SetupForm(QScrollArea):
     def _check(self) -> None:
         values, problem = self.values.value, ""
         self.facts.setText(preset_text(values.preset))
-        self.values.rows.setRowVisible(self.facts, not values.optics)
+        known = values.preset != OTHER and not values.optics
+        self.values.rows.setRowVisible(self.facts, known or values.source == "stated")
         try:
             session_of(self.session, values)
         except InputError as error:

@@ -14,6 +14,7 @@ from app.calibrate.radiance import RadianceStep
 from app.calibrate.reflectance.presenter import ReflectanceStep
 from app.calibrate.refraction import RefractionStep
 from app.calibrate.result import ResultStep
+from app.calibrate.scale import ScaleStep
 from app.calibrate.setup import SetupStep
 from app.calibrate.step import StepPresenter
 from app.calibrate.step_data import Step
@@ -40,13 +41,22 @@ OPEN_ROUTE: Route = (
 )
 """For a sensor that can be opened."""
 
-CLOSED_ROUTE: Route = (SetupStep, BackgroundStep, ClosedBallsStep, ResultStep, ValidationStep)
+CLOSED_ROUTE: Route = (
+    SetupStep,
+    BackgroundStep,
+    ScaleStep,
+    ClosedBallsStep,
+    ResultStep,
+    ValidationStep,
+)
 """For a sensor whose membrane is bonded: calibrated in place."""
 
 
 def route_of(project: CalibrationProject | ClosedProject) -> Route:
-    """Return the route of a session."""
-    return CLOSED_ROUTE if isinstance(project, ClosedProject) else OPEN_ROUTE
+    """Return the route of a session, without steps for images that it does not need."""
+    route = CLOSED_ROUTE if isinstance(project, ClosedProject) else OPEN_ROUTE
+    having = (None, *project.statuses())
+    return tuple(step for step in route if step.describe().stage in having)
 
 
 def steps_of(route: Route, having: Container[Stage] | None = None) -> tuple[Step, ...]:

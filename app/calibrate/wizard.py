@@ -47,9 +47,12 @@ class Wizard(QMainWindow):
     -------
     left()
         The user wants to leave this session.
+    renewed(str)
+        The session needs other steps than before; with the key of the open one.
     """
 
     left = Signal()
+    renewed = Signal(str)
 
     def __init__(self, project: CalibrationProject | ClosedProject, *, context: AppContext) -> None:
         super().__init__()
@@ -72,6 +75,9 @@ class Wizard(QMainWindow):
             if not presenter.opens_slowly:
                 _add(self.centre, presenter.centre)
         self._running: object = None
+        # Not at once: the history may ask for it, and is closed then.
+        self._renewal = QTimer(self, singleShot=True, interval=0)
+        self._renewal.timeout.connect(lambda: self.renewed.emit(self.open.step.key))
         self._build_docks()
         self._build_keys()
         self.session_camera = SessionCamera(self.model, context=context, window=self)
@@ -189,6 +195,7 @@ class Wizard(QMainWindow):
 
     def close_session(self) -> None:
         """Stop all work; all captures and decisions are on disk."""
+        self._renewal.stop()
         for presenter in self.presenters:
             presenter.close()
         self.leave()
@@ -277,6 +284,9 @@ class Wizard(QMainWindow):
 
     def refresh(self) -> None:
         """Show the present state of everything."""
+        if self.project.statuses().keys() != self.model.statuses.keys():
+            self._renewal.start()
+            return
         self.model.update()
         self.model.states = self._states()
         self.step_list.show_states(self.model.states)

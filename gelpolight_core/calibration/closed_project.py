@@ -10,6 +10,8 @@ from pathlib import Path
 from gelpolight_core.calibration.in_place_session import (
     InPlaceRun,
     calibrate_closed_session,
+    judge_scale,
+    measured_scale,
     stages_of,
 )
 from gelpolight_core.calibration.inputs import FOLDERS, Stage, StageInputs
@@ -18,12 +20,11 @@ from gelpolight_core.calibration.staged_project import Outcome, StagedProject
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.in_place.scale import MeasuredScale
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.images import require_colour
 from gelpolight_core.session.session import InPlace, Session, read_session
 from gelpolight_core.translation import tr
-
-STAGES = (Stage.BACKGROUND, Stage.BALLS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +35,14 @@ class ClosedResults:
     ----------
     background : QualityTable
         Figures of the untouched membrane.
+    scale : MeasuredScale or None
+        The newest scale from images of a pressed object, even if out of date.
     run : InPlaceRun or None
         The newest calibration, even if out of date.
     """
 
     background: QualityTable = field(default_factory=QualityTable)
+    scale: MeasuredScale | None = None
     run: InPlaceRun | None = None
 
 
@@ -67,10 +71,10 @@ class ClosedProject(StagedProject[ClosedResults]):
         return hashlib.sha256(repr((balls.fingerprint, serial)).encode()).hexdigest()
 
     def statuses(self) -> dict[Stage, StageStatus]:
-        """Return the present status of both stages."""
+        """Return the present status of every stage."""
         with self._lock:
             inputs = self._inputs()
-            return {stage: self._status(stage, inputs[stage]) for stage in STAGES}
+            return {stage: self._status(stage, inputs[stage]) for stage in inputs}
 
     def stale(self, *, upto: Stage | None = None) -> tuple[Stage, ...]:
         """Return the stages that can and need to be computed, in order.
@@ -83,12 +87,14 @@ class ClosedProject(StagedProject[ClosedResults]):
         with self._lock:
             inputs = self._inputs()
         found = []
-        for stage in STAGES[:1] if upto is Stage.BACKGROUND else STAGES:
+        for stage in inputs:
             if not inputs[stage].images:
                 break
             if not self._is_current(stage, inputs[stage]):
                 found.append(stage)
             elif self.fault(stage) is not None:
+                break
+            if stage is upto:
                 break
         return tuple(found)
 
@@ -98,7 +104,7 @@ class ClosedProject(StagedProject[ClosedResults]):
         Parameters
         ----------
         stage : Stage
-            Background or balls.
+            Background, scale or balls.
         progress : callable, optional
             Called with the share done; it may raise, which leaves everything unchanged.
         """
@@ -113,6 +119,9 @@ class ClosedProject(StagedProject[ClosedResults]):
                 require_colour(image, where=str(session.folder / "background"))
                 table = check_bare_membrane(image.rgb).quality
                 results = replace(results, background=table)
+            elif stage is Stage.SCALE:
+                image, stated = session.averaged("background"), session.in_place or InPlace()
+                results = replace(results, scale=measured_scale(session, stated, image))
             else:
                 run = calibrate_closed_session(session, progress=lambda _stage, share: say(share))
                 results = replace(results, run=run)
@@ -150,7 +159,11 @@ class ClosedProject(StagedProject[ClosedResults]):
         background = self._inputs_of(("background",), session.declared_response, ())
         folders = ("balls", *stages_of(session)[2:])
         balls = self._inputs_of(folders, (radii, circles, scale, *cut), (background.fingerprint,))
-        return {Stage.BACKGROUND: background, Stage.BALLS: balls}
+        found = {Stage.BACKGROUND: background}
+        if stated.mm_per_px is None:
+            size = (stated.pressed_scale, *cut)
+            found[Stage.SCALE] = self._inputs_of(("scale",), size, (background.fingerprint,))
+        return {**found, Stage.BALLS: balls}
 
     def _inputs_of(
         self, folders: tuple[str, ...], stated: object, earlier: tuple[str, ...]
@@ -167,7 +180,10 @@ class ClosedProject(StagedProject[ClosedResults]):
             return StageStatus(stage, StageState.WAITING, tr("Not computed yet"), nothing)
         if (unfinished := self._unfinished(stage, inputs)) is not None:
             return unfinished
-        table, run = self._results.background, self._results.run
+        table, scale, run = self._results.background, self._results.scale, self._results.run
+        if stage is Stage.SCALE and scale is not None:
+            more = tr("Add images of the pressed object, at other places")
+            table = judge_scale(scale.mm_per_px, scale.sd_mm_per_px / scale.mm_per_px, more)
         if stage is Stage.BALLS and run is not None:
             tables = run.calibration.quality.values()
             table = QualityTable(tuple(figure for t in tables for figure in t.figures))

@@ -397,6 +397,7 @@ _STEMS = {
     "mirror": "mirror",
     "whiteboard": "whiteboard",
     "background": "background",
+    "scale": "scale",
     "balls": "ball",
 }
 

@@ -12,7 +12,7 @@ from gelpolight_core.session.file_hashes import file_hash, refuse_copies
 from gelpolight_core.session.images import SessionImages, read_image, require_colour
 from gelpolight_core.translation import tr
 
-COLOUR_STAGES = (Stage.LIGHTS, Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
+COLOUR_STAGES = (Stage.LIGHTS, Stage.RADIANCE, Stage.BACKGROUND, Stage.SCALE, Stage.BALLS)
 
 
 def refuse_unfit(session: SessionImages, stage: Stage, files: Sequence[Path]) -> None:

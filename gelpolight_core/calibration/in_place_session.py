@@ -91,7 +91,7 @@ def calibrate_closed_session(
     background = session.averaged("background")
     require_colour(background, where=str(session.folder / "background"))
     stated = session.in_place or InPlace()
-    scale = None if stated.mm_per_px is not None else _measured_scale(session, stated, background)
+    scale = None if stated.mm_per_px is not None else measured_scale(session, stated, background)
     mm_per_px, scale_sd = _scale(stated, scale)
     grid = WorkingGrid(ImageSize(*background.size), mm_per_px)
     progress(tr("ball presses"), 0.05)
@@ -138,8 +138,23 @@ def _refuse_missing(session: Session) -> None:
         )
 
 
-def _measured_scale(session: Session, stated: InPlace, background: LinearImage) -> MeasuredScale:
-    """Return the scale by the images of ``scale/``."""
+def measured_scale(session: Session, stated: InPlace, background: LinearImage) -> MeasuredScale:
+    """Return the scale by the images of ``scale/``.
+
+    Parameters
+    ----------
+    session : Session
+        Its images.
+    stated : InPlace
+        The size of the pressed object.
+    background : LinearImage
+        The untouched membrane.
+
+    Raises
+    ------
+    InputError
+        If an image does not show the object.
+    """
     images = session.images("scale")
     rgb = [image.rgb for image in images]
     where, pressed = str(session.folder / "scale"), stated.pressed_scale
@@ -209,6 +224,21 @@ def _noise(rgb: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.asarray(1.4826 * spread, np.float64)
 
 
+def judge_scale(mm_per_px: float, scale_sd: float, advice: str = "") -> QualityTable:
+    """Judge a scale by its relative standard deviation; `advice` says how to lower it."""
+    scale = judge("mm_per_px", tr("Scale"), mm_per_px, "mm/px")
+    uncertainty = judge(
+        "scale_sd_percent",
+        tr("Uncertainty of the scale"),
+        100.0 * scale_sd,
+        "%",
+        warn=2.0,
+        fail=10.0,
+        advice=advice or tr("Measure the scale with a pin grid or a flat punch"),
+    )
+    return QualityTable((scale, uncertainty))
+
+
 def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityTable]:
     """Judge a calibration in place by the presses that were left out."""
     held_out = [press.held_out for press in result.presses]
@@ -219,20 +249,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
     more = tr("Press more balls at more positions")
     sizes = tr("Check the ball radii and the scale (mm per pixel)")
     return {
-        "scale": QualityTable(
-            (
-                judge("mm_per_px", tr("Scale"), result.model.grid.mm_per_px, "mm/px"),
-                judge(
-                    "scale_sd_percent",
-                    tr("Uncertainty of the scale"),
-                    100.0 * scale_sd,
-                    "%",
-                    warn=2.0,
-                    fail=10.0,
-                    advice=tr("Measure the scale with a pin grid or a flat punch"),
-                ),
-            )
-        ),
+        "scale": judge_scale(result.model.grid.mm_per_px, scale_sd),
         "balls": QualityTable(
             (
                 judge(

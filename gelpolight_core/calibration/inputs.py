@@ -23,6 +23,7 @@ class Stage(StrEnum):
     LIGHTS = "lights"
     RADIANCE = "radiance"
     BACKGROUND = "background"
+    SCALE = "scale"
     BALLS = "balls"
     REFLECTANCE = "reflectance"
     JOINT = "joint"
@@ -35,10 +36,11 @@ FOLDERS = MappingProxyType(
         Stage.LIGHTS: "mirror",
         Stage.RADIANCE: "whiteboard",
         Stage.BACKGROUND: "background",
+        Stage.SCALE: "scale",
         Stage.BALLS: "balls",
     }
 )
-"""Image folder of each required stage."""
+"""Image folder of each stage that has images of its own."""
 
 OPTIONAL_FOLDERS = MappingProxyType({Stage.RESPONSE: "response", Stage.LIGHTS: "single_led"})
 """Folders of additional images that a stage uses if a session has them."""
@@ -56,7 +58,7 @@ NEEDS = MappingProxyType(
         Stage.JOINT: (Stage.REFLECTANCE,),
     }
 )
-"""Stages whose results a stage uses directly."""
+"""The stages of an open sensor, and those whose results a stage uses directly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +98,7 @@ def inputs_of(
         Returns the hash of a file; a caching one avoids reading every image again.
     """
     found: dict[Stage, StageInputs] = {}
-    for stage in Stage:
+    for stage in NEEDS:
         folders = (FOLDERS.get(stage, ""), OPTIONAL_FOLDERS.get(stage, ""))
         files = [path for folder in folders if folder for path in session.found(folder)]
         found[stage] = StageInputs(
@@ -117,7 +119,7 @@ def all_inputs(session: Session, hashes: Callable[[Path], str] = file_hash) -> s
     """
     stages = inputs_of(session, hashes)
     curves = sorted(session.decisions.curves.items())
-    rests_on = [stages[stage].fingerprint for stage in Stage], session.sensor.serial, curves
+    rests_on = [stages[stage].fingerprint for stage in NEEDS], session.sensor.serial, curves
     return hashlib.sha256(repr(rests_on).encode()).hexdigest()
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gelpolight_core.calibration.edit import edited
-from gelpolight_core.calibration.inputs import FOLDERS, Stage, all_inputs
+from gelpolight_core.calibration.inputs import FOLDERS, NEEDS, Stage, all_inputs
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.calibration.refinement import bare_calibration
@@ -36,7 +36,7 @@ from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS
 from gelpolight_core.translation import pattern, tr
 
 Progress = Callable[[str, float], None]
-STAGES = tuple(FOLDERS.values())
+STAGES = tuple(FOLDERS[stage] for stage in NEEDS if stage in FOLDERS)
 _BEGINS = {
     Stage.RESPONSE: 0.0,
     Stage.LENS: 0.02,
@@ -135,7 +135,7 @@ def _with_edits(calibration: Calibration, session: Session) -> Calibration:
 
 def stages_of(model: str) -> tuple[Stage, ...]:
     """Return the stages of a calibration for a model, in order."""
-    return tuple(stage for stage in Stage if model == "full" or stage is not Stage.JOINT)
+    return tuple(stage for stage in NEEDS if model == "full" or stage is not Stage.JOINT)
 
 
 def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]) -> CalibrationRun:

@@ -61,7 +61,7 @@ class CalibrationProject(StagedProject[StageResults]):
         """Return the present status of every stage."""
         with self._lock:
             inputs = inputs_of(self._session, self._hashes)
-            return {stage: self._status(stage, inputs) for stage in Stage}
+            return {stage: self._status(stage, inputs) for stage in inputs}
 
     def stale(self, *, upto: Stage | None = None, model: str = MODELS[-1]) -> tuple[Stage, ...]:
         """Return the stages that can and need to be computed, in order.

@@ -48,6 +48,23 @@ class MeasuredScale:
     pins: int = 0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PinGrid:
+    """A square grid of pins in an image.
+
+    Attributes
+    ----------
+    spacing_px, sd_px : float
+        Between neighbouring pins, and its standard deviation.
+    pins_px : (N, 2) float64
+        Their centres (u, v).
+    """
+
+    spacing_px: float
+    sd_px: float
+    pins_px: Array
+
+
 def scale_from_pins(
     images: Sequence[Map], background: Map, *, spacing_mm: float, where: str = "scale"
 ) -> MeasuredScale:
@@ -69,23 +86,38 @@ def scale_from_pins(
     InputError
         If an image shows no regular grid of at least 9 pins.
     """
-    spacings, count, spreads = [], 0, []
-    for image in images:
-        fits = [_lattice(_pins(image, background, blur)) for blur in BLURS_PX]
-        found = max(fits, key=lambda fit: fit[2])
-        if found[2] < LEAST_PINS:
-            raise InputError(
-                tr("no regular grid of pins was found ({n} pins of one)").format(n=found[2]),
-                where=where,
-                advice=tr("Press the pin grid evenly, 3 x 3 pins or more, or state mm_per_px"),
-            )
-        spacings.append(found[0])
-        spreads.append(found[1])
-        count += found[2]
+    grids = [find_pins(image, background, where=where) for image in images]
+    spacings = [grid.spacing_px for grid in grids]
     spacing = float(np.mean(spacings))
-    between = float(np.std(spacings)) / np.sqrt(len(spacings))
-    sd = float(np.hypot(between, np.mean(spreads) / np.sqrt(len(spreads)))) / spacing
+    between = float(np.std(spacings)) / np.sqrt(len(grids))
+    within = np.mean([grid.sd_px for grid in grids]) / np.sqrt(len(grids))
+    sd = float(np.hypot(between, within)) / spacing
+    count = sum(len(grid.pins_px) for grid in grids)
     return MeasuredScale(spacing_mm / spacing, sd * spacing_mm / spacing, count)
+
+
+def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
+    """Find the pressed square grid of pins in an image.
+
+    Parameters
+    ----------
+    image, background, where
+        As for :func:`scale_from_pins`.
+
+    Raises
+    ------
+    InputError
+        If it shows no regular grid of at least 9 pins.
+    """
+    fits = [_lattice(_pins(image, background, blur)) for blur in BLURS_PX]
+    found = max(fits, key=lambda fit: len(fit.pins_px))
+    if (count := len(found.pins_px)) < LEAST_PINS:
+        raise InputError(
+            tr("no regular grid of pins was found ({n} pins of one)").format(n=count),
+            where=where,
+            advice=tr("Press the pin grid evenly, 3 x 3 pins or more, or state mm_per_px"),
+        )
+    return found
 
 
 def scale_from_punch(
@@ -147,9 +179,9 @@ def _offset(before: Map, at: Map, after: Map) -> Array:
     return np.clip(0.5 * (before - after) / bend, -0.5, 0.5).astype(np.float64)
 
 
-def _lattice(pins: Array) -> tuple[float, float, int]:
-    """Return spacing, its standard deviation (pixels) and the pins of the best square grid."""
-    none = (1.0, 1.0, 0)
+def _lattice(pins: Array) -> PinGrid:
+    """Return the best square grid through pins; one without pins if there is none."""
+    none = PinGrid(1.0, 1.0, np.empty((0, 2)))
     if len(pins) < LEAST_PINS:
         return none
     gaps = np.linalg.norm(pins[:, None] - pins[None], axis=2)
@@ -176,10 +208,9 @@ def _lattice(pins: Array) -> tuple[float, float, int]:
         target = np.concatenate([pins[on, 0], pins[on, 1]])
         (c, s, x, y), *_ = np.linalg.lstsq(design, target, rcond=None)
         axes, middle = np.array([[c, s], [-s, c]]), np.array([x, y])
-    found = int(np.count_nonzero(on))
-    if found < LEAST_ON_LATTICE * len(pins):
+    if np.count_nonzero(on) < LEAST_ON_LATTICE * len(pins):
         return none
     spacing = float(np.hypot(*axes[0]))
     left = design @ np.array([c, s, x, y]) - target
     covariance = np.linalg.inv(design.T @ design) * float(left @ left) / max(len(target) - 4, 1)
-    return spacing, float(np.sqrt(covariance[0, 0])), found
+    return PinGrid(spacing, float(np.sqrt(covariance[0, 0])), pins[on])

@@ -6,11 +6,15 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
 from app.calibrate.closed_balls import Progress
+from app.calibrate.detection import as_image, read_raw
 from app.calibrate.setup_form import SetupForm
 from app.calibrate.setup_values import new_session
 from app.calibrate.validation import KnownObject
@@ -128,6 +132,61 @@ def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician.until(lambda: technician.see("calibrate.capture").isEnabled())
     technician.click("calibrate.capture")
     assert "belongs to sensor c" in technician.see("calibrate.notice").text()
+
+
+def test_the_scale_is_measured_on_a_pressed_pin_grid(
+    technician: Technician, small_session: Path, tmp_path: Path
+) -> None:
+    project = closed_project(small_session, tmp_path, balls=4)
+    technician.begin(project, "balls")
+    technician.wizard.go_to("setup")
+    inputs, first = technician.wizard.open.form.values.inputs, technician.wizard
+    inputs["scale_from"].setCurrentIndex(inputs["scale_from"].findData("pins"))
+    inputs["pins"].setValue(3.0)
+    technician.click("setup.accept")
+    technician.until(lambda: technician.wizard is not first)
+    technician.rest()
+    assert technician.state("scale") == "empty"
+    assert project.stale() == ()
+
+    technician.wizard.go_to("scale")
+    background = as_image(read_raw(project.session.found("background")[-1])).rgb
+    technician.wizard.open.import_files([with_pins(background, tmp_path / "pins.png")])
+    technician.rest()
+    technician.until(lambda: technician.state("scale") == "pass")
+    measured = project.results.scale
+    assert measured.mm_per_px == pytest.approx(3.0 / PINS_PX, rel=0.01)
+    name = project.session.found("scale")[0].name
+    technician.wizard.show_capture(name)
+    said = technician.see("calibrate.live")
+    technician.until(lambda: f"{measured.pins} pins" in said.text())
+    assert Stage.BALLS in project.stale()
+    technician.wizard.model.undo.undo()
+    technician.rest()
+    assert technician.state("scale") == "empty"
+
+    technician.wizard.go_to("setup")
+    inputs, second = technician.wizard.open.form.values.inputs, technician.wizard
+    inputs["scale_from"].setCurrentIndex(inputs["scale_from"].findData("stated"))
+    technician.click("setup.accept")
+    technician.until(lambda: technician.wizard is not second)
+    technician.rest()
+    assert "scale" not in [one.step.key for one in technician.wizard.presenters]
+
+
+PINS_PX = 16.0
+
+
+def with_pins(rgb: NDArray[np.float32], path: Path) -> Path:
+    """Write an image with a pressed grid of pins, PINS_PX apart."""
+    rows, columns = rgb.shape[:2]
+    v, u = np.mgrid[:rows, :columns] - 0.5 * np.array([rows, columns])[:, None, None]
+    away = [np.mod(at, PINS_PX) - 0.5 * PINS_PX for at in (u, v)]
+    inside = np.hypot(u, v) < 3.6 * PINS_PX
+    pins = np.where(inside, np.exp(-(away[0] ** 2 + away[1] ** 2) / (2.0 * 2.0**2)), 0.0)
+    raw = np.clip(255.0 * (rgb + 0.15 * pins[..., None]), 0.0, 255.0).astype(np.uint8)
+    cv2.imwrite(str(path), raw[..., ::-1])
+    return path
 
 
 def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> ClosedProject:

@@ -1,0 +1,96 @@
+"""The step of the scale: an object of known size, pressed into the membrane."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from app.calibrate.closed_balls import refuse_size
+from app.calibrate.detection import Detection, Detector, or_refusal, too_early
+from app.calibrate.image_step import ImageStep
+from app.calibrate.light_checks import KnownImage, refuse_grey
+from app.calibrate.step_data import Step
+from app.live.image_checks import Rgb
+from app.live.overlay import Circle, Marker, Overlay
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.image.linear import linear_image
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.in_place.press import find_contact
+from gelpolight_core.in_place.scale import find_pins
+from gelpolight_core.reconstruction.in_place.change import reference
+from gelpolight_core.session.session import InPlace, PressedScale
+from gelpolight_core.translation import tr
+
+
+def detect_scale(
+    rgb: Rgb, background: Rgb, *, pressed: PressedScale, response: CameraResponse | None = None
+) -> Detection:
+    """Find the pressed object, and show what it says about the size of a pixel.
+
+    Parameters
+    ----------
+    rgb, background : (rows, columns, 3)
+        The frame, and the untouched membrane.
+    pressed : PressedScale
+        Size of the object.
+    response : CameraResponse, optional
+        Response of the camera.
+    """
+
+    def detect() -> Detection:
+        refuse_grey(rgb)
+        refuse_size(rgb, (background.shape[1], background.shape[0]))
+        seen, bare = (linear_image(raw, "", response=response).rgb for raw in (rgb, background))
+        if pressed.pin_spacing_mm is not None:
+            grid = find_pins(seen, bare, where=tr("Image"))
+            marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in grid.pins_px))
+            text = tr("{n} pins found: a pixel is {s:.4f} mm wide.")
+            said = text.format(n=len(grid.pins_px), s=pressed.pin_spacing_mm / grid.spacing_px)
+        else:
+            disc, _ = find_contact(seen, reference(bare), ball_radius=None, name=tr("Image"))
+            marks = Overlay(circles=(Circle(disc.x, disc.y, disc.radius, "good"),))
+            wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
+            said = tr("Contact of the punch found: a pixel is {s:.4f} mm wide.").format(s=wide)
+        return Detection(marks, said, True)
+
+    return or_refusal(detect)
+
+
+class ScaleStep(ImageStep):
+    """Measures the size of a pixel on images of a pressed pin grid or flat punch."""
+
+    step = Step(
+        "scale",
+        tr("Scale"),
+        (Stage.SCALE,),
+        tr(
+            "Press the pin grid or the flat punch whose size is stated in the set-up straight into "
+            "the membrane, at a different place for each image. The size of a pixel is measured "
+            "on it."
+        ),
+        "indenter",
+        frames=4,
+        wanted=3,
+    )
+
+    def detector(self, name: str) -> Detector:
+        """Return the detection of the pressed object beside the background."""
+        session = self.model.project.session
+        files = session.found(FOLDERS[Stage.BACKGROUND])
+        if not files:
+            return too_early
+        pressed = (session.in_place or InPlace()).pressed_scale
+        known = KnownImage(files)
+        return partial(_detect, known=known, pressed=pressed, response=session.response)
+
+    def show_bench(self, there: bool) -> None:
+        """Offer no object: the size of the punch on the virtual bench is chosen there."""
+        self.panel.lay.setVisible(False)
+
+
+def _detect(
+    rgb: Rgb, known: KnownImage, pressed: PressedScale, response: CameraResponse | None
+) -> Detection:
+    background = known.rgb
+    if background is None:
+        return too_early(rgb)
+    return detect_scale(rgb, background, pressed=pressed, response=response)
