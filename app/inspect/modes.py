@@ -15,15 +15,7 @@ from app.services.jobs import Job, Jobs
 from app.widgets.inputs import ComboBox
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
-from gelpolight_core.reconstruction.modes import (
-    CLOSED_MODES,
-    FOUND,
-    FULL,
-    IN_PLACE,
-    MODES,
-    PAPER,
-    Mode,
-)
+from gelpolight_core.reconstruction.modes import FOUND, MODES_OF, PAPER, Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
@@ -112,14 +104,9 @@ class ModeChoice(QObject):
 
     def offer(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Offer the modes of a calibration, and continue with the mode selected before."""
-        self._live, self._best = live, best
-        self._paper = live if live is not None and live.model == PAPER else None
+        self._live, self._best, self._paper = live, best, None
         self._times.clear()
-        modes = () if live is None else MODES
-        if self._paper is not None:
-            modes = tuple(mode for mode in MODES if mode.model == PAPER)
-        if live is not None and live.model == IN_PLACE:
-            modes = CLOSED_MODES
+        modes = () if live is None else MODES_OF[live.model]
         self.box.show_modes(modes, self.mode if self.mode in modes else next(reversed(modes), None))
         self._choose()
 
@@ -130,9 +117,7 @@ class ModeChoice(QObject):
             return
         self._last = shown
         if heightmap.depth_sd_mm is None:  # a frame with other, longer work
-            mode = Mode(
-                heightmap.model, heightmap.trace.effort if heightmap.model == FULL else "best"
-            )
+            mode = Mode(heightmap.model, heightmap.trace.effort)
             self._times.setdefault(mode, deque(maxlen=TIMED)).append(shown.depth_ms)
             if not self.box.view().isVisible():
                 self.box.show_times({mode: median(ms) for mode, ms in self._times.items()})
@@ -156,9 +141,7 @@ class ModeChoice(QObject):
         mode, live, best = self.box.currentData(), self._live, self._best
         if live is None or mode is None:
             self.chosen.emit(None, None)
-        elif mode.model == IN_PLACE:
-            self.chosen.emit(live, best)
-        elif mode.model == FULL:
+        elif mode.model == live.model:
             self.chosen.emit(best if mode.effort == "best" else live.at_effort(mode.effort), best)
         elif self._paper is not None:
             self.chosen.emit(self._paper, self._paper)

@@ -21,8 +21,6 @@ Map = NDArray[np.float32]
 BYTES_OF_KIND = {"u": (1, 2), "f": (2, 4, 8, 12, 16)}
 BOUNDARY_MM = 1.0
 """Distance from the boundary of the field at which the paper's model is checked for contact."""
-BOUNDARY_NODES = 720
-CONDITION_POINTS = 2000
 HELD_DOWN_MM, HELD_DOWN_SHARE = 0.03, 0.2
 """Depth there, and share of the deepest, that shows a contact across the boundary although the
 boundary is fixed at depth 0. It is more than the drape of a contact that ends 2 mm inside, and more
@@ -47,7 +45,6 @@ at 0.7 8 %."""
 MOST_HIDDEN_MM = 0.1
 """Sensors of 320 x 240 pixels and 50 dB show 25 um; a depth of 0 from a worse one needs a note."""
 LEAST_USABLE = 0.02
-USABLE_STEP = 8
 LARGEST_MEDIAN = 2.0
 """An image of floats with a larger median is not linear light 0..1, but counts from 0 to 255."""
 
@@ -171,7 +168,7 @@ def condition_notes(calibration: Calibration, leds_mm: NDArray[np.float64]) -> N
     points = table.grid.points_mm()[table.valid]
     if not points.size:
         return ()
-    condition = direction_condition(leds_mm, points[:: max(len(points) // CONDITION_POINTS, 1)])
+    condition = direction_condition(leds_mm, points[:: max(len(points) // 2000, 1)])
     if condition <= MOST_CONDITION:
         return ()
     text = tr(
@@ -274,7 +271,7 @@ def refuse_dark_membrane(calibration: Calibration, light: Map) -> None:
     InputError
         If fewer than `LEAST_USABLE` of the nodes in view are lit in all channels.
     """
-    thin = np.s_[::USABLE_STEP, ::USABLE_STEP]
+    thin = np.s_[::8, ::8]
     valid = calibration.table.valid[thin]
     lit = usable(valid, light[thin], calibration.factors[thin])
     share = float(np.count_nonzero(lit)) / max(int(valid.sum()), 1)
@@ -310,7 +307,7 @@ def nodes_near_boundary(calibration: Calibration) -> NearBoundary:
     """Return the nodes next to the boundary of a calibration's field."""
     table = calibration.table
     grid = table.grid
-    angle = np.linspace(0.0, 2.0 * np.pi, BOUNDARY_NODES, endpoint=False)
+    angle = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
     radius = 0.5 * calibration.sensor.working_diameter_mm - BOUNDARY_MM
     x, y = (
         np.clip(radius * side, axis[0] + BOUNDARY_MM, axis[-1] - BOUNDARY_MM)

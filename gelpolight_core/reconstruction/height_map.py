@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from gelpolight_core.health.finding import Health
 from gelpolight_core.reconstruction.trace import Trace
 
+COARSE = 4
+"""Nodes of the grid to a node of the coarsest scale, and of examples of noise, along an axis."""
+
 
 class Flag(IntFlag):
     """Reasons why the depth of a pixel is less reliable; a pixel can have several.

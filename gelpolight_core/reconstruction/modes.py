@@ -30,12 +30,13 @@ class Mode:
     @property
     def label(self) -> str:
         """Its name for the user."""
-        if self.model == PAPER:
-            return tr("Paper's model")
-        if self.model == IN_PLACE:
-            return tr("In place")
-        names = {"fast": tr("fast"), "balanced": tr("balanced"), "best": tr("best")}
-        return tr("Full model, {effort}").format(effort=names[self.effort])
+        efforts = {"fast": tr("fast"), "balanced": tr("balanced"), "best": tr("best")}
+        models = {
+            PAPER: tr("Paper's model"),
+            FULL: tr("Full model, {effort}"),
+            IN_PLACE: tr("In place"),
+        }
+        return models[self.model].format(effort=efforts[self.effort])
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +58,10 @@ class FoundError:
 MODES = (*(Mode(FULL, effort) for effort in EFFORTS), Mode(PAPER, "best"))
 """All modes, the quickest of the full model first."""
 
-CLOSED_MODES = (Mode(IN_PLACE, "best"),)
-"""The modes for a closed sensor."""
+MODES_OF: Mapping[str, tuple[Mode, ...]] = MappingProxyType(
+    {FULL: MODES, PAPER: MODES[-1:], IN_PLACE: (Mode(IN_PLACE, "best"),)}
+)
+"""The modes that a calibration made for each model offers."""
 
 FOUND: Mapping[Mode, FoundError] = MappingProxyType(
     {

@@ -7,8 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any
 
-# More blocks than threads, so that an uneven image keeps all of them busy.
-BLOCKS = 4
 THREAD_NAME = "image rows"
 
 
@@ -27,7 +25,8 @@ class RowWorkers:
 
     def run(self, rows: int, action: Callable[..., object], *arguments: Any) -> None:
         """Call ``action(first, last, *arguments)`` so that all rows are done once."""
-        blocks = min(BLOCKS * self.count, rows)
+        # More blocks than threads, so that an uneven image keeps all of them busy.
+        blocks = min(4 * self.count, rows)
         if self._pool is None or blocks < 2:
             action(0, rows, *arguments)
             return

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from gelpolight_core.reconstruction.trace import Trace
 from gelpolight_core.translation import tr
 
-WINDOW_S = 60.0
-
 
 @dataclass(frozen=True, slots=True)
 class StepCount:
@@ -52,7 +50,7 @@ class TraceTally:
     2.0
     """
 
-    def __init__(self, window_s: float = WINDOW_S) -> None:
+    def __init__(self, window_s: float = 60.0) -> None:
         self._window_s = window_s
         self._traces: deque[tuple[float, Trace]] = deque()
 

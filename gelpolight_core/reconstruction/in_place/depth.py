@@ -8,16 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.height_map import COARSE
+from gelpolight_core.reconstruction.integration.weighted import FREE, integrate_weighted
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
 
-FREE = 1e-4
-"""Weight of depth 0 where a contact crosses the border."""
 ROUGHLY_FREE = 1e-3
 """Weight of depth 0 on the whole border in a first, coarse solution."""
-COARSE = 4
 CROSSES = 0.08
 """Share of the largest depth at the border above which parts of the border are free ..."""
 HELD = 0.02

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.checks import Note, Notes, free_boundary_note
 from gelpolight_core.reconstruction.height_map import (
+    COARSE,
     Flag,
     HeightMap,
     normals_from_slopes,
@@ -39,7 +40,6 @@ EXTRAPOLATED_WEIGHT = 0.3
 DIFFERENT = 0.12
 """Median change of colour above which an image does not show this sensor's membrane."""
 EXAMPLES = 6
-THINNED = 4
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
 STATED_CHANGE = 0.01
@@ -169,9 +169,9 @@ class InPlaceSolver:
         examples = np.stack(depths)
         spread = cv2.GaussianBlur(np.mean(examples**2, axis=0), (0, 0), NOISE_REACH)
         slope_noise = cv2.GaussianBlur(np.mean(slopes, axis=0), (0, 0), NOISE_REACH)
-        rows, columns = (n // THINNED for n in size.shape)
-        thin = examples[:, : rows * THINNED, : columns * THINNED]
-        blocks = thin.reshape(EXAMPLES, rows, THINNED, columns, THINNED)
+        rows, columns = (n // COARSE for n in size.shape)
+        thin = examples[:, : rows * COARSE, : columns * COARSE]
+        blocks = thin.reshape(EXAMPLES, rows, COARSE, columns, COARSE)
         return DepthNoise(
             np.sqrt(slope_noise),
             np.sqrt(spread),

@@ -35,7 +35,6 @@ SLOPE_LIMIT = 10.0
 tenth of its height and cannot be distinguished from a fault of the image."""
 
 _TAPS = 5
-_TRANSFORM = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +215,7 @@ class PoissonSolver:
         return np.ascontiguousarray(field[top : top + rows, left : left + columns])
 
     def _transform(self, transform: Callable[..., Any], field: FloatArray) -> FloatArray:
-        options = {"type": _TRANSFORM, "axis": 1, "overwrite_x": True, "workers": self.workers}
+        options = {"type": 2, "axis": 1, "overwrite_x": True, "workers": self.workers}
         return np.asarray(transform(field, **options))
 
 

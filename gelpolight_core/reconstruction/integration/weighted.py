@@ -23,7 +23,8 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
 TOLERANCE = 3e-4
-MAX_ROUNDS = 60
+FREE = 1e-4
+"""Weight of depth 0 at the border where a contact crosses it."""
 SHARED_NODES, SHARED_SUMS = 60_000, 200_000
 """For smaller grids, one thread finishes transforms and passes before a second thread starts."""
 
@@ -94,7 +95,7 @@ def integrate_weighted(
     size = solve.product(left, better)
     wanted = tolerance**2 * max(energy, size)
     rounds = 0
-    while size > wanted and rounds < MAX_ROUNDS:
+    while size > wanted and rounds < 60:
         along = solve.apply(direction)
         solve.run(_advance, single(size / along), direction, solve.image, depth, left)
         rounds += 1

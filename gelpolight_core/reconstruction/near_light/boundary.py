@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.checks import PRESSED_SHARE
 from gelpolight_core.reconstruction.near_light.structures import Region
 
 Map = NDArray[np.float32]
@@ -26,7 +27,6 @@ STRIP_MM = 0.5
 LEFT_MM, LEFT_SHARE = 0.005, 0.01
 """Depth in the strip, and share of the largest depth, above which a contact reaches it. Drape alone
 gives less; a contact that crosses the boundary gives half its depth."""
-PRESSED_SHARE = 0.1
 """Share of the largest boundary depth above which a node of the free boundary is pressed: more than
 the light error of the first round. A smaller drape decays to 3 um over `REACH_MM`."""
 REACH_MM = 2.5

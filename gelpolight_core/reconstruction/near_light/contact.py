@@ -28,8 +28,6 @@ Mask = NDArray[np.bool_]
 BLOCK_MM = 0.2
 # A press changes the light from the surroundings too, far from itself and without any slope.
 CHANGE_BY_INTERREFLECTION = 6e-3
-# Of the nine blocks around one, so that a hot pixel does not count as a contact.
-NEIGHBOURS = 3
 MARGIN_DECAYS = 1.5
 """Margin of the region around a contact; the drape falls by a factor e over its decay length."""
 LEAST_MARGIN_MM = 0.8
@@ -195,10 +193,10 @@ class ContactFinder:
 
 
 def _among_others(blocks: Mask) -> Mask:
-    """Return where enough of the nine blocks about one are true."""
+    """Return where three of the nine blocks about one are true: a hot pixel is no contact."""
     count = blocks.astype(np.uint8)
     cv2.boxFilter(count, -1, (3, 3), count, normalize=False, borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(count >= NEIGHBOURS)
+    return np.asarray(count >= 3)
 
 
 def _in_any(channels: Mask) -> Mask:

@@ -21,9 +21,6 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
 QUIET_PX = 1.2
-WIDER_PX = (2.4, 4.8, 9.6)
-SAMPLES = 8000
-"""Nodes from which the image's noise is estimated."""
 LEAST = np.float32(1e-9)
 USABLE = np.float32(1e-6)
 """Background of a node that is usable; of others the noise is unknown."""
@@ -79,7 +76,7 @@ def quieted(
         return None
     kept: Map | None = None
     edge = take("edge", (rows, columns))
-    for width in (QUIET_PX, *WIDER_PX):
+    for width in (QUIET_PX * times for times in (1.0, 2.0, 4.0, 8.0)):
         if kept is not None and not _noisy(noise, base, kept):
             break
         wide = tuple(_average(m, 2.0 * width, np.empty_like(m)) for m in (light, base))
@@ -101,7 +98,7 @@ def _own_noise(light: Map, base: Map, average: Map) -> tuple[Map, Map] | None:
 
     Robust, from the darker and the brighter third of what is usable; None where nothing is.
     """
-    step = max(int(np.sqrt(light[0].size / SAMPLES)), 1)
+    step = max(int(np.sqrt(light[0].size / 8000)), 1)
     thin = np.s_[step // 2 :: step, step // 2 :: step]
     read, shot = np.zeros(3, np.float32), np.zeros(3, np.float32)
     for k in range(3):

@@ -22,7 +22,6 @@ Map = NDArray[np.float32]
 # 64 independent differences: the variance of a block is accurate to 18 %, without bias in the
 # median.
 BLOCK = 16
-LEVELS = 8
 LEAST_BLOCKS = 12
 
 
@@ -100,7 +99,7 @@ def _curve(level: Map, variance: Map, use: NDArray[np.bool_]) -> tuple[Array, Ar
     level, variance = level[use].astype(np.float64), variance[use].astype(np.float64)
     if level.size < LEAST_BLOCKS:
         return np.zeros(1), np.full(1, float(np.median(variance)) if variance.size else 0.0)
-    count = min(LEVELS, level.size // LEAST_BLOCKS)
+    count = min(8, level.size // LEAST_BLOCKS)
     classes = np.array_split(np.argsort(level, kind="stable"), count)
     return (
         np.array([np.mean(level[c]) for c in classes]),

@@ -16,7 +16,7 @@ from scipy.ndimage import binary_fill_holes
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import DARK_COSINE, reflects_light, usable
-from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.height_map import COARSE, Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
 from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers, Scale
 from gelpolight_core.reflectance.gathered_light import Slab, returned_to_flat
@@ -27,8 +27,6 @@ from gelpolight_core.sensor_calibration import Calibration, FullModel
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
-COARSE = 4
-"""Nodes of the calibration's grid to one node of the coarsest scale, along an axis."""
 DEGREE = 7
 CURVE_ERROR = 1e-3
 """A polynomial with a larger error, relative to the top of its curve, is not used (0.06 degrees of

@@ -7,10 +7,6 @@ import numpy as np
 from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.near_light.kernel import ray_ramps
 
-PLACE_ROUNDS = 14
-PLACED = 0.01
-FOLDED = 0.55
-
 
 @part
 def _between(values, c, r, fc, fr):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
@@ -65,7 +61,7 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                 x, y = c - d * wx, r - d * wy
                 missed = ZERO
                 n, m = j, i
-                for step in range(PLACE_ROUNDS):
+                for step in range(14):
                     x = min(max(x, ZERO), single(columns - 1))
                     y = min(max(y, ZERO), single(rows - 1))
                     n, m = min(int(x), columns - 2), min(int(y), rows - 2)
@@ -74,7 +70,7 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     ex = off_x + d * (wx + wxx * off_x + wxy * off_y)
                     ey = off_y + d * (wy + wyx * off_x + wyy * off_y)
                     missed = max(abs(ex), abs(ey))
-                    if missed < PLACED:
+                    if missed < 0.01:
                         break
                     det = ONE + by_x * wx + by_y * wy
                     if step < 5 and det > single(0.3):
@@ -86,7 +82,7 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                         y -= HALF * ey
                 placed[i, j] = d
                 near = flags[min(int(y + HALF), rows - 1), min(int(x + HALF), columns - 1)]
-                marks[i, j] = near | (hidden if missed > FOLDED else 0)
+                marks[i, j] = near | (hidden if missed > 0.55 else 0)
                 position[0, i, j], position[1, i, j] = x, y
 
 

@@ -14,7 +14,7 @@ from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.near_light.denoise import quieted
 from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, light_levels
-from gelpolight_core.reconstruction.near_light.sampling import halve, sample_rows
+from gelpolight_core.reconstruction.near_light.sampling import BEYOND_FINITE, halve, sample_rows
 from gelpolight_core.reconstruction.near_light.structures import RatioImage, Region
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -22,7 +22,6 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 Map = NDArray[np.float32]
 Gain = NDArray[np.float64]
 Rows = tuple[tuple[np.float32, ...], ...]
-_BEYOND_FINITE = np.float32(1.5)
 LENS_BLUR_PX = 0.47
 """Blur of a sharp lens (0.37) and a pixel's own width (0.29), where a calibration does not say."""
 SAMPLING = 1.0 / 6.0
@@ -174,7 +173,7 @@ class PressSampler:
             sample_rows,
             raw,
             self.levels(raw.dtype, linear),
-            np.float32(SATURATED) if terms.saturation else _BEYOND_FINITE,
+            np.float32(SATURATED) if terms.saturation else BEYOND_FINITE,
             self.maps.source(factor),
             factor > 1,
             (unmix, self._noise(factor)),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.integration.weighted import (
+    FREE,
     WeightedIntegration,
     integrate_weighted,
 )
@@ -44,8 +45,6 @@ from gelpolight_core.sensor_calibration import FullModel
 
 Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
-FREE = 1e-4
-"""Weight of depth 0 at the border where a contact crosses it."""
 STEEP_ROUNDS = 2
 """Rounds with a membrane that absorbs no light."""
 LONGEST_STEP = 0.2

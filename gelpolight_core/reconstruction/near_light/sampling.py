@@ -7,7 +7,7 @@ import numpy as np
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, part, single, whole
 from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE
 
-_MISSING = single(1.5)
+BEYOND_FINITE = single(1.5)
 _UNKNOWN_NOISE = single(1e6)
 
 
@@ -112,7 +112,7 @@ def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corn
                     seen[k], top = _near(light, raw, k, c, r, fu, fv)
                 if top >= limit:
                     bits |= 1 << k
-                    if top > _MISSING:
+                    if top > BEYOND_FINITE:
                         bits |= NOT_FINITE
             for k in range(3):
                 own = unmix[k][0] * seen[0] + unmix[k][1] * seen[1] + unmix[k][2] * seen[2]

@@ -22,7 +22,7 @@ STATIC_PLANES = 5
 
 _B = BLOCK
 _int = np.int32
-_LEAST_NZ = single(1.0 / SLOPE_LIMIT)
+_LEAST_NZ = ONE / single(SLOPE_LIMIT)
 _DARK = single(DARK_COSINE)
 _OUTSIDE = np.uint8(Flag.OUTSIDE)
 _F_OUTSIDE, _F_SATURATED = single(Flag.OUTSIDE), single(Flag.SATURATED)
