@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
+from gelpolight_core.finding import QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, build_stack
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
-from gelpolight_core.quality import QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import SensorData

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.reflectance.table import cosine_table
 from gelpolight_core.sensor_calibration import Calibration, Provenance, sensor_stack
 from gelpolight_core.session.session import SensorData

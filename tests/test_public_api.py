@@ -63,7 +63,7 @@ def test_a_fault_of_the_image_is_refused_before_anything_is_measured(
     assert height_map.health is not None and height_map.health.meaningless is not None
     with pytest.raises(gp.InputError) as refused:
         gp.measure(height_map)
-    assert refused.value.found == height_map.health.meaningless.cause
+    assert refused.value.found == height_map.health.meaningless.text
     assert refused.value.where == "dark.png"
 
 

@@ -424,7 +424,7 @@ def judge_ball(name: str, project: CalibrationProject) -> Judgement:
         return Judgement("fail", text, tr("check it"), 100.0 * ball.press.shading_misfit)
     quality = ball.press.quality
     note = tr("⌀ {d:g} mm").format(d=2.0 * ball.press.pose.radius_mm)
-    advice = ". ".join(quality.advice)
+    advice = ". ".join(quality.remedies)
     return Judgement(quality.verdict.value, advice, note, 100.0 * ball.press.shading_misfit)
 
 

@@ -37,11 +37,11 @@ from gelpolight_core.calibration.in_place_session import (
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.calibrate import LEAST_PRESSES
 from gelpolight_core.in_place.press import find_contact
-from gelpolight_core.quality import QualityTable
 from gelpolight_core.reconstruction.in_place.change import Reference, reference
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.translation import tr
@@ -338,7 +338,7 @@ class ClosedBallsStep(BallsStep):
         progress = self.progress
         if progress is not None:
             figures = self.model.statuses[Stage.BALLS].quality.figures
-            others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).advice
+            others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
             sentence = " ".join((progress.sentence(), *(f"{advice}." for advice in others)))
         super().show_state(state, sentence)
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from app.live.image_checks import Rgb, end_of_scale
 from app.live.overlay import Overlay
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.checkerboard import BoardView
-from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.translation import tr
@@ -36,7 +36,7 @@ class Detection:
         What was found, or the problem and what to do.
     ready : bool
         Whether this frame may be captured for the stage.
-    figures : tuple of Figure
+    figures : tuple of Finding
         Judged figures for the table next to the image.
     found : BoardView, MirrorSpots, BallPress or None
         Result of the core's detector, used for example in the list of earlier views.
@@ -47,7 +47,7 @@ class Detection:
     overlay: Overlay
     sentence: str
     ready: bool
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[Finding, ...] = ()
     found: Found | None = None
     warns: bool = False
 
@@ -97,13 +97,13 @@ def or_refusal(detect: Callable[[], Detection], *, marks: Overlay | None = None)
 
 
 def judged(
-    overlay: Overlay, figures: tuple[Figure, ...], good: str, found: Found | None = None
+    overlay: Overlay, figures: tuple[Finding, ...], good: str, found: Found | None = None
 ) -> Detection:
     """Return a detection that is ready unless a figure fails; its text is the worst figure's."""
     table = QualityTable(figures)
-    bad = [f for f in figures if f.verdict is not Verdict.PASS and f.advice]
+    bad = [f for f in figures if f.verdict is not Verdict.PASS and f.remedy]
     worst = next((f for f in bad if f.verdict is Verdict.FAIL), bad[0] if bad else None)
-    text = good if worst is None else f"{worst.text}. {worst.advice}."
+    text = good if worst is None else f"{worst.stated}. {worst.remedy}."
     ready = table.verdict is not Verdict.FAIL
     return Detection(overlay, text, ready, figures, found, warns=worst is not None)
 

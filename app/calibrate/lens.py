@@ -23,6 +23,7 @@ from app.live.overlay import Line, Marker, Overlay
 from app.services.jobs import Job
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
     blur_error,
@@ -40,7 +41,6 @@ from gelpolight_core.optics.lens_views import (
     find_view,
     refused_view,
 )
-from gelpolight_core.quality import Figure, judge
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
@@ -235,7 +235,7 @@ def _uncovered_area(views: Sequence[BoardView]) -> str:
     return "" if ninth is None else names[ninth[0]][ninth[1]]
 
 
-def _view_figures(view: BoardView, earlier: Sequence[BoardView]) -> tuple[Figure, ...]:
+def _view_figures(view: BoardView, earlier: Sequence[BoardView]) -> tuple[Finding, ...]:
     covered = coverage_counts([*earlier, view], view.image_size) > 0
     return (
         judge("tilt", tr("Tilt"), view.tilt_deg, "deg"),

@@ -15,8 +15,8 @@ from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Job
 from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.finding import judge
 from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
-from gelpolight_core.quality import judge
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -61,7 +61,7 @@ def detect_mirror(
             figures += (
                 judge("spot_off_px", tr("Largest spot offset"), off, "px",
                       warn=LED_OFF_OF_WIDTH * rgb.shape[1],
-                      advice=tr("Check the channel of each LED, and that the mirror is flat")),
+                      remedy=tr("Check the channel of each LED, and that the mirror is flat")),
             )  # fmt: skip
         return judged(marks, figures, tr("All three LED reflections were found."), spots)
 

@@ -27,8 +27,8 @@ from gelpolight_core.factors.bare_membrane import (
     saturated_percent,
     shrunk,
 )
+from gelpolight_core.finding import judge
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import judge
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 from gelpolight_core.translation import tr
 
@@ -74,14 +74,14 @@ def detect_whiteboard(
             brightness_figure(small, area),
             judge("saturated", tr("Saturated share"), saturated_percent(rgb, area), "%",
                   warn=0.1, fail=10.0,
-                  advice=tr("Shorten the exposure until nothing is saturated")),
+                  remedy=tr("Shorten the exposure until nothing is saturated")),
             judge("unlit", tr("Unlit share"), 100.0 * share(unlit, area), "%", warn=10.0, fail=40.0,
-                  advice=tr("Press the board flat onto the surface, or lengthen the exposure")),
+                  remedy=tr("Press the board flat onto the surface, or lengthen the exposure")),
             judge("specks", tr("Specks and edges"), 100.0 * share(specks, area), "%",
                   warn=3.0, fail=20.0,
-                  advice=tr("Use a white board without pattern; clean it and the elastomer")),
+                  remedy=tr("Use a white board without pattern; clean it and the elastomer")),
             judge("light_range", tr("Ratio of brightest to darkest area"), _light_range(small, lit),
-                  warn=40.0, advice=tr("Dim or move the LEDs to get more even light")),
+                  warn=40.0, remedy=tr("Dim or move the LEDs to get more even light")),
         )  # fmt: skip
         return judged(marks, figures, tr("The whiteboard is well lit."))
 

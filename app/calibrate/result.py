@@ -40,7 +40,7 @@ from app.workspace.report import stated_validation
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.session.missing import OPEN_STAGES
 from gelpolight_core.translation import tr
 

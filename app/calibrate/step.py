@@ -19,7 +19,7 @@ from app.context.context import AppContext
 from app.sources.bench import Scene
 from app.sources.processor import Failure, Outcome
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.translation import tr
 
 UNUSED = ("excluded", StageState.FAIL.value)

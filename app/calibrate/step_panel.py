@@ -28,7 +28,7 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.session.session import ONE_IMAGE_STAGES
 from gelpolight_core.translation import tr
 

@@ -26,7 +26,7 @@ from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -223,7 +223,7 @@ class CameraPanel(QWidget):
         if verdict is Verdict.PASS:
             return tr("Locked, and the image is stable. Close this window and calibrate."), "pass"
         text = tr("Not stable yet: {advice}.")
-        return text.format(advice="; ".join(self._result.advice)), verdict.value
+        return text.format(advice="; ".join(self._result.remedies)), verdict.value
 
 
 def _small(rgb: Rgb, height: int) -> QPixmap:

@@ -11,8 +11,8 @@ from tqdm import tqdm
 
 from app.command_line.terminal import harmless
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.atomic import refuse_unwritable
-from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -100,7 +100,7 @@ def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:
                 "" if figure.warn_limit is None else tr("limit {x:g}").format(x=figure.warn_limit)
             )
             value = f"{figure.value:>10.4g} {harmless(figure.unit):<4}"
-            lines.append(f"  {mark} {harmless(figure.label):<58} {value} {limit}".rstrip())
-            if figure.verdict is not Verdict.PASS and figure.advice:
-                lines.append(f"      {harmless(figure.advice)}.")
+            lines.append(f"  {mark} {harmless(figure.text):<58} {value} {limit}".rstrip())
+            if figure.verdict is not Verdict.PASS and figure.remedy:
+                lines.append(f"      {harmless(figure.remedy)}.")
     return lines

@@ -19,6 +19,7 @@ from app.command_line.reconstructing import (
 from app.command_line.terminal import say
 from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
 from gelpolight_core.errors import InputError
+from gelpolight_core.health.finding import as_dict
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -93,7 +94,7 @@ def _measured(
         despite_faults=options.despite_faults,
     )
     findings = () if heightmap.health is None else heightmap.health.findings
-    faults = {"faults": [finding.as_dict() for finding in findings]}
+    faults = {"faults": [as_dict(finding) for finding in findings]}
     if tools:
         results = [judged(tool.apply(heightmap), heightmap) for tool in tools]
         content = {

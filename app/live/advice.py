@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gelpolight_core.health.finding import Finding
+from gelpolight_core.finding import Finding
 from gelpolight_core.translation import tr
 
 Size = tuple[int, int]
@@ -117,7 +117,7 @@ def advise(now: LiveState) -> Advice:
         return Advice(now.trouble, "reopen", tr("Reconnect"), role="fail")
     if now.fault is not None:
         button = ("zero", tr("Set to zero")) if now.fault.key in ZERO_CORRECTS else ("", "")
-        return Advice(now.fault.line, *button, role=now.fault.severity.value)
+        return Advice(now.fault.line, *button, role=now.fault.verdict.value)
     return Advice()
 
 

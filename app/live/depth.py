@@ -18,7 +18,7 @@ from app.sources.processor import Failure, Outcome
 from app.sources.source import SourceInfo
 from app.workspace.gel_care import presses_text, read_presses, write_presses
 from gelpolight_core.errors import InputError
-from gelpolight_core.health.finding import Finding
+from gelpolight_core.finding import Finding
 from gelpolight_core.health.watch import HealthWatch
 from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

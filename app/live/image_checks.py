@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]  # or one channel of it

@@ -17,8 +17,8 @@ from app.services.jobs import Job, Jobs
 from app.workspace.workspace import ENDING, Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.io.user import user_name
-from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.background_shift import (
     BackgroundShift,
     background_shift,

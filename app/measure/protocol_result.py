@@ -26,8 +26,8 @@ from app.widgets.layout import hbox, keep_space, splitter, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
+from gelpolight_core.finding import verdict_word
 from gelpolight_core.measurement.evaluation import Evaluation
-from gelpolight_core.quality import verdict_word
 from gelpolight_core.report.document import Listing, Report
 from gelpolight_core.report.evaluation import evaluation_document, evaluation_sentence
 from gelpolight_core.translation import tr

@@ -23,7 +23,7 @@ from app.widgets.sign import Sign
 from app.workspace.entries import Entry, validation_lines
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.titles import stage_title
-from gelpolight_core.quality import Verdict, verdict_word
+from gelpolight_core.finding import Verdict, verdict_word
 from gelpolight_core.translation import tr
 
 

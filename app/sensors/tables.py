@@ -19,7 +19,7 @@ from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
-from gelpolight_core.quality import verdict_word
+from gelpolight_core.finding import verdict_word
 from gelpolight_core.translation import tr
 
 

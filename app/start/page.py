@@ -20,7 +20,7 @@ from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry, unfinished
 from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import verdict_word
+from gelpolight_core.finding import verdict_word
 from gelpolight_core.translation import tr
 
 # Larger images are not decoded here: the window must be up at once.

@@ -12,7 +12,7 @@ from app.tools.work_dialog import WorkDialog
 from app.widgets.layout import vbox
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.design_check.check import DesignCheckResult, check_design
-from gelpolight_core.quality import Verdict, limit_text, value_text, verdict_word
+from gelpolight_core.finding import Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.studies.files import write_table
 from gelpolight_core.translation import tr
 
@@ -65,11 +65,11 @@ def _rows(result: DesignCheckResult) -> list[tuple[str, ...]]:
     """Return one row for each figure; advice only where there is something to do."""
     return [
         (
-            f.label,
+            f.text,
             value_text(f),
             limit_text(f),
             verdict_word(f.verdict),
-            "" if f.verdict is Verdict.PASS else f.advice,
+            "" if f.verdict is Verdict.PASS else f.remedy,
         )
         for f in result.quality.figures
     ]

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QSizePolicy
 
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
-from gelpolight_core.quality import (
-    Figure,
+from gelpolight_core.finding import (
+    Finding,
     QualityTable,
     Verdict,
     limit_text,
@@ -55,18 +55,18 @@ class QualityTableWidget(MarkupLabel):
         """Return the texts of the rows."""
         rows = []
         for f in self._table.figures:
-            rows.append([verdict_word(f.verdict), f.label, value_text(f), limit_text(f)])
+            rows.append([verdict_word(f.verdict), f.text, value_text(f), limit_text(f)])
             if _advice(f):
                 rows.append(["", _advice(f), "", ""])
         return rows
 
-    def _row(self, figure: Figure) -> str:
+    def _row(self, figure: Finding) -> str:
         verdict, cell = figure.verdict, "<td width='1%' align='right' style='white-space: nowrap"
         colour = f"white-space: nowrap; color: @{verdict.value}"
         sign = SIGNS[verdict] if self._narrow else f"{SIGNS[verdict]} {verdict_word(verdict)}"
         row = (
             f"<tr><td width='1%' style='{colour}'><b>{sign}</b></td>"
-            f"<td width='97%'>{escaped(figure.label)}</td>"
+            f"<td width='97%'>{escaped(figure.text)}</td>"
             f"{cell}'>{escaped(value_text(figure))}</td>"
             f"{cell}; color: @muted'>{escaped(limit_text(figure))}</td></tr>"
         )
@@ -79,6 +79,6 @@ class QualityTableWidget(MarkupLabel):
         return QSize(width, self.heightForWidth(width))
 
 
-def _advice(figure: Figure) -> str:
-    poor = figure.verdict is not Verdict.PASS and bool(figure.advice)
-    return f"{figure.advice}." if poor else ""
+def _advice(figure: Finding) -> str:
+    poor = figure.verdict is not Verdict.PASS and bool(figure.remedy)
+    return f"{figure.remedy}." if poor else ""

@@ -9,7 +9,7 @@ from pathlib import Path
 from app.workspace.validation import Validation, read_validation
 from gelpolight_core.calibration.manifest import CalibrationSummary, read_summary
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.translation import tr
 
 

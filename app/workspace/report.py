@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from app.workspace.entries import Entry, validation_lines
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.report.document import Validation
 
 

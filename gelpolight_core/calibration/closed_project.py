@@ -20,8 +20,8 @@ from gelpolight_core.calibration.staged_project import Outcome, StagedProject
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.in_place.scale import MeasuredScale
-from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.images import require_colour
 from gelpolight_core.session.session import InPlace, Session, read_session
 from gelpolight_core.translation import tr

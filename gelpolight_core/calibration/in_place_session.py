@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.in_place.ball import Ball
 from gelpolight_core.in_place.calibrate import (
@@ -22,7 +23,6 @@ from gelpolight_core.in_place.calibrate import (
 )
 from gelpolight_core.in_place.scale import MeasuredScale, scale_from_pins, scale_from_punch
 from gelpolight_core.io.reading import as_text
-from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor, InPlaceCalibration
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reflectance.contour import Circle
@@ -234,7 +234,7 @@ def judge_scale(mm_per_px: float, scale_sd: float, advice: str = "") -> QualityT
         "%",
         warn=2.0,
         fail=10.0,
-        advice=advice or tr("Measure the scale with a pin grid or a flat punch"),
+        remedy=advice or tr("Measure the scale with a pin grid or a flat punch"),
     )
     return QualityTable((scale, uncertainty))
 
@@ -258,7 +258,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
                     float(used),
                     warn=float(ENOUGH_BALLS),
                     higher_is_better=True,
-                    advice=more,
+                    remedy=more,
                 ),
                 judge(
                     "balls_left_out_percent",
@@ -267,7 +267,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
                     "%",
                     warn=20.0,
                     fail=60.0,
-                    advice=tr("Check the background and the images that are named"),
+                    remedy=tr("Check the background and the images that are named"),
                 ),
                 judge("steepest_slope_deg", tr("Steepest slope of the balls"),
                       float(np.degrees(np.arctan(result.model.steepest))), "deg"),
@@ -282,7 +282,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
                     "deg",
                     warn=5.0,
                     fail=12.0,
-                    advice=more,
+                    remedy=more,
                 ),
                 judge(
                     "held_out_cap_percent",
@@ -291,7 +291,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
                     "%",
                     warn=8.0,
                     fail=25.0,
-                    advice=sizes,
+                    remedy=sizes,
                 ),
                 judge(
                     "held_out_diameter_percent",
@@ -300,7 +300,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
                     "%",
                     warn=3.0,
                     fail=15.0,
-                    advice=sizes,
+                    remedy=sizes,
                 ),
                 *_learning_figures(result, more),
             )
@@ -308,7 +308,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
     }  # fmt: skip
 
 
-def _learning_figures(result: InPlaceResult, more: str) -> tuple[Figure, ...]:
+def _learning_figures(result: InPlaceResult, more: str) -> tuple[Finding, ...]:
     """Return the expected improvement by one more ball, from fits with fewer balls."""
     gain = expected_gain(result)
     if gain is None:
@@ -320,7 +320,7 @@ def _learning_figures(result: InPlaceResult, more: str) -> tuple[Figure, ...]:
             100.0 * gain,
             "%",
             warn=100.0 * SETTLED,
-            advice=more,
+            remedy=more,
         ),
     )
 
@@ -382,7 +382,7 @@ def with_background(
         0.0,
         warn=1.0,
         higher_is_better=True,
-        advice=tr("Press a ball at three or more places and repair the calibration with them"),
+        remedy=tr("Press a ball at three or more places and repair the calibration with them"),
     )
     quality = {**calibration.quality, "gel": QualityTable((unseen,))}
     return replace(calibration, in_place=changed, quality=quality, provenance=provenance)

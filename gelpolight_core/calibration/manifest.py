@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.io.reading import (
     brief,
     check_version,
@@ -28,7 +29,6 @@ from gelpolight_core.io.reading import (
     written_text,
 )
 from gelpolight_core.io.texts import text_of_file
-from gelpolight_core.quality import Figure, QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.translation import english, tr
 
 FORMAT = "gelpolight-calibration"
@@ -160,8 +160,7 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
 def quality_rows(table: QualityTable) -> list[dict[str, Any]]:
     """Return a quality table as it is stored: with English texts."""
     return [
-        row | {key: english(getattr(figure, key)) for key in _TEXTS}
-        for row, figure in zip(table.as_rows(), table.figures, strict=True)
+        row | {key: english(row[key]) for key in ("label", "advice")} for row in table.as_rows()
     ]
 
 
@@ -170,17 +169,21 @@ def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
     return QualityTable(tuple(_figure(row) for row in rows))
 
 
-def _figure(row: dict[str, Any]) -> Figure:
-    texts = {key: written_text(row[key]) for key in ("key", "unit")}
-    texts |= {key: text_of_file(row[key]) for key in _TEXTS}
-    limits = {key: None if row[key] is None else _number(row[key]) for key in _LIMITS}
-    return Figure(**{
-        **row, **texts, **limits, "value": _number(row["value"]), "verdict": Verdict(row["verdict"])
-    })  # fmt: skip
+def _figure(row: dict[str, Any]) -> Finding:
+    warn, fail = (None if row[key] is None else _number(row[key]) for key in _LIMITS)
+    return Finding(
+        written_text(row["key"]),
+        text_of_file(row["label"]),
+        _number(row["value"]),
+        written_text(row["unit"]),
+        warn,
+        fail,
+        Verdict(row["verdict"]),
+        text_of_file(row["advice"]),
+    )
 
 
 _LIMITS = ("warn_limit", "fail_limit")
-_TEXTS = ("label", "advice")
 
 
 def _number(value: Any) -> float:

@@ -18,11 +18,11 @@ from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.lights.crosstalk import CrosstalkResult
 from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
-from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.agreement import LEAST_PRESSES
 from gelpolight_core.reflectance.membrane import MEMBRANES
@@ -214,7 +214,7 @@ def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
                 "%",
                 warn=4.0,
                 fail=12.0,
-                advice=tr("Check the ball radii, then repeat the worst presses"),
+                remedy=tr("Check the ball radii, then repeat the worst presses"),
             ),
             judge(
                 "joint_led_sd_mm",
@@ -223,7 +223,7 @@ def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
                 "mm",
                 warn=0.2,
                 fail=1.0,
-                advice=tr("Press more balls at more positions"),
+                remedy=tr("Press more balls at more positions"),
             ),
             *(() if results.joint is None else judge_presses(results.joint)),
             *(() if results.joint is None else judge_radii(results.joint)),
@@ -241,7 +241,7 @@ def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
     )
 
 
-def judge_presses(joint: JointResult) -> tuple[Figure, ...]:
+def judge_presses(joint: JointResult) -> tuple[Finding, ...]:
     """Judge the ball press with the largest residual, compared with the others.
 
     Parameters
@@ -261,14 +261,14 @@ def judge_presses(joint: JointResult) -> tuple[Figure, ...]:
             float(np.nanmax(misfits) / np.nanmedian(misfits)),
             warn=1.5,
             fail=2.0,
-            advice=tr(
+            remedy=tr(
                 "Check the stated diameter of {name}; clean the membrane and repeat the press"
             ).format(name=worst),
         ),
     )
 
 
-def judge_radii(joint: JointResult) -> tuple[Figure, ...]:
+def judge_radii(joint: JointResult) -> tuple[Finding, ...]:
     """Judge whether all stated ball radii have a common error, or contradict the other lengths."""
     factor = joint.radius_factor
     if factor is None:
@@ -289,12 +289,12 @@ def judge_radii(joint: JointResult) -> tuple[Figure, ...]:
             "%",
             warn=RADIUS_WARN_PERCENT,
             fail=RADIUS_FAIL_PERCENT,
-            advice=pattern("{seen}. {advice}", seen=seen.format(p=off), advice=advice),
+            remedy=pattern("{seen}. {advice}", seen=seen.format(p=off), advice=advice),
         ),
     )
 
 
-def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
+def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
     scale = full.scale_sd
     if scale is None:
         return ()
@@ -308,7 +308,7 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
             "%",
             warn=2.0,
             fail=MOST_HEIGHT_ERROR,
-            advice=lengths,
+            remedy=lengths,
         ),
         judge(
             "depth_sd_percent",
@@ -318,12 +318,12 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
             warn=2.0,
             fail=MOST_HEIGHT_ERROR,
             # More balls reduce scatter, but not an error common to all heights.
-            advice=lengths if stated_wrong else tr("Press more balls at more positions"),
+            remedy=lengths if stated_wrong else tr("Press more balls at more positions"),
         ),
     )
 
 
-def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
+def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
     """Return the selected membrane and the ratio of errors; empty if no press was held out."""
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:

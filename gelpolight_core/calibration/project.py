@@ -23,7 +23,7 @@ from gelpolight_core.calibration.staged_project import Outcome, StagedProject
 from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.status import StageState, StageStatus, judged
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.sensor_calibration import MODELS
 from gelpolight_core.session.file_hashes import refuse_copies
 from gelpolight_core.session.session import read_session

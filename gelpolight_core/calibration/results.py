@@ -12,12 +12,12 @@ from gelpolight_core.bad_pixels import FAR_SHARE, BadPixels
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult
+from gelpolight_core.finding import Finding, QualityTable, Verdict, judge, judge_left_out
 from gelpolight_core.lights.crosstalk import CrosstalkResult
 from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import Figure, QualityTable, Verdict, judge, judge_left_out
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.stage import ReflectanceResult
@@ -94,10 +94,10 @@ def require_balls(results: StageResults) -> None:
         if figure.verdict is Verdict.FAIL:
             raise InputError(
                 tr("No ball was found with this background ({label}: {value:.1f} {unit})").format(
-                    label=figure.label, value=figure.value, unit=figure.unit
+                    label=figure.text, value=figure.value, unit=figure.unit
                 ),
                 where=tr("background"),
-                advice=figure.advice,
+                advice=figure.remedy,
             )
     for ball in results.balls:
         if ball.fault is not None:
@@ -119,7 +119,7 @@ def judge_balls(results: StageResults) -> QualityTable:
     return QualityTable((judge_left_out("balls_left_out", tr("Captures left out"), refused),))
 
 
-def judge_bad_pixels(bad: BadPixels) -> Figure:
+def judge_bad_pixels(bad: BadPixels) -> Finding:
     """Judge how many pixels of the camera do not follow the light."""
     return judge(
         "bad_pixels_percent",
@@ -128,7 +128,7 @@ def judge_bad_pixels(bad: BadPixels) -> Figure:
         "%",
         warn=0.5,
         fail=100.0 * FAR_SHARE,
-        advice=tr("Replace the camera, or lower its gain and temperature"),
+        remedy=tr("Replace the camera, or lower its gain and temperature"),
     )
 
 

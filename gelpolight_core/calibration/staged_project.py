@@ -11,7 +11,7 @@ from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.inputs import Stage, StageInputs, changes_between
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.session.file_hashes import CachedHashes
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr

@@ -28,6 +28,7 @@ from gelpolight_core.calibration.results import (
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import calibrate_factors
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.lights.crosstalk import find_crosstalk, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
@@ -40,7 +41,6 @@ from gelpolight_core.optics.pose import estimate_top_pose
 from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane
 from gelpolight_core.optics.resampling import build_resampling_table
 from gelpolight_core.parallel import in_parallel
-from gelpolight_core.quality import QualityTable
 from gelpolight_core.radiance.whiteboard import calibrate_radiance
 from gelpolight_core.reflectance.press import PlacedContact, find_ball
 from gelpolight_core.reflectance.stage import calibrate_reflectance

@@ -10,7 +10,7 @@ from typing import Any
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import judge_joint
 from gelpolight_core.calibration.results import StageResults, judge_balls
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -67,7 +67,7 @@ def judged(stage: Stage, results: StageResults) -> StageStatus:
 
 def judged_by(stage: Stage, table: QualityTable) -> StageStatus:
     """Return the status of a stage by the figures of its up-to-date result."""
-    advice = ". ".join(table.advice)
+    advice = ". ".join(table.remedies)
     sentence = f"{advice}." if advice else tr("Everything is within its limits.")
     return StageStatus(stage, StageState(table.verdict.value), sentence, table)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.design_check.reflections import LED_NAMES, Reflection, led_reflections
-from gelpolight_core.quality import Figure, QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.simulation.lamps import PointLamp, lamps_of
 from gelpolight_core.simulation.rays import project_through_layers, reflection, trace_pixels
 from gelpolight_core.simulation.shading import Material, point_brightness
@@ -225,7 +225,7 @@ def veil_share(design: SensorDesign) -> float:
     return float(np.max((kernel @ direct)[lit] / direct[lit], initial=0.0))
 
 
-def _lower_face_figure(reflections: tuple[Reflection, ...]) -> Figure:
+def _lower_face_figure(reflections: tuple[Reflection, ...]) -> Finding:
     seen = [r for r in reflections if r.face == "lower face" and r.in_image]
     where = ", ".join(f"{r.led} ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})" for r in seen)
     return judge(
@@ -233,14 +233,14 @@ def _lower_face_figure(reflections: tuple[Reflection, ...]) -> Figure:
         tr("LEDs visible as reflections in the lower face"),
         float(len(seen)),
         fail=0.5,
-        advice=tr(
+        remedy=tr(
             "Reflections reach the camera at {where}. Embed the LEDs in the elastomer, or "
             "move them outward until the reflections leave the image"
         ).format(where=where),
     )
 
 
-def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> Figure:
+def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> Finding:
     shares, positions = [0.0], [""]
     for number, lamp in enumerate(lamps_of(design)):
         for r in reflections:
@@ -255,7 +255,7 @@ def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> 
         "%",
         warn=100.0 * GLOSS_WARN,
         fail=100.0 * GLOSS_FAIL,
-        advice=tr(
+        remedy=tr(
             "The membrane is glossy at {where}. Make it rougher or more diffuse, or move the "
             "LEDs outward"
         ).format(where=positions[worst]),
@@ -288,7 +288,7 @@ def gloss_share(design: SensorDesign, lamp: PointLamp, at_mm: tuple[float, float
     return 1.0 - dull / whole if whole > 0.0 else 0.0
 
 
-def _bare_figure(reflections: tuple[Reflection, ...]) -> Figure:
+def _bare_figure(reflections: tuple[Reflection, ...]) -> Finding:
     seen = [r for r in reflections if r.face != "lower face" and r.in_image]
     return judge(
         "air_film_images",
@@ -297,7 +297,7 @@ def _bare_figure(reflections: tuple[Reflection, ...]) -> Figure:
     )
 
 
-def _embedding_figure(design: SensorDesign) -> Figure:
+def _embedding_figure(design: SensorDesign) -> Finding:
     deepest = max(led.height_mm for led in design.leds)
     return judge(
         "led_outside_elastomer",
@@ -305,27 +305,27 @@ def _embedding_figure(design: SensorDesign) -> Figure:
         max(0.0, deepest - design.layers.elastomer_thickness_mm),
         "mm",
         warn=0.0,
-        advice=tr(
+        remedy=tr(
             "Light from there is refracted before it reaches the membrane, which the calibration "
             "does not model. Embed the LEDs in the elastomer"
         ),
     )
 
 
-def _condition_figure(worst: float) -> Figure:
+def _condition_figure(worst: float) -> Finding:
     return judge(
         "light_condition",
         tr("Condition number of the light directions, largest"),
         worst,
         warn=CONDITION_WARN,
         fail=CONDITION_FAIL,
-        advice=tr(
+        remedy=tr(
             "Move the LEDs further apart (120 degrees about the axis) or nearer to the top surface"
         ),
     )
 
 
-def _blocked_figure(share: float) -> Figure:
+def _blocked_figure(share: float) -> Finding:
     return judge(
         "blocked_share",
         tr("Membrane hidden by the LEDs"),
@@ -333,11 +333,11 @@ def _blocked_figure(share: float) -> Figure:
         "%",
         warn=0.0,
         fail=100.0 * BLOCKED_FAIL,
-        advice=tr("Move the LEDs outward, use smaller ones, or reduce the working diameter"),
+        remedy=tr("Move the LEDs outward, use smaller ones, or reduce the working diameter"),
     )
 
 
-def _evenness_figures(irradiance: Array) -> tuple[Figure, ...]:
+def _evenness_figures(irradiance: Array) -> tuple[Finding, ...]:
     return tuple(
         judge(
             f"evenness_{name.lower()}",
@@ -347,13 +347,13 @@ def _evenness_figures(irradiance: Array) -> tuple[Figure, ...]:
             warn=100.0 * EVEN_WARN,
             fail=100.0 * EVEN_FAIL,
             higher_is_better=True,
-            advice=tr("Lower the LEDs below the top surface, or use a camera with more bits"),
+            remedy=tr("Lower the LEDs below the top surface, or use a camera with more bits"),
         )
         for k, name in enumerate(LED_NAMES)
     )
 
 
-def _veil_figure(design: SensorDesign) -> Figure:
+def _veil_figure(design: SensorDesign) -> Finding:
     return judge(
         "lower_face_veil",
         tr("Light on the membrane via the lower face, largest share"),
@@ -361,5 +361,5 @@ def _veil_figure(design: SensorDesign) -> Figure:
         "%",
         warn=100.0 * VEIL_WARN,
         fail=100.0 * VEIL_FAIL,
-        advice=tr("Make the elastomer thicker, or the membrane darker or smaller"),
+        remedy=tr("Make the elastomer thicker, or the membrane darker or smaller"),
     )

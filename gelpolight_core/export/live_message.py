@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.health.finding import as_dict
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, HeightMap
 from gelpolight_core.translation import tr
 
@@ -89,7 +90,7 @@ def _health(heightmap: HeightMap) -> dict[str, Any]:
         return {"checked": False, "findings": [], "unknown": [], "untouched": None}
     return {
         "checked": True,
-        "findings": [finding.as_dict() for finding in health.findings],
+        "findings": [as_dict(finding) for finding in health.findings],
         "unknown": list(health.unknown),
         "untouched": float(health.untouched),
     }

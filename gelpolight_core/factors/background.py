@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.translation import tr
@@ -104,7 +104,7 @@ def _judge(factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_]) -> Q
                 "%",
                 warn=15.0,
                 fail=40.0,
-                advice=tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
+                remedy=tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
             ),
             judge(
                 "membrane_unusable_percent",
@@ -113,7 +113,7 @@ def _judge(factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_]) -> Q
                 "%",
                 warn=2.0,
                 fail=20.0,
-                advice=tr("Check the background image for holes, dirt or saturation"),
+                remedy=tr("Check the background image for holes, dirt or saturation"),
             ),
         )
     )

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.optics.resampling import ResamplingTable, working_area
-from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 from gelpolight_core.translation import tr
 
@@ -91,9 +91,9 @@ def check_bare_membrane(
     figures = (
         brightness_figure(small, area),
         judge("saturated", tr("Saturated share"), saturated_percent(image, area), "%",
-              warn=1.0, fail=20.0, advice=tr("Shorten the exposure so that nothing is saturated")),
+              warn=1.0, fail=20.0, remedy=tr("Shorten the exposure so that nothing is saturated")),
         judge("pressed", tr("Area that seems to be pressed"), 100.0 * _share(pressed, area), "%",
-              fail=0.0, advice=tr("Remove anything that touches the membrane, and wipe it clean")),
+              fail=0.0, remedy=tr("Remove anything that touches the membrane, and wipe it clean")),
     )  # fmt: skip
     return BareMembrane(pressed, QualityTable(figures))
 
@@ -128,7 +128,7 @@ def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
     return whole
 
 
-def brightness_figure(small: Float, area: Mask) -> Figure:
+def brightness_figure(small: Float, area: Mask) -> Finding:
     """Judge the brightness of the dimmest channel within the area."""
     brightest = 100.0 * np.percentile(small[area], 99.0, axis=0)
     dimmest = int(np.argmin(brightest))
@@ -140,7 +140,7 @@ def brightness_figure(small: Float, area: Mask) -> Figure:
         warn=25.0,
         fail=200.0 * LEAST_LIGHT,
         higher_is_better=True,
-        advice=tr("Switch the {name} LED on, or use a longer exposure").format(
+        remedy=tr("Switch the {name} LED on, or use a longer exposure").format(
             name=channel_name(dimmest)
         ),
     )

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
-from gelpolight_core.health.finding import KEYS, Finding, Health, health_of
+from gelpolight_core.finding import Finding
+from gelpolight_core.health.finding import KEYS, Health, health_of
 from gelpolight_core.health.fit import LEAST_START, CommonChange, common_change
 from gelpolight_core.health.judging import (
     Limits,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,65 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Finding, Verdict
 
 KEYS = (
     "dark", "led_off", "led_weak", "exposure", "room_light", "colour_order", "other_sensor",
     "saturated", "camera_moved", "blurred", "dirt", "bad_pixels", "bad_line", "not_recovered",
 )  # fmt: skip
 """Keys of all faults."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One fault of an image.
-
-    Attributes
-    ----------
-    key : str
-        One of `KEYS`.
-    cause : str
-        What is wrong, as a clause without a full stop.
-    remedy : str
-        The remedy, as a sentence without a full stop.
-    severity : Verdict
-        ``warn``: the depth is less exact than stated; ``fail``: it is far off.
-    meaningless : bool
-        Whether the depth is meaningless.
-    value : float
-        Size of the fault, in `unit`.
-    unit : str
-        Such as ``%`` or ``px``.
-    corrected : bool
-        Whether the depth is corrected for it and keeps its stated accuracy.
-    """
-
-    key: str
-    cause: str
-    remedy: str
-    severity: Verdict
-    meaningless: bool = False
-    value: float = 0.0
-    unit: str = ""
-    corrected: bool = False
-
-    @property
-    def line(self) -> str:
-        """Cause and remedy in one line."""
-        return f"{self.cause[:1].upper()}{self.cause[1:]}. {self.remedy}."
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "key": self.key,
-            "cause": self.cause,
-            "remedy": self.remedy,
-            "severity": self.severity.value,
-            "depth_is_meaningless": self.meaningless,
-            "value": self.value,
-            "unit": self.unit,
-            "corrected": self.corrected,
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +64,7 @@ class Health:
     @property
     def faults(self) -> tuple[Finding, ...]:
         """The findings that are not corrected in the depth."""
-        return tuple(finding for finding in self.findings if not finding.corrected)
+        return tuple(finding for finding in self.findings if finding.doubtful)
 
     @property
     def meaningless(self) -> Finding | None:
@@ -144,8 +93,8 @@ def health_of(
     """Return the health with findings in the order of their severity."""
 
     def weight(finding: Finding) -> tuple[bool, bool, bool, int]:
-        severe = finding.severity is Verdict.FAIL
-        return not finding.meaningless, not severe, finding.corrected, KEYS.index(finding.key)
+        severe = finding.verdict is Verdict.FAIL
+        return not finding.meaningless, not severe, not finding.doubtful, KEYS.index(finding.key)
 
     return Health(tuple(sorted(findings, key=weight)), unknown, untouched, cells, light)
 
@@ -160,4 +109,18 @@ def refuse_meaningless(health: Health, *, where: str) -> None:
     """
     fault = health.meaningless
     if fault is not None:
-        raise InputError(fault.cause, where=where, advice=fault.remedy)
+        raise InputError(fault.text, where=where, advice=fault.remedy)
+
+
+def as_dict(finding: Finding) -> dict[str, Any]:
+    """Return a fault as plain values for JSON."""
+    return {
+        "key": finding.key,
+        "cause": finding.text,
+        "remedy": finding.remedy,
+        "severity": finding.verdict.value,
+        "depth_is_meaningless": finding.meaningless,
+        "value": finding.value if math.isfinite(finding.value) else 0.0,
+        "unit": finding.unit,
+        "corrected": not finding.doubtful,
+    }

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import FAR_SHARE
 from gelpolight_core.channels import channel_name
-from gelpolight_core.health.finding import Finding, LightGain
+from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.health.finding import LightGain
 from gelpolight_core.health.fit import LEAST_START, CommonChange
 from gelpolight_core.health.movement import FOLLOWED_PX
 from gelpolight_core.health.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samples
-from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ def corrected(change: Finding) -> Finding:
     if change.key not in CORRECTABLE:
         return change
     remedy = tr("The depth is corrected for this. {remedy}").format(remedy=change.remedy)
-    return replace(change, remedy=remedy, severity=Verdict.WARN, corrected=True)
+    return replace(change, remedy=remedy, verdict=Verdict.WARN, heights=Heights.STATED)
 
 
 def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:
@@ -310,7 +310,7 @@ def bad_pixel_findings(
             text = tr("the camera has a dead or hot {kind} at {places}")
             text = text.format(kind=kind, places=", ".join(str(n) for n in places[:5]))
             line = _graded("bad_line", text, remedy, False, float(len(places)), "")
-            found.append(replace(line, severity=Verdict.FAIL))
+            found.append(replace(line, verdict=Verdict.FAIL))
     if share > BAD_SHARE and count >= LEAST_BAD:
         text = tr("{p:.2g} % of the pixels are dead or hot").format(p=100.0 * share)
         far = share > FAR_SHARE
@@ -344,8 +344,9 @@ def stranger_finding() -> Finding:
 
 
 def _graded(
-    key: str, cause: str, remedy: str, far: bool, value: float = 0.0, unit: str = ""
+    key: str, text: str, remedy: str, far: bool, value: float = math.nan, unit: str = ""
 ) -> Finding:
     """Return a finding that makes the depth meaningless where the fault is `far`."""
-    severity = Verdict.FAIL if far else Verdict.WARN
-    return Finding(key, cause, remedy, severity, far, value, unit)
+    verdict = Verdict.FAIL if far else Verdict.WARN
+    heights = Heights.MEANINGLESS if far else Heights.DOUBTFUL
+    return Finding(key, text, value, unit, verdict=verdict, remedy=remedy, heights=heights)

@@ -7,8 +7,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.health.finding import Finding, Health, health_of
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.health.finding import Health, health_of
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -147,6 +147,9 @@ def not_recovered(left: float) -> Finding:
     return Finding(
         "not_recovered",
         tr("the gel has not recovered: {p:.1f} % of the last press remains").format(p=100.0 * left),
-        tr("Wait before the next press, and press for less time"),
-        Verdict.WARN, False, 100.0 * left, "%",
-    )  # fmt: skip
+        100.0 * left,
+        "%",
+        verdict=Verdict.WARN,
+        remedy=tr("Wait before the next press, and press for less time"),
+        heights=Heights.DOUBTFUL,
+    )

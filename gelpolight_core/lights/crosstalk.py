@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def find_crosstalk(spots: MirrorSpots, single_led: Sequence[LinearImage] = ()) -
             100.0 * max(scatter for _, scatter in columns),
             "%",
             warn=2.0,
-            advice=tr("Darken the room and switch on only one LED for each image"),
+            remedy=tr("Darken the room and switch on only one LED for each image"),
         ),
     ]
     if measured.any():
@@ -98,7 +98,7 @@ def find_crosstalk(spots: MirrorSpots, single_led: Sequence[LinearImage] = ()) -
                 _largest(np.eye(3) + np.where(measured, mirror - matrix, 0.0)),
                 "%",
                 warn=2.0,
-                advice=tr(
+                remedy=tr(
                     "Check that each image shows one LED alone, and the exposure of the mirror "
                     "image"
                 ),
@@ -115,7 +115,7 @@ def _judge_mirror(matrix: Array, measured: NDArray[np.bool_]) -> QualityTable:
             tr("LEDs with unknown crosstalk"),
             float(np.count_nonzero(~measured)),
             warn=0.0,
-            advice=tr(
+            remedy=tr(
                 "The mirror spots are too small or too bright to show their colour, so crosstalk "
                 "is not corrected. Add single_led images, use larger images, or use a shorter "
                 "exposure for the mirror"

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.session.images import require_colour
 from gelpolight_core.translation import tr
 
@@ -354,7 +354,7 @@ def _judge(
                 warn=2.0 * LEAST_SPOT,
                 fail=LEAST_SPOT,
                 higher_is_better=True,
-                advice=tr(
+                remedy=tr(
                     "An LED's spot is dark or has another LED's colour: drag it onto the LED's "
                     "reflection, or use a longer exposure"
                 ),
@@ -366,14 +366,14 @@ def _judge(
                 "px",
                 warn=0.1,
                 fail=0.5,
-                advice=tr("Average more frames, or use a longer exposure"),
+                remedy=tr("Average more frames, or use a longer exposure"),
             ),
             judge(
                 "spot_peak",
                 tr("Brightest spot"),
                 saturated,
                 warn=SATURATED,
-                advice=tr("The spots are saturated: use a shorter exposure"),
+                remedy=tr("The spots are saturated: use a shorter exposure"),
             ),
             judge(
                 "spot_elongation",
@@ -381,7 +381,7 @@ def _judge(
                 max(s.elongation for s in spots),
                 warn=1.5,
                 fail=3.0,
-                advice=tr(
+                remedy=tr(
                     "A spot is elongated: hold the mirror still and flat, or use a shorter exposure"
                 ),
             ),
@@ -390,7 +390,7 @@ def _judge(
                 tr("Other spots rejected"),
                 float(len(rejected)),
                 warn=3.0,
-                advice=tr("There are many glints: darken the room and clean the mirror"),
+                remedy=tr("There are many glints: darken the room and clean the mirror"),
             ),
         )
     )

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -215,7 +215,7 @@ def _judge(
                 "mm",
                 warn=0.3,
                 fail=1.0,
-                advice=tr("Repeat the top pose and the mirror image"),
+                remedy=tr("Repeat the top pose and the mirror image"),
             ),
             judge(
                 "led_sd_mm",
@@ -224,7 +224,7 @@ def _judge(
                 "mm",
                 warn=0.5,
                 fail=1.5,
-                advice=tr("Measure the height of the LEDs below the top surface again"),
+                remedy=tr("Measure the height of the LEDs below the top surface again"),
             ),
             judge(
                 "direction_condition",
@@ -232,14 +232,14 @@ def _judge(
                 condition,
                 warn=8.0,
                 fail=20.0,
-                advice=tr("Place the LEDs wider apart around the sensor's axis"),
+                remedy=tr("Place the LEDs wider apart around the sensor's axis"),
             ),
             judge(
                 "led_radius_ratio",
                 tr("Ratio of largest to smallest LED distance from the axis"),
                 float(radii.max() / max(radii.min(), 1e-9)),
                 warn=2.0,
-                advice=tr("Check that each spot belongs to its LED"),
+                remedy=tr("Check that each spot belongs to its LED"),
             ),
         )
     )

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.lens_fit import (
@@ -44,7 +45,6 @@ from gelpolight_core.optics.lens_views import (
     require_views,
 )
 from gelpolight_core.parallel import in_parallel
-from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 

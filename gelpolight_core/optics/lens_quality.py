@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, judge, judge_left_out
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_fit import LensFit
 from gelpolight_core.optics.lens_views import MIN_VIEWS, LensView, more_views_advice
-from gelpolight_core.quality import Figure, judge, judge_left_out
 from gelpolight_core.translation import pattern, tr
 
 Array = NDArray[np.float64]
@@ -91,7 +91,9 @@ def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray
     return counts.astype(np.int64)
 
 
-def fit_figures(fit: LensFit, held_out_rms: float, sd: Array, camera: Camera) -> tuple[Figure, ...]:
+def fit_figures(
+    fit: LensFit, held_out_rms: float, sd: Array, camera: Camera
+) -> tuple[Finding, ...]:
     """Judge how well the camera fits the corners, and its uncertainty.
 
     Parameters
@@ -111,19 +113,19 @@ def fit_figures(fit: LensFit, held_out_rms: float, sd: Array, camera: Camera) ->
     return (
         # A good print is accurate to 0.1 px; half a pixel at the edge is 0.05 mm on the membrane.
         judge("reprojection_rms", tr("Reprojection error"), fit.rms_px, "px",
-              warn=0.3, fail=1.0, advice=steady),
+              warn=0.3, fail=1.0, remedy=steady),
         judge("held_out_rms", tr("Error on held-out views"), held_out_rms, "px",
-              warn=0.4, fail=1.5, advice=more_views_advice()),
+              warn=0.4, fail=1.5, remedy=more_views_advice()),
         judge("focal_sd", tr("Uncertainty of the focal length"), float(focal), "%",
-              warn=0.1, fail=100.0 * MAX_FOCAL_SD, advice=more_views_advice()),
+              warn=0.1, fail=100.0 * MAX_FOCAL_SD, remedy=more_views_advice()),
         judge("centre_sd", tr("Uncertainty of the principal point"), centre, "px",
-              warn=camera.width / 500.0, fail=camera.width / 50.0, advice=more_views_advice()),
+              warn=camera.width / 500.0, fail=camera.width / 50.0, remedy=more_views_advice()),
     )  # fmt: skip
 
 
 def view_figures(
     views: Sequence[LensView], coverage: float, spread_deg: float
-) -> tuple[Figure, ...]:
+) -> tuple[Finding, ...]:
     """Judge the content of the views.
 
     Parameters
@@ -144,14 +146,14 @@ def view_figures(
     edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
     return (
         judge("views_used", tr("Views used"), used,
-              warn=8, fail=MIN_VIEWS, higher_is_better=True, advice=more_views_advice()),
+              warn=8, fail=MIN_VIEWS, higher_is_better=True, remedy=more_views_advice()),
         judge_left_out("views_left_out", tr("Views left out"), refused),
         judge("normal_spread", tr("Variation of the board tilt"), spread_deg, "deg",
               warn=10.0, fail=MIN_NORMAL_SPREAD_DEG, higher_is_better=True,
-              advice=tr("Tilt the board more and in different directions")),
+              remedy=tr("Tilt the board more and in different directions")),
         # Without corners, the distortion is a guess.
         judge("coverage", tr("Image area covered by corners"), 100.0 * coverage, "%",
               warn=60.0, fail=25.0, higher_is_better=True,
-              advice=tr("Also show the board in the corners of the image")),
+              remedy=tr("Also show the board in the corners of the image")),
         judge("edge_width", tr("Edge width of the squares"), float(np.median(edges)), "px"),
     )  # fmt: skip

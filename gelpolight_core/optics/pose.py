@@ -16,6 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, judge, judge_left_out
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.board_exposure import EDGE_OF_SIGMA
 from gelpolight_core.optics.camera import Camera
@@ -30,7 +31,6 @@ from gelpolight_core.optics.plane_pose import (
     find_poses,
     nearest_pose,
 )
-from gelpolight_core.quality import Figure, QualityTable, judge, judge_left_out
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import pattern, tr
 
@@ -306,34 +306,34 @@ def _assemble(
     )
 
 
-def _blur_figure(blur_px: float) -> Figure:
+def _blur_figure(blur_px: float) -> Finding:
     advice = tr(
         "Focus the lens on the top surface and keep the board still; blur rounds off walls and "
         "edges"
     )
     name = tr("Blur on the top surface")
-    return judge("blur", name, blur_px, "px", warn=MOST_LENS_BLUR_PX, advice=advice)
+    return judge("blur", name, blur_px, "px", warn=MOST_LENS_BLUR_PX, remedy=advice)
 
 
 def _plane_figures(
     plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
-) -> tuple[Figure, ...]:
+) -> tuple[Finding, ...]:
     more = tr("Capture several sharp views of a flat board that fills the top surface")
     return (
         judge("distance", tr("Distance of the top surface"), plane.distance_mm, "mm"),
         judge("distance_sd", tr("Uncertainty of the distance"),
-              100.0 * distance_sd_mm / plane.distance_mm, "%", warn=0.1, fail=1.0, advice=more),
+              100.0 * distance_sd_mm / plane.distance_mm, "%", warn=0.1, fail=1.0, remedy=more),
         # A tilt error of one degree moves a mirrored LED by 1 mm (see "lights from mirror spots").
         judge("normal_sd", tr("Uncertainty of the normal"), normal_sd_deg, "deg",
-              warn=0.1, fail=1.0, advice=more),
+              warn=0.1, fail=1.0, remedy=more),
         judge("tilt", tr("Tilt of the top surface"), tilt_deg, "deg", warn=5.0, fail=20.0,
-              advice=tr("Press the board flat onto the surface; check how the camera is mounted")),
+              remedy=tr("Press the board flat onto the surface; check how the camera is mounted")),
     )  # fmt: skip
 
 
 def _view_figures(
     views: Sequence[TopPoseView], rms: float, spread_deg: float, decision: Decision, margin: float
-) -> tuple[Figure, ...]:
+) -> tuple[Finding, ...]:
     refused = [
         pattern("{name} ({reason})", name=view.name, reason=view.reason)
         for view in views
@@ -347,7 +347,7 @@ def _view_figures(
             "px",
             warn=0.3,
             fail=1.0,
-            advice=tr("Use a flat board and check its square size; calibrate the lens again"),
+            remedy=tr("Use a flat board and check its square size; calibrate the lens again"),
         ),
         judge(
             "view_spread",
@@ -356,7 +356,7 @@ def _view_figures(
             "deg",
             warn=0.25,
             fail=1.0,
-            advice=tr("Press the board flat onto the surface in each view"),
+            remedy=tr("Press the board flat onto the surface in each view"),
         ),
         judge_left_out("views_left_out", tr("Views left out"), refused),
     ]
@@ -365,7 +365,7 @@ def _view_figures(
             judge("mirrored_margin", tr("Certainty against the mirrored pose"),
                   math.sqrt(max(margin, 0.0)), "sd", warn=math.sqrt(SURE_MARGIN),
                   higher_is_better=True,
-                  advice=tr("Two mirrored poses fit the views equally well; the one with the "
+                  remedy=tr("Two mirrored poses fit the views equally well; the one with the "
                             "smaller tilt was chosen. To be sure, use a larger or sharper board"))
         )  # fmt: skip
     return tuple(figures)

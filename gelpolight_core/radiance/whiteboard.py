@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.session.images import require_colour
 from gelpolight_core.translation import tr
 
@@ -296,7 +296,7 @@ def _judge(
                 "%",
                 warn=0.1,
                 fail=10.0,
-                advice=tr("Use a shorter exposure so that nothing is saturated"),
+                remedy=tr("Use a shorter exposure so that nothing is saturated"),
             ),
             judge(
                 "whiteboard_dust_percent",
@@ -305,7 +305,7 @@ def _judge(
                 "%",
                 warn=3.0,
                 fail=20.0,
-                advice=tr("Clean the whiteboard and the elastomer and repeat"),
+                remedy=tr("Clean the whiteboard and the elastomer and repeat"),
             ),
             judge(
                 "whiteboard_unlit_percent",
@@ -314,14 +314,14 @@ def _judge(
                 "%",
                 warn=10.0,
                 fail=40.0,
-                advice=tr("Use a longer exposure, or move the LEDs outward or lower"),
+                remedy=tr("Use a longer exposure, or move the LEDs outward or lower"),
             ),
             judge(
                 "light_range",
                 tr("Light, ratio of brightest to darkest area of a channel"),
                 evenness,
                 warn=40.0,
-                advice=tr("Lower or move the LEDs for more even light"),
+                remedy=tr("Lower or move the LEDs for more even light"),
             ),
         )
     )

@@ -15,11 +15,11 @@ from scipy import ndimage
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
+from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.health.expected import even_membrane, raw_background
 from gelpolight_core.health.texture_shift import texture_shift_px
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import LEAST_LIGHT, lit, saturated
-from gelpolight_core.quality import QualityTable, Verdict, judge
 from gelpolight_core.radiance import whiteboard
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
 from gelpolight_core.reconstruction.linear import as_linear
@@ -231,7 +231,7 @@ def _judge(
             tr("Contacts on the sensor (0: untouched)"),
             float(touched),
             fail=0.5,
-            advice=tr("Remove everything from the sensor and check again"),
+            remedy=tr("Remove everything from the sensor and check again"),
         )
     ]
     if shift_px is not None:
@@ -243,7 +243,7 @@ def _judge(
                 "px",
                 warn=0.5,
                 fail=2.0,
-                advice=tr(
+                remedy=tr(
                     "Camera and elastomer have moved against each other: seat them, or "
                     "calibrate again"
                 ),
@@ -257,7 +257,7 @@ def _judge(
             "%",
             warn=2.0,
             fail=15.0,
-            advice=tr("Let the LEDs warm up and check exposure and gain, then set to zero"),
+            remedy=tr("Let the LEDs warm up and check exposure and gain, then set to zero"),
         )
         for k, change in enumerate(brightness)
     ]
@@ -269,7 +269,7 @@ def _judge(
             "%",
             warn=5.0,
             fail=80.0,
-            advice=tr(
+            remedy=tr(
                 "Set to zero; if the difference remains, clean the sensor or calibrate again"
             ),
         )
@@ -287,4 +287,4 @@ def _refuse_unfit(shift: BackgroundShift) -> None:
                 if shift.touched
                 else tr("the membrane has moved by {px:.1f} px").format(px=figures[0].value)
             )
-            raise InputError(found, where=tr("zero"), advice=figures[0].advice)
+            raise InputError(found, where=tr("zero"), advice=figures[0].remedy)

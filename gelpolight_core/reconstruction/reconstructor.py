@@ -283,7 +283,7 @@ class Reconstructor:
             faults=(
                 *filter(None, (self.calibration.fault,)),
                 *(note.text for note in solved.notes if note.doubtful),
-                *(finding.cause for finding in faults),
+                *(finding.text for finding in faults),
             ),
             **({} if noise is None else {f.name: getattr(noise, f.name) for f in fields(noise)}),
             depth_scale_sd=solved.depth_scale_sd,

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gelpolight_core.finding import Finding, judge
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import Figure, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
 from gelpolight_core.translation import tr
@@ -153,7 +153,7 @@ def compare_presses(
     return tuple(replace(a, usual_odd_share=usual) for a in found)
 
 
-def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Figure, ...]:
+def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ...]:
     """Judge the press that agrees least; no figures if the presses could not be compared."""
     if not agreements:
         return ()
@@ -169,7 +169,7 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Figure, ...
             # If no press follows a curve, as with a glossy membrane, the curve cannot show a wrong
             # radius. The joint refinement compares the presses again.
             fail=None if odd.usual_odd_share > ODD_WARN_PERCENT / 100.0 else RADIUS_FAIL_PERCENT,
-            advice=_sentence(odd.fault),
+            remedy=_sentence(odd.fault),
         ),
         judge(
             "press_dirt_percent",
@@ -177,7 +177,7 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Figure, ...
             100.0 * poor.odd_share,
             "%",
             warn=ODD_WARN_PERCENT,
-            advice=_sentence(poor.fault),
+            remedy=_sentence(poor.fault),
         ),
     )
 

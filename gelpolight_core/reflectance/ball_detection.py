@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.image.noise import (
     ScaledDifference,
     change_where,
@@ -24,7 +25,6 @@ from gelpolight_core.image.noise import (
     prepare_pair,
     scale_difference,
 )
-from gelpolight_core.quality import Verdict
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit, fit_shading
 from gelpolight_core.reflectance.contour import Circle, Contour, distance_in_radii, fit_edge
 from gelpolight_core.reflectance.indentation import Indentation, describe_indentation

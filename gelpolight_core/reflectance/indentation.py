@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.noise import (
     LARGEST_GAIN_CHANGE,
     ScaledDifference,
@@ -16,7 +17,6 @@ from gelpolight_core.image.noise import (
     scale_difference,
 )
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.reflectance.contour import Circle, Contour, distance_in_radii
 from gelpolight_core.reflectance.indentation_checks import (
     ALLOWED_RESIDUAL_PX,
@@ -236,10 +236,10 @@ def _judge(
 
     def figure(
         key: str, value: float, unit: str, warn: float, fail: float | None, advice: str
-    ) -> Figure:
+    ) -> Finding:
         high = key in {"axis_ratio", "coverage", "signal_to_noise"}
         limits = {"warn": warn, "fail": fail}
-        return judge(key, label[key], value, unit, **limits, advice=advice, higher_is_better=high)
+        return judge(key, label[key], value, unit, **limits, remedy=advice, higher_is_better=high)
 
     lowest = 100.0 * LEAST_COVERAGE
     middle, deeper = (

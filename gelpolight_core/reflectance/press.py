@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.reflectance.ball import (
     BallPose,
     ShadedPixels,
@@ -225,7 +225,7 @@ def _judge(
                 contact_mm,
                 "mm",
                 warn=0.9 * radius_mm,
-                advice=tr("The ball is pressed in very deep: press less, or use a larger ball"),
+                remedy=tr("The ball is pressed in very deep: press less, or use a larger ball"),
             ),
             judge(
                 "centre_moved_mm",
@@ -234,7 +234,7 @@ def _judge(
                 "mm",
                 warn=0.15 * contact_mm,
                 fail=0.4 * contact_mm,
-                advice=tr("Outline and shading disagree: look for dirt, or press again"),
+                remedy=tr("Outline and shading disagree: look for dirt, or press again"),
             ),
             judge(
                 "shading_misfit_percent",
@@ -243,7 +243,7 @@ def _judge(
                 "%",
                 warn=8.0,
                 fail=25.0,
-                advice=tr("Check the ball's radius and that nothing else touches the membrane"),
+                remedy=tr("Check the ball's radius and that nothing else touches the membrane"),
             ),
         )
     )

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.agreement import (
     PressAgreement,
@@ -172,7 +172,7 @@ def _judge(
                 warn=4.0,
                 fail=0.5,
                 higher_is_better=True,
-                advice=tr("Press balls at five or more places"),
+                remedy=tr("Press balls at five or more places"),
             ),
             judge(
                 "lowest_cosine",
@@ -180,7 +180,7 @@ def _judge(
                 float(max(f.coverage[0] for f in fits)),
                 warn=0.4,
                 fail=0.7,
-                advice=tr("Press balls deeper, or smaller ones: steep walls are extrapolated"),
+                remedy=tr("Press balls deeper, or smaller ones: steep walls are extrapolated"),
             ),
             judge(
                 "scatter_percent",
@@ -189,7 +189,7 @@ def _judge(
                 "%",
                 warn=8.0,
                 fail=25.0,
-                advice=tr(
+                remedy=tr(
                     "On a very glossy membrane this is normal if the figures of the joint"
                     " refinement pass; otherwise check ball radii and LED positions, then repeat"
                     " the worst presses"
@@ -202,7 +202,7 @@ def _judge(
                 "%",
                 warn=5.0,
                 fail=20.0,
-                advice=tr("Clean the membrane and repeat the worst presses"),
+                remedy=tr("Clean the membrane and repeat the worst presses"),
             ),
             judge(
                 "worst_misfit_percent",
@@ -211,7 +211,7 @@ def _judge(
                 "%",
                 warn=10.0,
                 fail=25.0,
-                advice=tr("Repeat the press {name}").format(name=worst.name),
+                remedy=tr("Repeat the press {name}").format(name=worst.name),
             ),
         )
     )

@@ -12,8 +12,8 @@ from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.calibration.titles import stage_title
+from gelpolight_core.finding import Verdict
 from gelpolight_core.in_place.calibrate import InPlaceResult
-from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
 from gelpolight_core.report import drawings, tables
 from gelpolight_core.report.document import Listing, Parts, Report, Section, Validation

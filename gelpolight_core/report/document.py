@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.finding import QualityTable, Verdict
 
 T = TypeVar("T")
 MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}

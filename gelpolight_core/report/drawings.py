@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.channels import channel_name
+from gelpolight_core.finding import Verdict
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.lens_views import LensView
 from gelpolight_core.optics.pose import TopPoseResult, TopPoseView
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
-from gelpolight_core.quality import Verdict
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.reflectance.press import BallPress

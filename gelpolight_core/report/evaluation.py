@@ -10,6 +10,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.evaluation import (
     ALL,
@@ -23,7 +24,6 @@ from gelpolight_core.measurement.evaluation_report import (
     write_evaluation,
 )
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
-from gelpolight_core.quality import QualityTable, Verdict, judge
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.report.document import (
     Facts,
@@ -123,7 +123,7 @@ def evaluation_errors(
         name = label(direction)
         mean = evaluation.overall(direction).mean_absolute_percent
         text = title.format(direction=name)
-        figures.append(judge(f"{direction}_mean", text, mean, "%", fail=limit, advice=advice))
+        figures.append(judge(f"{direction}_mean", text, mean, "%", fail=limit, remedy=advice))
         for group in evaluation.groups:
             overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
             mean = group.statistic.mean_absolute_percent

@@ -16,8 +16,8 @@ import typst
 
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.quality import Figure, Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.report.document import MARKS, Report
 from gelpolight_core.report.drawing import FONTS
 from gelpolight_core.translation import current_language, tr
@@ -98,7 +98,7 @@ def report_json(report: Report) -> Any:
             "title": s.title,
             "intro": s.intro,
             "verdict": s.quality.verdict,
-            "advice": s.quality.advice,
+            "advice": s.quality.remedies,
             "figures": [_figure(figure) for figure in s.quality.figures],
             "facts": s.facts,
             "drawings": [{"number": next(number), "caption": d.caption} for d in s.drawings],
@@ -123,12 +123,12 @@ def report_json(report: Report) -> Any:
     )
 
 
-def _figure(figure: Figure) -> dict[str, Any]:
+def _figure(figure: Finding) -> dict[str, Any]:
     limit = limit_text(figure)
     if figure.warn_limit is not None and figure.fail_limit is not None:
         sign = "<" if figure.higher_is_better else ">"
         limit += tr(" (fails {sign} {limit:.4g})").format(sign=sign, limit=figure.fail_limit)
-    return {**asdict(figure), "value_text": value_text(figure), "limit_text": limit}
+    return {**figure.as_row(), "value_text": value_text(figure), "limit_text": limit}
 
 
 def _date(created: str) -> tuple[int, ...] | None:

@@ -10,10 +10,10 @@ import numpy as np
 
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.channels import channel_name
+from gelpolight_core.finding import verdict_word
 from gelpolight_core.in_place.calibrate import InPlaceResult
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.lens import LensResult
-from gelpolight_core.quality import verdict_word
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.report.document import MARKS, Listing, listing
@@ -91,7 +91,7 @@ def ball_presses(presses: Sequence[BallPress]) -> Listing:
 
     def verdict(press: BallPress) -> str:
         word = f"{MARKS[press.quality.verdict]} {verdict_word(press.quality.verdict)}"
-        return ": ".join((word, *press.quality.advice))
+        return ": ".join((word, *press.quality.remedies))
 
     return listing(
         tr("Ball presses (lengths in mm)"),

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import NODES, CameraResponse, declared_response, distance
-from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.response.series import (
     REPEATABILITY,
     Series,
@@ -94,7 +94,7 @@ def declare_response(declared: str | float | None) -> ResponseResult:
         ``linear``, ``srgb``, a gamma, or None if nothing is declared.
     """
     response = declared_response(declared)
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[Finding, ...] = ()
     if response is not None:
         figures = (
             judge(
@@ -290,7 +290,7 @@ def _judge(
             "%",
             warn=0.5,
             fail=100.0 * LARGEST_SD,
-            advice=tr("Add exposures, and check the stated exposure times"),
+            remedy=tr("Add exposures, and check the stated exposure times"),
         ),
         judge(
             "response_residual_percent",
@@ -299,7 +299,7 @@ def _judge(
             "%",
             warn=100.0 * WARN_RESIDUAL,
             fail=100.0 * LARGEST_RESIDUAL,
-            advice=tr("Keep scene and light constant, and check the exposure times"),
+            remedy=tr("Keep scene and light constant, and check the exposure times"),
         ),
         judge(
             "response_held_out_percent",
@@ -308,7 +308,7 @@ def _judge(
             "%",
             warn=100.0 * WARN_RESIDUAL,
             fail=100.0 * LARGEST_RESIDUAL,
-            advice=tr("Keep scene and light constant, check the exposure times, and add exposures"),
+            remedy=tr("Keep scene and light constant, check the exposure times, and add exposures"),
         ),
         judge(
             "response_lowest_percent",
@@ -316,7 +316,7 @@ def _judge(
             100.0 * max(c.series.covered[0] for c in channels),
             "%",
             warn=30.0,
-            advice=tr("Add shorter exposures"),
+            remedy=tr("Add shorter exposures"),
         ),
         judge(
             "response_highest_percent",
@@ -325,7 +325,7 @@ def _judge(
             "%",
             warn=80.0,
             higher_is_better=True,
-            advice=tr("Add longer exposures, until the scene begins to saturate"),
+            remedy=tr("Add longer exposures, until the scene begins to saturate"),
         ),
         judge(
             "response_exposure_span",
@@ -338,7 +338,7 @@ def _judge(
     return QualityTable(tuple(figures))
 
 
-def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Figure:
+def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Finding:
     response, nodes = declared_response(declared), np.linspace(0.0, 1.0, NODES)
     stated = np.tile(nodes, (3, 1)) if response is None else response.curves
     difference = 0.0
@@ -351,5 +351,5 @@ def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Fig
         100.0 * difference,
         "%",
         warn=1.0,
-        advice=tr("Correct or remove the declared camera response; the measured response was used"),
+        remedy=tr("Correct or remove the declared camera response; the measured response was used"),
     )

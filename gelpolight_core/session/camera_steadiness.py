@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def judge_steadiness(
             warn=100.0 * DARKEST,
             fail=0.4,
             higher_is_better=True,
-            advice=tr("Switch the LEDs on and lock a longer exposure"),
+            remedy=tr("Switch the LEDs on and lock a longer exposure"),
         ),
         judge(
             "camera_drift_percent",
@@ -90,7 +90,7 @@ def judge_steadiness(
             "%",
             warn=0.5,
             fail=2.0,
-            advice=tr(
+            remedy=tr(
                 "Lock exposure and gain, let the LEDs warm up for a few minutes, and test again"
             ),
         ),
@@ -101,7 +101,7 @@ def judge_steadiness(
             "%",
             warn=0.5,
             fail=2.0,
-            advice=tr("Lock the white balance, and test again"),
+            remedy=tr("Lock the white balance, and test again"),
         ),
         judge(
             "camera_flicker_percent",
@@ -110,7 +110,7 @@ def judge_steadiness(
             "%",
             warn=0.4,
             fail=1.5,
-            advice=tr(
+            remedy=tr(
                 "Shade the sensor from room lamps, or set the exposure to a multiple of 10 ms "
                 "(50 Hz mains)"
             ),
@@ -122,7 +122,7 @@ def judge_steadiness(
             "%",
             warn=0.0,
             fail=50.0,
-            advice=tr("The camera is stuck: reconnect it to another port, without a hub"),
+            remedy=tr("The camera is stuck: reconnect it to another port, without a hub"),
         ),
     ]
     if rate_hz > 0.0:
@@ -136,7 +136,7 @@ def judge_steadiness(
                 warn=85.0,
                 fail=30.0,
                 higher_is_better=True,
-                advice=tr(
+                remedy=tr(
                     "Use a shorter exposure or a lower frame rate, and connect the camera "
                     "without a hub"
                 ),

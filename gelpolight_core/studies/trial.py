@@ -172,5 +172,5 @@ def warnings_of(found: HeightMap) -> tuple[str, ...]:
     """Return the notes of a map that report an unreliable depth."""
     harmless = {free_boundary_note().text}
     if found.health is not None:
-        harmless |= {finding.line for finding in found.health.findings if finding.corrected}
+        harmless |= {finding.line for finding in found.health.findings if not finding.doubtful}
     return tuple(note for note in found.notes if note not in harmless)

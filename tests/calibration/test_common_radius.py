@@ -10,7 +10,7 @@ from test_joint import BALLS, MIRROR, NO_MAP, SLAB, found_press, pixels_of, trut
 
 from gelpolight_core.calibration.joint import refine_jointly
 from gelpolight_core.calibration.pipeline import judge_radii
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 
 
 @pytest.mark.parametrize(("stated", "verdict"), [(1.0, Verdict.PASS), (1.1, Verdict.FAIL)])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView, view_directions
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.calibration.pipeline import judge_presses
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.press import BallPress
@@ -361,4 +361,4 @@ def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> Non
     named = [replace(press, name=f"ball_{k}.png") for k, press in enumerate(presses)]
     figure = judge_presses(refine_jointly(named, pixels, MIRROR, SLAB, NO_MAP))[0]
     assert figure.verdict is Verdict.FAIL
-    assert named[odd].name in figure.advice
+    assert named[odd].name in figure.remedy

@@ -67,7 +67,7 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
         if path.name in reasons:
             assert state == "fail"
             assert reasons[path.name] in sentence
-            assert path.name in left_out.advice
+            assert path.name in left_out.remedy
         else:
             assert state in ("pass", "warn")
 

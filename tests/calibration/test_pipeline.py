@@ -14,7 +14,7 @@ from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.pipeline import assemble, calibrate_session
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.session.session import read_session
 
 
@@ -39,7 +39,7 @@ def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
     cv2.imwrite(str(path), np.round(0.1 * image).astype(np.uint8))
     quality = calibrate_session(read_session(session)).calibration.quality
     assert quality["radiance"].verdict is Verdict.FAIL
-    assert "whiteboard" in quality["balls"]["balls_left_out"].advice
+    assert "whiteboard" in quality["balls"]["balls_left_out"].remedy
 
 
 def test_names_that_are_not_text_make_a_calibration_that_can_be_read(

@@ -11,7 +11,7 @@ import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_quality
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import Text, current_language, tr, use_language
 
@@ -31,7 +31,7 @@ def test_every_text_of_a_calibration_file_can_be_translated(
     quality = small_calibration.quality
     for table in quality.values():
         for figure in table.figures:
-            for text in (figure.label, figure.advice):
+            for text in (figure.text, figure.remedy):
                 assert isinstance(text, Text) or not text, (figure.key, text)
     # A figure that fails shows its advice.
     lens = replace(
@@ -46,12 +46,12 @@ def test_every_text_of_a_calibration_file_can_be_translated(
     german = read_calibration(path).quality["lens"]
     for one, other in zip(english.figures, german.figures, strict=True):
         assert (one.key, one.value) == (other.key, other.value)
-        assert one.label != other.label
-        assert one.advice != other.advice or not one.advice or one.key == "views_left_out"
+        assert one.text != other.text
+        assert one.remedy != other.remedy or not one.remedy or one.key == "views_left_out"
 
 
 def test_plain_texts_of_older_files_are_read(small_calibration: Calibration) -> None:
     rows = json.loads(json.dumps(small_calibration.quality["lens"].as_rows()))
     assert read_quality(rows) == small_calibration.quality["lens"]
     use_language("de")
-    assert read_quality(rows).figures[0].label == tr(rows[0]["label"])
+    assert read_quality(rows).figures[0].text == tr(rows[0]["label"])

@@ -20,7 +20,7 @@ from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.remarks import write_remark
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.sensor_calibration import Calibration
 
 

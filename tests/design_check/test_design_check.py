@@ -12,7 +12,7 @@ from gelpolight_core.design.parts import LayerDesign, LedDesign, LedRing
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.design_check.check import check_design
 from gelpolight_core.design_check.reflections import led_reflections
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 
 
 def ring(radius: float, height: float, *, angles=(90.0, 210.0, 330.0)) -> SensorDesign:
@@ -33,7 +33,7 @@ def test_the_default_design_passes() -> None:
 def test_lights_on_one_side_are_refused() -> None:
     result = check_design(ring(12.0, 13.7, angles=(80.0, 90.0, 100.0)))
     assert result.quality["light_condition"].verdict is Verdict.FAIL
-    assert result.quality["light_condition"].advice
+    assert result.quality["light_condition"].remedy
 
 
 def test_leds_below_the_layers_show_their_mirror_image() -> None:
@@ -76,7 +76,7 @@ def test_a_glossy_membrane_is_reported() -> None:
     membrane = replace(SensorDesign().membrane, specular_weight=0.95, roughness=0.1)
     figure = check_design(replace(SensorDesign(), membrane=membrane)).quality["membrane_gloss"]
     assert figure.verdict is Verdict.FAIL
-    assert "(" in figure.advice
+    assert "(" in figure.remedy
 
 
 def test_a_thin_elastomer_lets_the_lower_face_fill_the_shadows() -> None:

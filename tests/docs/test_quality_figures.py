@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from chapter import DOCS
 
-from gelpolight_core.quality import Figure
+from gelpolight_core.finding import Finding
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES
 from gelpolight_core.sensor_calibration import Calibration
 
@@ -215,7 +215,7 @@ def test_a_calibration_has_no_figure_that_the_chapter_leaves_out(
         assert _known(figure), figure
 
 
-def _known(figure: Figure) -> bool:
+def _known(figure: Finding) -> bool:
     """Return whether the limits of a made figure are those of one that was read in the source."""
     for judged in all_figures():
         if judged.key != figure.key:

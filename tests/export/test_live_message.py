@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gelpolight_core.export.live_message import TOPIC, pack, unpack
-from gelpolight_core.health.finding import Finding, health_of
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.health.finding import health_of
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -35,7 +35,9 @@ def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap: HeightMa
 
 
 def test_normals_are_left_out_if_there_are_none_and_faults_are_named(heightmap: HeightMap) -> None:
-    fault = Finding("dirt", "dust", "Clean it", Verdict.WARN, value=3.0, unit="%")
+    fault = Finding(
+        "dirt", "dust", 3.0, "%", verdict=Verdict.WARN, remedy="Clean it", heights=Heights.DOUBTFUL
+    )
     health = health_of([fault], unknown=("blurred",), untouched=0.8)
     header, arrays = unpack(
         pack(replace(heightmap, normals=None, health=health), frame=0, time_s=0.0, serial="")

@@ -6,7 +6,7 @@ import numpy as np
 import scene
 
 from gelpolight_core.factors.background import calibrate_factors
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.table import cosine_table
 

@@ -12,9 +12,9 @@ from scipy.ndimage import gaussian_filter
 from scipy.ndimage import shift as moved
 
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.finding import Verdict
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.finding import KEYS
-from gelpolight_core.quality import Verdict
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
 from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
@@ -211,7 +211,7 @@ def test_hot_pixels_are_found_and_the_more_there_are_the_worse(
     (found,) = check.check(image, whole=whole).findings
     assert found.key == "bad_pixels"
     assert found.value == pytest.approx(100.0 * share, rel=0.7)
-    assert found.meaningless is (found.severity is Verdict.FAIL) is (share > 0.02)
+    assert found.meaningless is (found.verdict is Verdict.FAIL) is (share > 0.02)
 
 
 def test_what_no_texture_shows_is_unknown_and_not_guessed() -> None:

@@ -6,12 +6,24 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.health.finding import Finding, Health, health_of, refuse_meaningless
+from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.health.finding import Health, health_of, refuse_meaningless
 from gelpolight_core.health.watch import HealthWatch
-from gelpolight_core.quality import Verdict
 
-DIM = Finding("exposure", "the light is darker", "Restore it", Verdict.WARN)
-OFF = Finding("led_off", "the red LED is off", "Check it", Verdict.FAIL, meaningless=True)
+DIM = Finding(
+    "exposure",
+    "the light is darker",
+    verdict=Verdict.WARN,
+    remedy="Restore it",
+    heights=Heights.DOUBTFUL,
+)
+OFF = Finding(
+    "led_off",
+    "the red LED is off",
+    verdict=Verdict.FAIL,
+    remedy="Check it",
+    heights=Heights.MEANINGLESS,
+)
 
 
 def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is() -> None:

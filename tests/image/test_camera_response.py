@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import (
     NODES,
@@ -16,7 +17,6 @@ from gelpolight_core.image.response import (
     gamma_response,
     srgb_response,
 )
-from gelpolight_core.quality import Verdict
 from gelpolight_core.response.stage import declare_response, measure_response
 
 Encode = Callable[[np.ndarray], np.ndarray]
@@ -81,7 +81,7 @@ def test_the_curve_of_a_noisy_series_is_the_camera_s_within_a_third_of_a_percent
     result = measure_response(series(encode, bits=bits), TIMES)
     assert result.response is not None
     assert np.abs(result.response.curves - truth).max() < 0.0033
-    assert result.quality.verdict is Verdict.PASS, result.quality.advice
+    assert result.quality.verdict is Verdict.PASS, result.quality.remedies
 
 
 def test_a_curve_is_found_to_half_a_percent_where_exposures_are_not_quite_what_is_stated() -> None:

@@ -20,8 +20,8 @@ from gelpolight_core.calibration.in_place_session import (
 )
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.in_place.calibration import require_open

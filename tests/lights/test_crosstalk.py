@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import find_crosstalk
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
-from gelpolight_core.quality import QualityTable, Verdict
 
 TRUTH = np.array([[1.0, 0.04, 0.02], [0.05, 1.0, 0.05], [0.02, 0.04, 1.0]])
 NAMES = ("red.png", "green.png", "blue.png")
@@ -77,7 +77,7 @@ def test_crosstalk_that_no_spot_shows_is_a_warning_and_not_zero() -> None:
     figures = find_crosstalk(spots(hidden)).quality
     assert figures["crosstalk_unmeasured"].value == 2.0
     assert figures.verdict is Verdict.WARN
-    assert "single_led" in figures.advice[0]
+    assert "single_led" in figures.remedies[0]
     assert figures["crosstalk_percent"].value == pytest.approx(5.0)
     hidden[:, 0] = np.nan
     none = find_crosstalk(spots(hidden)).quality

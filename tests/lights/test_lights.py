@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import locate_leds
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.quality import Verdict
 from gelpolight_core.session.session import read_session
 
 CENTRES = np.array([[320.4, 401.7], [180.2, 160.9], [470.6, 150.3]])

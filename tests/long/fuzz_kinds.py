@@ -23,6 +23,7 @@ from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.response import gamma_response
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol import Protocol
@@ -38,7 +39,6 @@ from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import build_resampling_table
-from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter

@@ -14,6 +14,7 @@ import scene
 from report_pdf import report_data, report_text
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.drape import cylinder_depth
 from gelpolight_core.measurement.evaluation import (
     Crossing,
@@ -30,7 +31,6 @@ from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.measurement.truth import PressTruth, read_truth
-from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.report.evaluation import evaluation_document, write_evaluation_files
 

@@ -13,11 +13,11 @@ from boards import BOARD, CAMERA, board_pose, render_board
 
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.lens import LensResult, calibrate_lens, find_nonsense
 from gelpolight_core.optics.lens_views import LensRefusal
-from gelpolight_core.quality import Verdict
 
 # Tilt, its direction, distance, and position of the board centre: as held by a technician.
 HELD = [
@@ -103,7 +103,7 @@ def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[LinearImag
     assert "black" in reasons["dark.png"]
     assert "view_04.png" in reasons["again.png"]
     assert lens.quality["views_left_out"].verdict is Verdict.WARN
-    assert "moved.png" in lens.quality["views_left_out"].advice
+    assert "moved.png" in lens.quality["views_left_out"].remedy
     assert lens.camera.fx == pytest.approx(CAMERA.fx, rel=2e-3)
 
 

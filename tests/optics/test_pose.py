@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.pose import Decision, estimate_top_pose
-from gelpolight_core.quality import Verdict
 from gelpolight_core.session.board import BoardSpec
 
 BOARD = BoardSpec((9, 6), 2.0)
@@ -124,7 +124,7 @@ def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
     propped, _ = lying_board(tilt_deg=4.0, towards_deg=200.0, name="propped.png")
     result = estimate_top_pose([*(image for image, _ in flat), propped], BOARD, CAMERA)
     assert [view.name for view in result.views if not view.used] == ["propped.png"]
-    assert "propped.png" in result.quality["views_left_out"].advice
+    assert "propped.png" in result.quality["views_left_out"].remedy
     assert angle_deg(result.plane, flat[0][1]) < 0.1
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -68,7 +68,7 @@ def test_leds_that_changed_are_reported_by_channel(
     assert shift.brightness_percent == pytest.approx([3.0, 0.0, -3.0], abs=0.5)
     assert not shift.touched
     assert shift.quality.verdict is Verdict.WARN
-    assert any("zero" in line for line in shift.quality.advice)
+    assert any("zero" in line for line in shift.quality.remedies)
 
 
 def test_a_membrane_that_moved_in_the_image_is_reported(

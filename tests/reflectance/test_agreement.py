@@ -12,7 +12,7 @@ from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.reflectance.agreement import PressAgreement, compare_presses
 from gelpolight_core.reflectance.press import contact_mask
 from gelpolight_core.session.decisions import PlacedCircle

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 from gelpolight_core.reflectance.ball_detection import (
     BallDetection,
     detect_ball,

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.image.noise import pixel_noise
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -23,7 +24,6 @@ from gelpolight_core.optics.refraction import (
     camera_to_membrane,
     membrane_to_camera,
 )
-from gelpolight_core.quality import Verdict
 from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.indentation import Indentation
 

@@ -22,7 +22,7 @@ from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
-from gelpolight_core.quality import QualityTable, Verdict, judge, limit_text
+from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts
@@ -96,7 +96,7 @@ def test_the_pages_show_every_figure_drawing_and_source(
         assert shown, section.key
         assert section.title in text
         for figure in section.quality.figures:
-            assert figure.label[:30] in text  # its first line
+            assert figure.text[:30] in text  # its first line
         for drawing in section.drawings:
             assert drawing.caption in text
             assert "<path" in drawing.svg
@@ -142,7 +142,7 @@ def test_too_few_presses_to_hold_any_out_are_reported(
 
 def test_texts_from_files_are_shown_and_never_obeyed(tmp_path: Path) -> None:
     c = small()
-    figure = judge(NASTY, NASTY, float("nan"), NASTY, warn=1.0, advice=NASTY)
+    figure = judge(NASTY, NASTY, float("nan"), NASTY, warn=1.0, remedy=NASTY)
     hostile = replace(
         c,
         sensor=replace(c.sensor, serial=NASTY),
@@ -193,8 +193,8 @@ def test_camera_settings_are_named_and_unknown_ones_left_out() -> None:
 def test_a_figure_that_did_not_pass_comes_with_its_advice(tmp_path: Path) -> None:
     advice = "Press harder"
     tables = {
-        "lens": QualityTable((judge("a", "A", 2.0, "mm", warn=1.0, fail=3.0, advice=advice),)),
-        "balls": QualityTable((judge("b", "B", 0.5, "mm", warn=1.0, advice="Never shown"),)),
+        "lens": QualityTable((judge("a", "A", 2.0, "mm", warn=1.0, fail=3.0, remedy=advice),)),
+        "balls": QualityTable((judge("b", "B", 0.5, "mm", warn=1.0, remedy="Never shown"),)),
     }
     report = calibration_report(replace(small(), quality=tables))
     assert report.verdict is Verdict.WARN

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.session.camera_steadiness import BANDS, judge_steadiness
 
 TIMES = np.arange(60) / 20.0

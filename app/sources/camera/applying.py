@@ -9,7 +9,7 @@ from typing import Literal
 from app.sources.camera.driver import CameraGone, Format, OpenCamera
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.finding import Finding, QualityTable, Verdict
 from gelpolight_core.session.camera_controls import CONTROLS, MAIN, ORDER
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
@@ -133,7 +133,7 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
     there = {control.key: control for control in controls}
     free = [c for c in there.values() if CONTROLS[c.key].locked_value is not None and c.value]
     figures = [
-        Figure(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
+        Finding(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
     ]
     named = {control.key for control in free}
     in_order = sorted(applied, key=lambda a: ORDER.index(a.key))
@@ -147,7 +147,7 @@ def _lock_advice() -> str:
     return tr("The camera sets this automatically: click Lock")
 
 
-def _figure(applied: Applied) -> Figure:
+def _figure(applied: Applied) -> Finding:
     serious = applied.key in MAIN or CONTROLS[applied.key].locked_value is not None
     value = float("nan") if applied.read is None else applied.read
     verdict, advice = Verdict.PASS, ""
@@ -156,7 +156,7 @@ def _figure(applied: Applied) -> Figure:
         text = ": ".join(filter(None, (applied.sentence, applied.why)))
         advice = tr("{text}. Choose a value that the camera accepts").format(text=text)
     unit = applied.unit
-    return Figure(applied.key, applied.label, value, unit, None, None, verdict, advice)
+    return Finding(applied.key, applied.label, value, unit, None, None, verdict, advice)
 
 
 def differences(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.source import Frame
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 from gelpolight_core.session.camera_steadiness import (
     FRAMES,
     SPAN_S,

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.quality import QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reconstruction.in_place.model import COLOUR_CELLS, ErrorCurve, InPlaceModel
 from gelpolight_core.reconstruction.in_place.terms import TERMS

@@ -8,7 +8,7 @@ from app.calibrate.lens import LensStep
 from app.calibrate.result import ResultView
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.finding import QualityTable
 
 
 def _show(view: ResultView, state: StageState, *, saved: str) -> None:

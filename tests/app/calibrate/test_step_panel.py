@@ -6,7 +6,7 @@ from pytestqt.qtbot import QtBot
 
 from app.calibrate.step_panel import StepPanel
 from app.calibrate.steps import OPEN_ROUTE, steps_of
-from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.finding import Finding, QualityTable, Verdict
 
 
 def test_a_step_in_computation_does_not_show_figures_of_another_step(
@@ -15,7 +15,7 @@ def test_a_step_in_computation_does_not_show_figures_of_another_step(
     panel = StepPanel()
     qtbot.addWidget(panel)
     first, second = steps_of(OPEN_ROUTE)[:2]
-    figure = Figure("k", "Reprojection error", 0.2, "px", 0.3, 1.0, Verdict.PASS, "")
+    figure = Finding("k", "Reprojection error", 0.2, "px", 0.3, 1.0, Verdict.PASS, "")
     panel.show_step(first, following=second.title)
     panel.show_state("pass", "Good.", [QualityTable((figure,))], recompute=False, finished=True)
     assert panel.quality.texts() and "bold" in panel.next.styleSheet()

@@ -18,7 +18,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.project import CalibrationProject
-from gelpolight_core.quality import QualityTable, Verdict, judge
+from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 

@@ -5,12 +5,23 @@ from __future__ import annotations
 import pytest
 
 from app.live.advice import Known, LiveState, advise
-from gelpolight_core.health.finding import Finding
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Finding, Heights, Verdict
 
 MINE = Known("A", (1280, 960))
-DIM = Finding("exposure", "the light is darker", "Restore it", Verdict.WARN)
-OFF = Finding("led_off", "the red LED is off", "Check it", Verdict.FAIL, meaningless=True)
+DIM = Finding(
+    "exposure",
+    "the light is darker",
+    verdict=Verdict.WARN,
+    remedy="Restore it",
+    heights=Heights.DOUBTFUL,
+)
+OFF = Finding(
+    "led_off",
+    "the red LED is off",
+    verdict=Verdict.FAIL,
+    remedy="Check it",
+    heights=Heights.MEANINGLESS,
+)
 
 
 @pytest.mark.parametrize(

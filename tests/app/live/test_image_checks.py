@@ -18,7 +18,7 @@ from app.live.image_checks import (
     saturated,
     with_zebra,
 )
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Verdict
 
 DEPTHS = [np.uint8, np.uint16]
 

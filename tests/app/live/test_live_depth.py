@@ -20,10 +20,16 @@ from app.live.session import LiveSession
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
-from gelpolight_core.health.finding import Finding, Health
-from gelpolight_core.quality import Verdict
+from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.health.finding import Health
 
-DIM = Finding("exposure", "the light is darker", "Restore it", Verdict.WARN)
+DIM = Finding(
+    "exposure",
+    "the light is darker",
+    verdict=Verdict.WARN,
+    remedy="Restore it",
+    heights=Heights.DOUBTFUL,
+)
 
 
 @pytest.fixture

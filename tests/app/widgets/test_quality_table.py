@@ -10,10 +10,10 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.widgets.quality_table import QualityTableWidget
-from gelpolight_core.quality import Figure, QualityTable, judge, limit_text, value_text
+from gelpolight_core.finding import Finding, QualityTable, judge, limit_text, value_text
 
-RMS = {"unit": "px", "warn": 0.3, "fail": 1.0, "advice": "Focus the camera"}
-VIEWS = {"warn": 8, "fail": 4, "advice": "Capture more views", "higher_is_better": True}
+RMS = {"unit": "px", "warn": 0.3, "fail": 1.0, "remedy": "Focus the camera"}
+VIEWS = {"warn": 8, "fail": 4, "remedy": "Capture more views", "higher_is_better": True}
 
 
 def table(rms: float, views: float) -> QualityTable:
@@ -55,7 +55,7 @@ def test_its_text_can_be_copied_by_the_keyboard(widget: QualityTableWidget, qtbo
     assert words == "✓ Pass Reprojection error 0.2 px ≤ 0.3 px ✓ Pass Views used 16 ≥ 8".split()
 
 
-def figure(value: float, **limits: object) -> Figure:
+def figure(value: float, **limits: object) -> Finding:
     return judge("key", "Label", value, **limits)  # type: ignore[arg-type]
 
 
@@ -69,7 +69,7 @@ def figure(value: float, **limits: object) -> Figure:
         (figure(0.00483, unit="%"), "0.00483 %"),
     ],
 )
-def test_values_are_written_as_people_write_them(shown: Figure, output: str) -> None:
+def test_values_are_written_as_people_write_them(shown: Finding, output: str) -> None:
     assert value_text(shown) == output
 
 
@@ -84,5 +84,5 @@ def test_values_are_written_as_people_write_them(shown: Figure, output: str) -> 
         (figure(2.0, warn=2.0), "≤ 2"),
     ],
 )
-def test_limits_show_which_side_passes(shown: Figure, output: str) -> None:
+def test_limits_show_which_side_passes(shown: Finding, output: str) -> None:
     assert limit_text(shown) == output

@@ -1,4 +1,4 @@
-"""Quality figures: a measured value, its limits, a verdict, and advice."""
+"""How good something is: a value or a fault, its limits, a verdict, and the remedy."""
 
 from __future__ import annotations
 
@@ -25,42 +25,84 @@ class Verdict(StrEnum):
 _ORDER = (Verdict.PASS, Verdict.WARN, Verdict.FAIL)
 
 
+class Heights(StrEnum):
+    """What a finding says about the heights of a map."""
+
+    STATED = "stated"
+    """They are as exact as stated."""
+    DOUBTFUL = "doubtful"
+    """They may be wrong by more than stated."""
+    MEANINGLESS = "meaningless"
+    """They mean nothing."""
+
+
 @dataclass(frozen=True, slots=True)
-class Figure:
-    """One judged number of a stage.
+class Finding:
+    """How good something is: a number of a stage, an image, a height map, a measurement.
 
     Attributes
     ----------
     key : str
         Name for scripts, such as ``reprojection_rms``.
-    label : str
-        Name shown to users.
+    text : str
+        Name of the number, or what was found, as a clause without a full stop.
     value : float
-        In `unit`.
+        In `unit`; NaN if there is no number.
     unit : str
         Such as ``px``, ``mm``, ``deg``, ``%``; empty for a count.
     warn_limit, fail_limit : float or None
-        Values at which the verdict changes; None if the figure is only reported.
+        Values at which the verdict changes; None if there is no limit.
     verdict : Verdict
         The judgement.
-    advice : str
-        What to do when the verdict is not "pass".
+    remedy : str
+        What to do when the verdict is not "pass", as a sentence without a full stop.
+    heights : Heights
+        What it says about the heights of a map.
     """
 
     key: str
-    label: str
-    value: float
-    unit: str
-    warn_limit: float | None
-    fail_limit: float | None
-    verdict: Verdict
-    advice: str
+    text: str
+    value: float = math.nan
+    unit: str = ""
+    warn_limit: float | None = None
+    fail_limit: float | None = None
+    verdict: Verdict = Verdict.PASS
+    remedy: str = ""
+    heights: Heights = Heights.STATED
 
     @property
-    def text(self) -> str:
-        """Label, value and unit."""
-        form = "{label}: {value:.3g} {unit}" if self.unit else "{label}: {value:.3g}"
-        return pattern(form, label=self.label, value=self.value, unit=self.unit)
+    def stated(self) -> str:
+        """Text, value and unit."""
+        form = "{text}: {value:.3g} {unit}" if self.unit else "{text}: {value:.3g}"
+        return pattern(form, text=self.text, value=self.value, unit=self.unit)
+
+    @property
+    def line(self) -> str:
+        """Text and remedy as sentences."""
+        return ". ".join((self.text[:1].upper() + self.text[1:], self.remedy)).rstrip(". ") + "."
+
+    @property
+    def meaningless(self) -> bool:
+        """Whether heights mean nothing."""
+        return self.heights is Heights.MEANINGLESS
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether heights may be wrong by more than stated."""
+        return self.heights is not Heights.STATED
+
+    def as_row(self) -> dict[str, Any]:
+        """Return a judged number as plain values, with the keys of files."""
+        return {
+            "key": self.key,
+            "label": self.text,
+            "value": self.value,
+            "unit": self.unit,
+            "warn_limit": self.warn_limit,
+            "fail_limit": self.fail_limit,
+            "verdict": self.verdict.value,
+            "advice": self.remedy,
+        }
 
     @property
     def higher_is_better(self) -> bool:
@@ -82,7 +124,7 @@ def verdict_word(verdict: Verdict) -> str:
     }[verdict]
 
 
-def value_text(figure: Figure) -> str:
+def value_text(figure: Finding) -> str:
     """Return a figure's value with its unit. Counts have no decimals."""
     if not math.isfinite(figure.value):
         return tr("unknown")
@@ -95,7 +137,7 @@ def value_text(figure: Figure) -> str:
     return f"{number} {figure.unit}".rstrip()
 
 
-def limit_text(figure: Figure) -> str:
+def limit_text(figure: Finding) -> str:
     """Return the pass limit of a figure, such as "≤ 0.3 px". Empty if it has none."""
     limit = figure.warn_limit if figure.warn_limit is not None else figure.fail_limit
     if limit is None:
@@ -106,21 +148,21 @@ def limit_text(figure: Figure) -> str:
 
 def judge(
     key: str,
-    label: str,
+    text: str,
     value: float,
     unit: str = "",
     *,
     warn: float | None = None,
     fail: float | None = None,
-    advice: str = "",
+    remedy: str = "",
     higher_is_better: bool = False,
-) -> Figure:
+) -> Finding:
     """Judge a value against its limits; a value that is not finite fails.
 
     Parameters
     ----------
-    key, label, unit, advice : str
-        As in :class:`Figure`.
+    key, text, unit, remedy : str
+        As in :class:`Finding`.
     value : float
         The measured value.
     warn, fail : float, optional
@@ -137,28 +179,28 @@ def judge(
         verdict = Verdict.FAIL
     else:
         verdict = Verdict.WARN if beyond(warn) else Verdict.PASS
-    return Figure(key, label, float(value), unit, warn, fail, verdict, advice)
+    return Finding(key, text, float(value), unit, warn, fail, verdict, remedy)
 
 
-def judge_left_out(key: str, label: str, reasons: Sequence[str]) -> Figure:
+def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
     """Judge how many images were left out.
 
     Parameters
     ----------
-    key, label : str
-        As in :class:`Figure`.
+    key, text : str
+        As in :class:`Finding`.
     reasons : sequence of str
         Of each image that was left out, its name and why.
     """
-    advice = tr("Left out: {names}").format(names=joined("; ", reasons))
-    return judge(key, label, len(reasons), warn=0.0, advice=advice)
+    remedy = tr("Left out: {names}").format(names=joined("; ", reasons))
+    return judge(key, text, len(reasons), warn=0.0, remedy=remedy)
 
 
 @dataclass(frozen=True, slots=True)
 class QualityTable:
     """The quality figures of one stage, in display order."""
 
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[Finding, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -166,12 +208,12 @@ class QualityTable:
         return max((f.verdict for f in self.figures), key=_ORDER.index, default=Verdict.PASS)
 
     @property
-    def advice(self) -> tuple[str, ...]:
-        """What to do, for every figure that did not pass; each advice once."""
-        wanted = (f.advice for f in self.figures if f.verdict is not Verdict.PASS and f.advice)
+    def remedies(self) -> tuple[str, ...]:
+        """What to do, for every figure that did not pass; each remedy once."""
+        wanted = (f.remedy for f in self.figures if f.verdict is not Verdict.PASS and f.remedy)
         return tuple(dict.fromkeys(wanted))
 
-    def __getitem__(self, key: str) -> Figure:
+    def __getitem__(self, key: str) -> Finding:
         """Return the figure named `key`."""
         for figure in self.figures:
             if figure.key == key:
@@ -180,19 +222,7 @@ class QualityTable:
 
     def as_rows(self) -> list[dict[str, Any]]:
         """Return the table as plain values for JSON."""
-        return [
-            {
-                "key": f.key,
-                "label": f.label,
-                "value": f.value,
-                "unit": f.unit,
-                "warn_limit": f.warn_limit,
-                "fail_limit": f.fail_limit,
-                "verdict": f.verdict.value,
-                "advice": f.advice,
-            }
-            for f in self.figures
-        ]
+        return [figure.as_row() for figure in self.figures]
 
 
 def worst_verdict(quality: Mapping[str, QualityTable]) -> Verdict:
@@ -209,7 +239,7 @@ def failure(quality: Mapping[str, QualityTable]) -> str:
         Of every stage.
     """
     failed = [
-        figure.text
+        figure.stated
         for table in quality.values()
         for figure in table.figures
         if figure.verdict is Verdict.FAIL
