@@ -10,20 +10,10 @@ from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.health.finding import Health, health_of, refuse_meaningless
 from gelpolight_core.health.watch import HealthWatch
 
-DIM = Finding(
-    "exposure",
-    "the light is darker",
-    verdict=Verdict.WARN,
-    remedy="Restore it",
-    heights=Heights.DOUBTFUL,
-)
-OFF = Finding(
-    "led_off",
-    "the red LED is off",
-    verdict=Verdict.FAIL,
-    remedy="Check it",
-    heights=Heights.MEANINGLESS,
-)
+WARN, FAIL = Verdict.WARN, Verdict.FAIL
+DOUBTFUL, WRONG = Heights.DOUBTFUL, Heights.MEANINGLESS
+DIM = Finding("exposure", "darker", remedy="Restore it", verdict=WARN, heights=DOUBTFUL)
+OFF = Finding("led_off", "the LED is off", remedy="Check it", verdict=FAIL, heights=WRONG)
 
 
 def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is() -> None:
@@ -42,8 +32,8 @@ def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is() -> None:
 def test_the_worst_comes_first_and_makes_the_line() -> None:
     health = health_of([DIM, OFF])
     assert health.keys == ("led_off", "exposure")
-    assert health.line == "The red LED is off. Check it."
-    with pytest.raises(InputError, match="red LED"):
+    assert health.line == "The LED is off. Check it."
+    with pytest.raises(InputError, match="the LED"):
         refuse_meaningless(health, where="press.png")
     refuse_meaningless(health_of([DIM]), where="press.png")
 

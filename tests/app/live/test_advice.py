@@ -5,23 +5,11 @@ from __future__ import annotations
 import pytest
 
 from app.live.advice import Known, LiveState, advise
-from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.finding import Finding, Verdict
 
 MINE = Known("A", (1280, 960))
-DIM = Finding(
-    "exposure",
-    "the light is darker",
-    verdict=Verdict.WARN,
-    remedy="Restore it",
-    heights=Heights.DOUBTFUL,
-)
-OFF = Finding(
-    "led_off",
-    "the red LED is off",
-    verdict=Verdict.FAIL,
-    remedy="Check it",
-    heights=Heights.MEANINGLESS,
-)
+DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Verdict.WARN)
+OFF = Finding("led_off", "the red LED is off", remedy="Check it", verdict=Verdict.FAIL)
 
 
 @pytest.mark.parametrize(

@@ -20,16 +20,10 @@ from app.live.session import LiveSession
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
-from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.health.finding import Health
 
-DIM = Finding(
-    "exposure",
-    "the light is darker",
-    verdict=Verdict.WARN,
-    remedy="Restore it",
-    heights=Heights.DOUBTFUL,
-)
+DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Verdict.WARN)
 
 
 @pytest.fixture
