@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from app.calibrate.detection import (
     as_image,
     judged,
     or_refusal,
+    refuse_size,
     sentence_of,
     too_early,
 )
@@ -36,7 +37,6 @@ from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.results import StageResults
-from gelpolight_core.errors import InputError
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.resampling import ResamplingTable, seen_at
 from gelpolight_core.reflectance.press import BallPress, find_ball
@@ -44,6 +44,7 @@ from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
+Point = tuple[float, float]
 
 # Radius of the contact circle drawn when no contact was found; the user moves it into position.
 FIRST_RADIUS = 0.1
@@ -82,8 +83,8 @@ def detect_ball(
     setting: BallSetting,
     *,
     radius_mm: float,
-    earlier_mm: Sequence[tuple[float, float]] = (),
-    next_mm: tuple[float, float] | None = None,
+    earlier_mm: Sequence[Point] = (),
+    next_mm: Point | None = None,
     editable: bool = False,
 ) -> Detection:
     """Find a pressed ball.
@@ -104,13 +105,12 @@ def detect_ball(
         Whether the contact circle can be dragged; its handle is ball.
     """
     table = setting.table
-    done = tuple(Marker(u, v, "dot", "info") for u, v in _pixels(earlier_mm, table))
+    done = _pixels(earlier_mm, table)
     there = () if next_mm is None else _pixels([next_mm], table)
-    wanted = tuple(Marker(u, v, "ring", "expected", text=tr("next press")) for u, v in there)
     circle = working_circle(table)
 
     def detect() -> Detection:
-        _refuse_size(rgb, setting.image_size)
+        refuse_size(rgb, setting.image_size)
         seen = unmix(table.apply(as_image(rgb).rgb), setting.crosstalk)
         press = find_ball(
             seen,
@@ -122,7 +122,7 @@ def detect_ball(
         )
         handle = ball_handle(press, table) if editable else None
         marks = Overlay(
-            markers=done,
+            markers=press_marks(done),
             circles=() if handle is None else (handle,),
             lines=(circle, *ball_contour(press, table)),
         )
@@ -130,12 +130,12 @@ def detect_ball(
         text = good.format(c=press.contact_radius_mm, d=press.pose.depth_mm)
         return judged(marks, press.quality.figures, text, press)
 
-    return or_refusal(detect, marks=Overlay(markers=(*done, *wanted), lines=(circle,)))
+    return or_refusal(detect, marks=Overlay(markers=press_marks(done, there), lines=(circle,)))
 
 
 def next_press_mm(
-    table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[tuple[float, float]]
-) -> tuple[float, float] | None:
+    table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[Point]
+) -> Point | None:
     """Return the position (x, y) in the working area that is farthest from all earlier presses.
 
     The first press is in the middle. It is always far enough from the border for the contact of the
@@ -157,23 +157,17 @@ def next_press_mm(
     return float(x_mm), float(y_mm)
 
 
-def _pixels(
-    points_mm: Sequence[tuple[float, float]], table: ResamplingTable
-) -> list[tuple[float, float]]:
+def _pixels(points_mm: Sequence[Point], table: ResamplingTable) -> list[Point]:
     """Return the pixels of points of the top surface; invisible points are left out."""
     nodes = table.grid.to_index(np.array(points_mm, np.float64).reshape(-1, 2))
     return [(float(u), float(v)) for u, v in seen_at(table, nodes)]
 
 
-def _refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
-    if (rgb.shape[1], rgb.shape[0]) != size:
-        raise InputError(
-            tr("the image has {a} x {b} pixels, but the earlier stages used {c} x {d}").format(
-                a=rgb.shape[1], b=rgb.shape[0], c=size[0], d=size[1]
-            ),
-            where=tr("Image"),
-            advice=tr("Set the camera to the image size of the earlier stages"),
-        )
+def press_marks(earlier_px: Iterable[Point], next_px: Iterable[Point] = ()) -> tuple[Marker, ...]:
+    """Return dots at earlier presses (u, v), and a ring where the next press helps most."""
+    dots = (Marker(u, v, "dot", "info") for u, v in earlier_px)
+    rings = (Marker(u, v, "ring", "expected", text=tr("next press")) for u, v in next_px)
+    return (*dots, *rings)
 
 
 def placed_ball(_rgb: Rgb, *, circle: PlacedCircle, marks: Overlay) -> Detection:

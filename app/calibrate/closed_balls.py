@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -12,12 +11,13 @@ from typing import Any
 import cv2
 import numpy as np
 
-from app.calibrate.balls import BallsStep
+from app.calibrate.balls import BallsStep, Point, press_marks
 from app.calibrate.detection import (
     Detection,
     Detector,
     or_refusal,
     read_raw,
+    refuse_size,
     sentence_of,
     too_early,
 )
@@ -36,7 +36,6 @@ from gelpolight_core.calibration.in_place_session import (
 )
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
@@ -44,9 +43,8 @@ from gelpolight_core.in_place.calibrate import LEAST_PRESSES
 from gelpolight_core.in_place.press import find_contact
 from gelpolight_core.reconstruction.in_place.change import Reference, reference
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
+from gelpolight_core.session.session import InPlace
 from gelpolight_core.translation import tr
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -57,21 +55,22 @@ class Untouched:
     ----------
     path : Path
         Its file.
-    mm_per_px : float
-        Scale of the images.
+    stated : InPlace
+        Scale of the images, and the region of the membrane in them.
     response : CameraResponse or None
         Response of the camera.
     """
 
     path: Path
-    mm_per_px: float
+    stated: InPlace
     response: CameraResponse | None
 
     @cached_property
     def grid(self) -> WorkingGrid:
         """The grid on which images are compared."""
         rows, columns = self._image.shape[:2]
-        return WorkingGrid(ImageSize(columns, rows), self.mm_per_px)
+        assert self.stated.mm_per_px is not None
+        return WorkingGrid(ImageSize(columns, rows), self.stated.mm_per_px[0])
 
     @cached_property
     def base(self) -> Reference:
@@ -90,8 +89,7 @@ def detect_closed_ball(
     untouched: Untouched,
     *,
     radius_mm: float,
-    earlier_px: Sequence[Point] = (),
-    next_px: Point | None = None,
+    marks: tuple[Marker, ...] = (),
     editable: bool = False,
 ) -> Detection:
     """Find a pressed ball.
@@ -104,17 +102,11 @@ def detect_closed_ball(
         The background.
     radius_mm : float
         Radius of the ball.
-    earlier_px : sequence of (u, v)
-        Centres of the presses captured before.
-    next_px : (u, v), optional
-        Where the next press helps most.
+    marks : tuple of Marker, optional
+        Of earlier presses, and where the next one helps most.
     editable : bool, optional
         Whether the contact circle can be dragged; its handle is ball.
     """
-    marks = Overlay(markers=tuple(Marker(*at, "dot", "info") for at in earlier_px))
-    if next_px is not None:
-        ring = Marker(*next_px, "ring", "expected", text=tr("next press"))
-        marks = replace(marks, markers=(*marks.markers, ring))
 
     def detect() -> Detection:
         grid = untouched.grid
@@ -127,31 +119,12 @@ def detect_closed_ball(
         contact = Circle(u, v, size * found.radius, "good", handle="ball" if editable else "")
         text = tr("Ball found: contact radius {c:.2f} mm.")
         return Detection(
-            replace(marks, circles=(contact,)),
+            Overlay(markers=marks, circles=(contact,)),
             text.format(c=found.radius * grid.pitch_mm),
             True,
         )
 
-    return or_refusal(detect, marks=marks)
-
-
-def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
-    """Raise InputError if the image does not have the (width, height) of the background."""
-    if (rgb.shape[1], rgb.shape[0]) != size:
-        raise InputError(
-            tr("The image has {a} x {b} pixels, but the background has {c} x {d}").format(
-                a=rgb.shape[1], b=rgb.shape[0], c=size[0], d=size[1]
-            ),
-            where=tr("Image"),
-            advice=tr("Set the camera to the image size of the background"),
-        )
-
-
-def to_px(x_mm: float, y_mm: float, grid: WorkingGrid) -> Point:
-    """Return the camera pixel of a place on the membrane."""
-    image, scale = grid.image, grid.mm_per_px
-    u, v = x_mm / scale + 0.5 * (image.width - 1), y_mm / scale + 0.5 * (image.height - 1)
-    return float(np.clip(u, 0, image.width - 1)), float(np.clip(v, 0, image.height - 1))
+    return or_refusal(detect, marks=Overlay(markers=marks))
 
 
 GOOD_DEG, FAIR_DEG = 4.0, 8.0
@@ -172,14 +145,14 @@ class Progress:
         Relative decrease of the error by one more press; None with too few presses.
     curve : tuple of (int, float)
         Numbers of presses, and the typical errors with them, degrees.
-    next_px : (u, v) or None
+    next_mm : (x, y) or None
         Where the next press helps most; None if more presses do not help.
     """
 
     error_deg: float
     gain: float | None
     curve: tuple[tuple[int, float], ...]
-    next_px: tuple[float, float] | None
+    next_mm: Point | None
 
     @property
     def settled(self) -> bool:
@@ -211,7 +184,7 @@ def progress_of(run: InPlaceRun) -> Progress:
         float(np.mean(errors)),
         gain,
         tuple((n, math.degrees(math.atan(error))) for n, error in result.learning),
-        None if settled else to_px(*result.next_position_mm, result.model.grid),
+        None if settled else result.next_position_mm,
     )
 
 
@@ -228,8 +201,9 @@ def residual_panel(run: InPlaceRun) -> Panel:
         colour = COLOURS[(error > GOOD_DEG) + (error > FAIR_DEG)]
         cv2.circle(rgb, at, round(scale * press.ball.contact), colour, 2, cv2.LINE_AA)
         _write(rgb, f"{error:.1f}", at, colour)
-    if progress.next_px is not None:
-        u, v = (scale * c / grid.factor for c in progress.next_px)
+    if progress.next_mm is not None:
+        first = grid.x_mm[0], grid.y_mm[0]
+        u, v = scale * np.subtract(progress.next_mm, first) / grid.pitch_mm
         cv2.circle(rgb, (round(u), round(v)), 12, (255, 255, 255), 2, cv2.LINE_AA)
         _write(rgb, tr("next"), (round(u), round(v) + 26), (255, 255, 255))
     return Panel(
@@ -275,24 +249,25 @@ class ClosedBallsStep(BallsStep):
         files = session.found(FOLDERS[Stage.BACKGROUND])
         if not files:
             return too_early
-        run, stated = self._run(), session.in_place.mm_per_px
-        if stated is None:
+        run, stated = self._run(), session.in_place
+        if stated.mm_per_px is None:
             measured = self.model.project.results.scale
             if measured is None:
                 return too_early
-            stated = (measured.mm_per_px, measured.mm_per_px)
+            stated = replace(stated, mm_per_px=(measured.mm_per_px, measured.mm_per_px))
         detect = partial(
             detect_closed_ball,
-            untouched=Untouched(files[-1], stated[0], session.response),
+            untouched=Untouched(files[-1], stated, session.response),
             radius_mm=self.radius.radius_mm,
         )
         if name:
             return self.of_capture(name, partial(detect, editable=True), Overlay())
         if run is None:
             return detect
-        grid = run.result.model.grid
-        earlier = [to_px(x, y, grid) for _name, x, y, _c, _r in run.calibration.balls]
-        return partial(detect, earlier_px=earlier, next_px=progress_of(run).next_px)
+        pixels, next_mm = run.result.model.grid.to_pixels, progress_of(run).next_mm
+        earlier = pixels(np.array([(x, y) for _name, x, y, *_ in run.calibration.balls]))
+        there = () if next_mm is None else pixels(np.array([next_mm]))
+        return partial(detect, marks=press_marks(earlier, there))
 
     def _run(self) -> InPlaceRun | None:
         """Return the calibration of the present presses."""

@@ -77,6 +77,18 @@ def read_raw(path: Path) -> Rgb:
     return np.ascontiguousarray(read_raw_image(path)[0])
 
 
+def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
+    """Raise InputError if the frame does not have the (width, height) of earlier images."""
+    if (rgb.shape[1], rgb.shape[0]) != size:
+        raise InputError(
+            tr("the image has {a} x {b} pixels, but the earlier stages used {c} x {d}").format(
+                a=rgb.shape[1], b=rgb.shape[0], c=size[0], d=size[1]
+            ),
+            where=tr("Image"),
+            advice=tr("Set the camera to the image size of the earlier stages"),
+        )
+
+
 def as_image(rgb: Rgb, name: str = "") -> LinearImage:
     """Return a frame (rows, columns, 3) as a core LinearImage: float32, 0..1."""
     values = rgb.astype(np.float32) / np.float32(end_of_scale(rgb))

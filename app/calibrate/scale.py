@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from app.calibrate.closed_balls import refuse_size
-from app.calibrate.detection import Detection, Detector, or_refusal, too_early
+from app.calibrate.detection import Detection, Detector, or_refusal, refuse_size, too_early
 from app.calibrate.image_step import ImageStep
 from app.calibrate.light_checks import KnownImage, refuse_grey
 from app.calibrate.step_data import Step
