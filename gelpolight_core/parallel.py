@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -24,11 +23,12 @@ def usable_cores() -> int:
 
 def in_parallel(
     function: Callable[[Item], Result], items: Iterable[Item], *, threads: int | None = None
-) -> Iterator[Result]:
+) -> Generator[Result, None, None]:
     """Yield ``function(item)`` for each item, in the order of the items.
 
     Each task runs in one thread from start to end, so the results do not depend on the number of
-    threads. This is faster where NumPy, OpenCV or compiled loops do most of the work.
+    threads. This is faster where NumPy, OpenCV or compiled loops do most of the work. A caller that
+    may stop early closes it: its threads end then.
 
     Parameters
     ----------
@@ -41,13 +41,10 @@ def in_parallel(
     """
     todo = list(items)
     wanted = min(usable_cores(), MOST_THREADS) if threads is None else threads
-    name = f"parallel-{id(todo)}"
-    pool = ThreadPoolExecutor(max(min(wanted, len(todo)), 1), name)
+    pool = ThreadPoolExecutor(max(min(wanted, len(todo)), 1), "parallel")
     try:
         waiting = [pool.submit(function, item) for item in todo]
         for future in waiting:
             yield future.result()
     finally:
-        # Python may collect a generator that was left early in a thread of its own pool.
-        own = threading.current_thread().name.startswith(name)
-        pool.shutdown(wait=not own, cancel_futures=True)
+        pool.shutdown(cancel_futures=True)

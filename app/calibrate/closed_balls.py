@@ -323,6 +323,7 @@ class ClosedBallsStep(BallsStep):
         return () if run is None else (residual_panel(run),)
 
     def depends_on(self) -> tuple[Any, ...]:
-        """Return the radius and the background."""
-        found = self.model.project.session.found(FOLDERS[Stage.BACKGROUND])
-        return (*super().depends_on(), found)
+        """Return the radius, the scale and the background."""
+        session = self.model.project.session
+        background = session.found(FOLDERS[Stage.BACKGROUND])
+        return (*super().depends_on(), session.in_place, background)

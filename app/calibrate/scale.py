@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 from app.calibrate.detection import Detection, Detector, or_refusal, refuse_size, too_early
 from app.calibrate.image_step import ImageStep
@@ -80,6 +81,11 @@ class ScaleStep(ImageStep):
         pressed = (session.in_place or InPlace()).pressed_scale
         known = KnownImage(files)
         return partial(_detect, known=known, pressed=pressed, response=session.response)
+
+    def depends_on(self) -> tuple[Any, ...]:
+        """Return the size of the pressed object, and the background."""
+        session = self.model.project.session
+        return session.in_place, session.found(FOLDERS[Stage.BACKGROUND])
 
     def show_bench(self, there: bool) -> None:
         """Offer no object: the size of the punch on the virtual bench is chosen there."""

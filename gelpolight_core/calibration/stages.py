@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -192,9 +193,10 @@ def _run_balls(session: Session, results: StageResults, progress: Progress) -> S
         return known[key] if key in known else _find_ball(path, key, session, results, bare)
 
     balls: list[SeenBall] = []
-    for found in in_parallel(ball, files):
-        progress(len(balls) / len(files))
-        balls.append(found)
+    with closing(in_parallel(ball, files)) as seen:
+        for found in seen:
+            progress(len(balls) / len(files))
+            balls.append(found)
     return replace(results, balls=tuple(balls))
 
 

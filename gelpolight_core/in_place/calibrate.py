@@ -9,6 +9,7 @@ disagree with the others are left out and listed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import compress
 
@@ -254,16 +255,16 @@ def _begin(
         return seen, Ball(edge.x, edge.y, edge.radius, radius).limited()
 
     work = _Work([], [], [], [], {})
-    contacts = in_parallel(find, list(zip(presses, images, strict=True)))
-    for index, (press, found) in enumerate(zip(presses, contacts, strict=True)):
-        say(0.3 * (index + 1) / len(presses))
-        if isinstance(found, InputError):
-            work.refused[press.name] = found
-            continue
-        work.names.append(press.name)
-        work.seen.append(found[0])
-        work.start.append(found[1])
-        work.balls.append(found[1])
+    with closing(in_parallel(find, list(zip(presses, images, strict=True)))) as contacts:
+        for index, (press, found) in enumerate(zip(presses, contacts, strict=True)):
+            say(0.3 * (index + 1) / len(presses))
+            if isinstance(found, InputError):
+                work.refused[press.name] = found
+                continue
+            work.names.append(press.name)
+            work.seen.append(found[0])
+            work.start.append(found[1])
+            work.balls.append(found[1])
     _require_presses(work)
     return work
 
