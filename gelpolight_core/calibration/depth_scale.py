@@ -20,11 +20,11 @@ from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.from_around import LEVEL_NZ, surface_normals
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
 from gelpolight_core.reconstruction.near_light.maps import (
-    COARSE,
     LEAST_SHARE,
     kinds,
     membrane_numbers,

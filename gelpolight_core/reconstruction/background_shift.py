@@ -21,9 +21,9 @@ from gelpolight_core.health.texture_shift import texture_shift_px
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import LEAST_LIGHT, lit, saturated
 from gelpolight_core.radiance import whiteboard
+from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
-from gelpolight_core.reconstruction.linear import as_linear
-from gelpolight_core.reconstruction.near_light.maps import COARSE
+from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
 from gelpolight_core.translation import tr
 
@@ -186,8 +186,7 @@ def _on_grid(frames: Sequence[NDArray[Any]], calibration: AnyCalibration) -> Map
                 where=tr("background"),
                 advice=tr("Use the calibration of this sensor at this image size"),
             )
-        linear = response is None or frame.dtype.kind == "f"
-        total += as_linear(frame if linear or response is None else response.linearise(frame))
+        total += as_linear(linearised(frame, response))
     mean = (total / len(frames)).astype(np.float32)
     if isinstance(calibration, InPlaceCalibration):
         return calibration.in_place.grid.reduce(mean)

@@ -266,8 +266,7 @@ class Reconstructor:
         solved = self.solver.depth(
             frame, self._wanted(health, normals=normals, uncertainty=uncertainty)
         )
-        findings = () if health is None else health.findings
-        faults = () if health is None else health.faults
+        known = health or Health()
         grid, noise = self.calibration.table.grid, solved.noise
         return HeightMap(
             depth_mm=solved.depth_mm,
@@ -279,11 +278,14 @@ class Reconstructor:
             calibration_id=self.calibration.identity,
             model=self.model,
             source=name,
-            notes=(*(finding.line for finding in findings), *(note.text for note in solved.notes)),
+            notes=(
+                *(finding.line for finding in known.findings),
+                *(note.text for note in solved.notes),
+            ),
             faults=(
                 *filter(None, (self.calibration.fault,)),
                 *(note.text for note in solved.notes if note.doubtful),
-                *(finding.text for finding in faults),
+                *(finding.text for finding in known.faults),
             ),
             **({} if noise is None else {f.name: getattr(noise, f.name) for f in fields(noise)}),
             depth_scale_sd=solved.depth_scale_sd,
@@ -297,10 +299,9 @@ class Reconstructor:
     def _wanted(
         self, health: Health | None, *, normals: bool = True, uncertainty: bool = False
     ) -> Wanted:
+        known = health or Health(untouched=0.0)
         wanted = Wanted(self.effort, self.terms, normals, uncertainty)
-        if health is None:
-            return wanted
-        return replace(wanted, light=health.light, untouched=health.untouched == 1.0)
+        return replace(wanted, light=known.light, untouched=known.untouched == 1.0)
 
     def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
         """Return the faults of a frame, each with cause and remedy.

@@ -144,8 +144,7 @@ class InPlaceSolver:
         return np.asarray(np.where(seen.usable[..., None], left, np.nan)[thinned(step)], np.float32)
 
     def _inverse(self, height_map: HeightMap) -> Inverse:
-        slopes = surface_slopes(height_map.depth_mm, height_map.pitch_mm)
-        return inverse(self._model, *slopes)
+        return inverse(self._model, *surface_slopes(height_map.depth_mm, height_map.pitch_mm))
 
     def _deviations(self, frame: Map, depth_mm: Map, slope_x: Map, slope_y: Map) -> DepthNoise:
         """Return the maps of standard deviations, and examples of the depth's noise."""

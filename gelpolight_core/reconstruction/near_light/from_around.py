@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.compiled import HALF, single, whole
-from gelpolight_core.reconstruction.near_light.maps import COARSE, LEAST_SHARE, SensorMaps
+from gelpolight_core.reconstruction.height_map import COARSE
+from gelpolight_core.reconstruction.near_light.maps import LEAST_SHARE, SensorMaps
 from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage, Region
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reflectance.gathered_light import (

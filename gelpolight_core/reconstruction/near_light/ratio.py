@@ -12,8 +12,9 @@ from scipy.signal import convolve2d
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
 from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.near_light.denoise import quieted
-from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, light_levels
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps, light_levels
 from gelpolight_core.reconstruction.near_light.sampling import BEYOND_FINITE, halve, sample_rows
 from gelpolight_core.reconstruction.near_light.structures import RatioImage, Region
 from gelpolight_core.reconstruction.terms import Terms

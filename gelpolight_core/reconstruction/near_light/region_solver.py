@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import (
     FREE,
     WeightedIntegration,
@@ -28,7 +29,7 @@ from gelpolight_core.reconstruction.near_light.from_around import (
     with_surroundings,
 )
 from gelpolight_core.reconstruction.near_light.kernel import UNSOLVED_WEIGHT, solve_rows
-from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.ratio import Compared
 from gelpolight_core.reconstruction.near_light.settings import Settings
 from gelpolight_core.reconstruction.near_light.structures import (

@@ -29,12 +29,12 @@ from gelpolight_core.reconstruction.checks import (
     unsolved_notes,
     visible_depth_notes,
 )
-from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import COARSE, Flag, HeightMap
 from gelpolight_core.reconstruction.linear import linearised
 from gelpolight_core.reconstruction.near_light.contact import margin_mm, padded_region
 from gelpolight_core.reconstruction.near_light.from_around import FromAround
 from gelpolight_core.reconstruction.near_light.image_noise import image_noise
-from gelpolight_core.reconstruction.near_light.maps import COARSE, MISSING_CODE, SensorMaps
+from gelpolight_core.reconstruction.near_light.maps import MISSING_CODE, SensorMaps
 from gelpolight_core.reconstruction.near_light.placement import (
     place_rows,
     show_depth,
@@ -202,7 +202,13 @@ class NearLightSolver(OpenSolver):
         if wanted.effort == EFFORTS[-1]:
             # Camera values and linear light use the same code, so that both give the same depth.
             frame = linearised(frame, self.calibration.response)
-        return _image(frame, wanted.gain)
+        if frame.dtype.kind != "f":
+            # numba would compile the kernel a second time for a read-only array.
+            return Image(np.require(frame, requirements=["C", "W"]), False, wanted.gain)
+        finite = np.isfinite(frame)
+        code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING_CODE - 1) + 0.5
+        raw = np.where(finite, code, MISSING_CODE).astype(np.uint16)
+        return Image(raw, True, wanted.gain)
 
     def solved(self, frame: NDArray[Any], wanted: Wanted) -> SolvedRegion | None:
         """Return the solved region of a frame, for studies; None where nothing is pressed.
@@ -224,7 +230,7 @@ class NearLightSolver(OpenSolver):
             As in :meth:`depth`.
         """
         with self._lock:
-            raw, linear, _ = _image(frame)
+            raw, linear, _ = self._image(frame, Wanted())
             region = Region((0, 0), self.maps.scale(COARSE).kind.shape)
             found = self._sampler.compare(
                 raw, region, factor=COARSE, linear=linear, terms=ALL_TERMS
@@ -419,13 +425,3 @@ class NearLightSolver(OpenSolver):
 def _nothing_pressed(record: TraceRecorder) -> None:
     for name in (COMPARING, tr("near light"), INTEGRATION):
         record.left_out(name, NOTHING_PRESSED)
-
-
-def _image(frame: NDArray[Any], gain: Gain | None = None) -> Image:
-    """Return a frame in whole numbers."""
-    if frame.dtype.kind != "f":
-        # numba would compile the kernel a second time for a read-only array.
-        return Image(np.require(frame, requirements=["C", "W"]), False, gain)
-    finite = np.isfinite(frame)
-    code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING_CODE - 1) + 0.5
-    return Image(np.where(finite, code, MISSING_CODE).astype(np.uint16), True, gain)

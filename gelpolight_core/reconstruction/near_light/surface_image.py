@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from gelpolight_core.masks import LEAST_LIGHT
 from gelpolight_core.reconstruction.height_map import (
+    COARSE,
     HeightMap,
     normals_from_slopes,
     surface_slopes,
 )
 from gelpolight_core.reconstruction.near_light.from_around import CLEAR, FromAround, meeting
-from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, brightness
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps, brightness
 from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.solver import thinned
 from gelpolight_core.reflectance.surroundings import view_directions
@@ -68,11 +69,10 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
     _, _, fine = _lit(height_map, maps.full, x, y, rays, step)
     column, row = np.meshgrid((x - scale.x_mm) / scale.pitch_mm, (y - scale.y_mm) / scale.pitch_mm)
     place = np.asarray(column, np.float32), np.asarray(row, np.float32)
-    planes = (
+    reflected_here, clear_here = (
         np.stack([cv2.remap(plane, *place, cv2.INTER_LINEAR) for plane in source], axis=-1)
         for source in (reflected, clear)
     )
-    reflected_here, clear_here = planes
     ratio = np.where(clear_here < CLEAR, 0.0, fine / flat[at]) + reflected_here
     background = maps.full.background[at]
     crosstalk = calibration.crosstalk.T

@@ -24,10 +24,11 @@ from scipy.signal import correlate2d
 
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.compiled import whole
+from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
-from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, block_average
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps, block_average
 from gelpolight_core.reconstruction.near_light.region_solver import SolvedRegion
 from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, slopes_like
 from gelpolight_core.reconstruction.solver import DepthNoise

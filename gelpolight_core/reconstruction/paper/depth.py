@@ -110,10 +110,8 @@ class PaperSolver(OpenSolver):
 
     def _contact(self, frame: NDArray[Any], wanted: Wanted, record: TraceRecorder) -> bool:
         """Return whether something may be pressed, as the full model finds it."""
-        if wanted.everywhere or not wanted.untouched or self.calibration.full is None:
-            return True
-        linear = frame.dtype.kind == "f"
-        if linear and not np.isfinite(frame).all():
+        linear, full = frame.dtype.kind == "f", self.calibration.full
+        if not wanted.untouched or full is None or (linear and not np.isfinite(frame).all()):
             return True
         with record.done(LOOKING, frame.nbytes) as reason:
             finder = self.finder(linear)
