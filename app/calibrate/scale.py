@@ -14,9 +14,7 @@ from app.live.overlay import Circle, Marker, Overlay
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.in_place.press import find_contact
-from gelpolight_core.in_place.scale import find_pins
-from gelpolight_core.reconstruction.in_place.change import reference
+from gelpolight_core.in_place.scale import find_pins, find_punch
 from gelpolight_core.session.session import InPlace, PressedScale
 from gelpolight_core.translation import tr
 
@@ -46,7 +44,7 @@ def detect_scale(
             text = tr("{n} pins found: a pixel is {s:.4f} mm wide.")
             said = text.format(n=len(grid.pins_px), s=pressed.pin_spacing_mm / grid.spacing_px)
         else:
-            disc, _ = find_contact(seen, reference(bare), ball_radius=None, name=tr("Image"))
+            disc = find_punch(seen, bare, where=tr("Image"))
             marks = Overlay(circles=(Circle(disc.x, disc.y, disc.radius, "good"),))
             wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
             said = tr("Contact of the punch found: a pixel is {s:.4f} mm wide.").format(s=wide)
@@ -86,10 +84,6 @@ class ScaleStep(ImageStep):
         """Return the size of the pressed object, and the background."""
         session = self.model.project.session
         return session.in_place, session.found(FOLDERS[Stage.BACKGROUND])
-
-    def show_bench(self, there: bool) -> None:
-        """Offer no object: the size of the punch on the virtual bench is chosen there."""
-        self.panel.lay.setVisible(False)
 
 
 def _detect(

@@ -35,6 +35,7 @@ STAGES = {
     "mirror": "mirror",
     "whiteboard": "whiteboard",
     "background": "bare",
+    "scale": "cylinder",
     "balls": "ball",
     "presses": "",
 }

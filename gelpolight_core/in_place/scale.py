@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.in_place.press import find_contact
-from gelpolight_core.reconstruction.in_place.change import reference
+from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -137,16 +136,51 @@ def scale_from_punch(
     InputError
         If an image shows no contact.
     """
-    base = reference(background)
-    widths = np.array(
-        [
-            2.0 * find_contact(image, base, ball_radius=None, name=where)[0].radius
-            for image in images
-        ]
-    )
+    edges = [find_punch(image, background, where=where) for image in images]
+    widths = np.array([2.0 * edge.radius for edge in edges])
     width = float(widths.mean())
-    sd_px = max(float(widths.std()), 2.0 * EDGE_SD_PX) / np.sqrt(len(widths))
+    sd_px = float(max(widths.std(), 2.0 * EDGE_SD_PX) / np.sqrt(len(widths)))
     return MeasuredScale(diameter_mm / width, diameter_mm / width * sd_px / width)
+
+
+def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
+    """Find the edge of the face of a pressed flat round punch: there the membrane begins to slope.
+
+    Parameters
+    ----------
+    image, background, where
+        As for :func:`scale_from_pins`.
+
+    Raises
+    ------
+    InputError
+        If the image shows no round edge.
+    """
+    change = cv2.GaussianBlur(np.abs(image - background).sum(axis=2), (0, 0), BLURS_PX[0])
+    strong = np.argwhere(change > 0.5 * change.max())
+    reach = min(change.shape) // 2  # of the rays from the centre, two for each pixel of length
+    angle = np.pi * np.arange(2 * reach) / reach
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    found = Circle(*(float(c) for c in strong.mean(axis=0)[::-1]), 0.0)
+    for _ in range(8):
+        rays = cv2.warpPolar(
+            change, (reach, 2 * reach), (found.x, found.y), reach, cv2.WARP_POLAR_LINEAR
+        )
+        radius = np.gradient(rays, axis=1).argmax(axis=1).astype(np.float64)
+        points = radius[:, None] * direction
+        near = np.abs(radius - np.median(radius)) < max(0.2 * float(np.median(radius)), 1.0)
+        # x² + y² = 2 a x + 2 b y + c
+        design = np.column_stack([2.0 * points[near], np.ones(np.count_nonzero(near))])
+        a, b, c = np.linalg.lstsq(design, (points[near] ** 2).sum(axis=1), rcond=None)[0]
+        found = Circle(found.x + float(a), found.y + float(b), float(np.sqrt(c + a * a + b * b)))
+    off = np.abs(np.hypot(points[:, 0] - a, points[:, 1] - b) - found.radius)
+    if np.mean(off < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
+        raise InputError(
+            tr("no round edge of a pressed punch was found"),
+            where=where,
+            advice=tr("Press the flat punch straight and deeper, or state mm_per_px"),
+        )
+    return found
 
 
 def _pins(image: Map, background: Map, blur: float) -> Array:

@@ -10,7 +10,7 @@ import pytest
 from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
 from gelpolight_core.in_place.next_ball import next_position
-from gelpolight_core.in_place.scale import scale_from_pins
+from gelpolight_core.in_place.scale import scale_from_pins, scale_from_punch
 from gelpolight_core.reconstruction.height_map import normals_from_slopes, surface_slopes
 from gelpolight_core.reconstruction.in_place.change import light_gain, reference
 from gelpolight_core.reconstruction.in_place.depth import depth_of
@@ -143,6 +143,24 @@ def test_slopes_place_ball_and_contact() -> None:
     assert (found.x, found.y) == pytest.approx((true.x, true.y), abs=0.05)
     contact = contact_by_slopes(slope_x, slope_y, found, smoothing=0.5)
     assert contact == pytest.approx(true.contact, abs=0.6)
+
+
+def test_a_flat_punch_gives_the_scale() -> None:
+    """Its face changes nothing; the light changes where the membrane slopes around it."""
+    background = np.full((240, 320, 3), 0.4, np.float32)
+    y, x = np.mgrid[:240, :320]
+    across, down = x - 171.3, y - 118.6
+    away = np.hypot(across, down) - 43.0
+    slope = np.where(away > 0.0, np.exp(-away / 9.0), 0.0) / (away + 43.0)
+    lights = [np.cos(a) * across + np.sin(a) * down for a in (0.0, 2.1, 4.2)]
+    image = background + 0.15 * slope[..., None] * np.stack(lights, axis=-1)
+    image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
+    found = scale_from_punch([image.astype(np.float32)], background, diameter_mm=5.0)
+    assert found.mm_per_px == pytest.approx(5.0 / 86.0, rel=0.02)
+    assert abs(found.mm_per_px - 5.0 / 86.0) < 2.0 * found.sd_mm_per_px
+    noise = background + np.random.default_rng(4).normal(0.0, 0.004, image.shape)
+    with pytest.raises(InputError, match="no round edge"):
+        scale_from_punch([noise.astype(np.float32)], background, diameter_mm=5.0)
 
 
 def test_a_pin_grid_gives_the_scale() -> None:

@@ -59,6 +59,7 @@ def test_every_image_of_a_session_can_be_arranged() -> None:
         "mirror": 1,
         "whiteboard": 1,
         "background": 1,
+        "scale": 1,
         "balls": 10,
         "presses": 8,
     }
