@@ -249,3 +249,14 @@ def failure(quality: Mapping[str, QualityTable]) -> str:
     return tr("the calibration failed its quality check ({figures})").format(
         figures=joined(", ", failed)
     )
+
+
+def failed_calibration(quality: Mapping[str, QualityTable]) -> tuple[Finding, ...]:
+    """Return the finding of every height map of a calibration that failed; none if it did not.
+
+    A calibration with warnings is within the limits in which its stated uncertainties hold.
+    """
+    text = failure(quality)
+    if not text:
+        return ()
+    return (Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL),)

@@ -92,8 +92,8 @@ def run(options: argparse.Namespace) -> int:
             write_heightmap(heightmap, options.output, formats=formats)
             if options.explain and heightmap.trace is not None:
                 tqdm.write("\n".join([f"{item.where}:", *trace_lines(heightmap.trace)]))
-            for note in heightmap.notes:
-                tqdm.write(f"{item.where}: {note}", file=sys.stderr)
+            for finding in heightmap.findings:
+                tqdm.write(f"{item.where}: {finding.line}", file=sys.stderr)
             if PREVIEW in options.format:
                 write_preview(heightmap, image.rgb, options.output / f"{item.stem}.png")
     saved = len(inputs.items) - refused

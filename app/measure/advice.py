@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from app.live.advice import Advice, LiveState, advise, preparing
+from gelpolight_core.finding import Finding
 from gelpolight_core.translation import tr
 
 
 def measuring_advice(
-    now: LiveState, *, frozen: bool, refused: str, notes: tuple[str, ...] = ()
+    now: LiveState, *, frozen: bool, refused: str, findings: tuple[Finding, ...] = ()
 ) -> Advice:
     """Return what to do next.
 
@@ -19,8 +20,8 @@ def measuring_advice(
         Whether an image is frozen or was opened, independent of the camera.
     refused : str
         Why that image cannot be measured. Empty if it can.
-    notes : tuple of str
-        Messages of its reconstruction.
+    findings : tuple of Finding
+        About its height map.
     """
     live = advise(now)
     if now.used is None and (frozen or not now.kind):
@@ -31,7 +32,7 @@ def measuring_advice(
     if frozen:
         if refused:
             return Advice(refused, "live", tr("Back to the camera"), "fail", live.usable)
-        text = " ".join(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in notes)
+        text = " ".join(finding.line for finding in findings)
         return Advice(text, role="warn" if text else "text", usable=live.usable)
     if not now.kind:
         text = tr("No camera is selected. Choose one, open an image, or try the virtual sensor.")

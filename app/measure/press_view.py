@@ -326,9 +326,11 @@ class PressView(PressViewFrame):
         """Show what to do next."""
         frozen = self.work.image is not None
         heightmap = self.work.heightmap if frozen else None
-        notes = () if heightmap is None else heightmap.notes
+        findings = () if heightmap is None else heightmap.findings
         self.banner.advise(
-            measuring_advice(self.depth.state, frozen=frozen, refused=self._refused, notes=notes)
+            measuring_advice(
+                self.depth.state, frozen=frozen, refused=self._refused, findings=findings
+            )
         )
 
     def _on_act(self, name: str) -> None:

@@ -148,7 +148,7 @@ def processed(heightmap: HeightMap, processing: Processing) -> Processed:
             done = step(done, processing)
     except InputError as error:
         return Processed(heightmap, refused=str(error))
-    return Processed(done, done.notes[len(heightmap.notes) :])
+    return Processed(done, tuple(step.text for step in done.findings[len(heightmap.findings) :]))
 
 
 class Processor:

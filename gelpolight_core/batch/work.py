@@ -161,7 +161,7 @@ def _described(row: FrameRow, heightmap: HeightMap, shape: str | None) -> FrameR
         max_depth_mm=float(depth_mm.max()) if depth_mm.size else None,
         volume_mm3=float(depth_mm.sum()) * heightmap.pitch_mm**2,
         flagged_share=float(flagged.mean()) if flagged.size else None,
-        notes=heightmap.notes,
+        notes=tuple(finding.text for finding in heightmap.findings),
     )
     if shape is None:
         return row

@@ -51,7 +51,7 @@ def pack(heightmap: HeightMap, *, frame: int, time_s: float, serial: str) -> lis
         "x0_mm": float(heightmap.x_mm[0]),
         "y0_mm": float(heightmap.y_mm[0]),
         "flag_names": dict(FLAG_NAMES),
-        "notes": list(heightmap.notes),
+        "notes": [finding.line for finding in heightmap.findings],
         "health": _health(heightmap),
         "parts": [
             {"name": name, "dtype": _TYPES[name], "shape": list(values.shape)}

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import refusing
 from gelpolight_core.io.texts import text_of_file
@@ -30,7 +31,16 @@ GREY_LEVELS = 65_535
 """Largest 16-bit value, as one value is reserved for unknown depths."""
 NPZ_MAPS = ("depth_mm", "normals", *SD_MAPS)
 NPZ_NUMBERS = ("pitch_mm", "lateral_per_mm", *SENSOR_NUMBERS)
-NPZ_TEXTS = ("calibration_id", "model", "source", "notes", "faults", "doubts", "flag_names")
+NPZ_TEXTS = (
+    "calibration_id",
+    "model",
+    "source",
+    "notes",
+    "finding_keys",
+    "faults",
+    "doubts",
+    "flag_names",
+)
 NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags")
 LEAST_STEP_MM = 1e-6
 """Step for a map with constant depth."""
@@ -86,8 +96,9 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         "calibration_id": np.array(heightmap.calibration_id),
         "model": np.array(heightmap.model),
         "source": np.array(heightmap.source),
-        "notes": np.array([english(note) for note in heightmap.notes], dtype=np.str_),
-        "faults": np.array([english(fault) for fault in heightmap.faults], dtype=np.str_),
+        "notes": np.array([english(found.text) for found in heightmap.findings], dtype=np.str_),
+        "faults": np.array([english(found.text) for found in heightmap.doubts], dtype=np.str_),
+        "finding_keys": np.array([found.key for found in heightmap.findings], dtype=np.str_),
         "lateral_per_mm": np.float64(heightmap.lateral_per_mm),
     }
     if heightmap.normals is not None:
@@ -127,6 +138,7 @@ def read_npz(path: Path) -> HeightMap:
         texts = {name: stored[name].tolist() for name in NPZ_TEXTS if name in stored}
         # Files of one earlier state of the program have the faults under another name.
         faults = [*texts.pop("faults", ()), *texts.pop("doubts", ())]
+        findings = _findings(texts.pop("notes", []), faults, texts.pop("finding_keys", []))
         if not {*texts.pop("flag_names", ())} <= {*flag_names()}:
             raise ValueError("flag_names")
         values: dict[str, Any] = {"normals": None}
@@ -136,13 +148,27 @@ def read_npz(path: Path) -> HeightMap:
             x_mm=stored["x_mm"].astype(np.float64),
             y_mm=stored["y_mm"].astype(np.float64),
             flags=stored["flags"].astype(np.uint8, casting="safe"),
-            notes=tuple(map(text_of_file, texts.pop("notes", ()))),
-            faults=tuple(map(text_of_file, faults)),
+            findings=findings,
             **values,
             **texts,
         )
         _refuse_contradictions(heightmap)
     return heightmap
+
+
+def _findings(notes: list[str], faults: list[str], keys: list[str]) -> tuple[Finding, ...]:
+    """Return the findings of a file; older ones have no keys, and faults that are not notes."""
+    texts = tuple(dict.fromkeys((*notes, *faults)))
+    known = dict(zip(notes, keys, strict=False))
+    return tuple(
+        Finding(
+            known.get(text, "note"),
+            text_of_file(text),
+            verdict=Verdict.WARN if text in faults else Verdict.PASS,
+            heights=Heights.DOUBTFUL if text in faults else Heights.STATED,
+        )
+        for text in texts
+    )
 
 
 def _refuse_contradictions(heightmap: HeightMap) -> None:

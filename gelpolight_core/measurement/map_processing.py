@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
@@ -63,7 +64,9 @@ def masked(heightmap: HeightMap, keep: Mask) -> HeightMap:
     flags = heightmap.flags | np.where(keep, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
     percent = 100.0 * float((before & ~keep).sum() / before.sum())
     note = tr("Masked: {percent:.0f} % of the points are left out.").format(percent=percent)
-    return replace(heightmap, flags=flags, notes=(*heightmap.notes, note))
+    return replace(
+        heightmap, flags=flags, findings=(*heightmap.findings, Finding("processed", note))
+    )
 
 
 def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
@@ -286,7 +289,12 @@ def _root_sum_square(
 
 def _without(heightmap: HeightMap, plane: NDArray[np.floating], note: str) -> HeightMap:
     depth = (heightmap.depth_mm - plane).astype(np.float32)
-    return replace(heightmap, depth_mm=depth, normals=None, notes=(*heightmap.notes, note))
+    return replace(
+        heightmap,
+        depth_mm=depth,
+        normals=None,
+        findings=(*heightmap.findings, Finding("processed", note)),
+    )
 
 
 def _filtered(heightmap: HeightMap, depth_mm: NDArray[np.floating], note: str) -> HeightMap:
@@ -295,7 +303,7 @@ def _filtered(heightmap: HeightMap, depth_mm: NDArray[np.floating], note: str) -
         heightmap,
         depth_mm=depth_mm.astype(np.float32),
         normals=None,
-        notes=(*heightmap.notes, note),
+        findings=(*heightmap.findings, Finding("processed", note)),
     )
     return _without_errors(smooth)
 

@@ -36,7 +36,7 @@ def judged(result: Result, height_map: HeightMap) -> Result:
         Doubtful, with the reason, if the height map has faults, or a shape with walls was measured
         with an in-place calibration; unchanged otherwise.
     """
-    faults: list[str] = list(height_map.faults)
+    faults: list[str] = [finding.text for finding in height_map.doubts]
     if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
         faults.append(
             tr(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.lights.positions import (
     CONDITION_LIMIT,
     direction_condition,
@@ -92,41 +93,30 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     return limited
 
 
-class Note(NamedTuple):
-    """A note on a map for the user.
-
-    Attributes
-    ----------
-    text : str
-        A sentence.
-    doubtful : bool
-        Whether what is measured on the map may be wrong by more than it states.
-    """
-
-    text: str
-    doubtful: bool = True
+def _note(key: str, text: str, heights: Heights = Heights.DOUBTFUL) -> Finding:
+    return Finding(key, text, verdict=Verdict.WARN, heights=heights)
 
 
-Notes = tuple[Note, ...]
-
-
-def free_boundary_note() -> Note:
+def free_boundary_note() -> Finding:
     """Return the note on a map whose boundary a contact crosses; its depth is still accurate."""
     text = tr("a contact crosses the boundary of the field: the boundary is free there")
-    return Note(text, doubtful=False)
+    return Finding("free_boundary", text)
 
 
-def fixed_boundary_note() -> Note:
+def fixed_boundary_note() -> Finding:
     """Return the note on a map of the paper's model whose boundary a contact crosses."""
-    return Note(
+    return _note(
+        "fixed_boundary",
         tr(
             "a contact crosses the boundary of the field, where the paper's model holds depth 0: "
             "depths are too small; use the full model, or press nearer to the middle"
-        )
+        ),
     )
 
 
-def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float) -> Notes:
+def paper_notes(
+    depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float
+) -> tuple[Finding, ...]:
     """Return the notes on a map that violates the assumptions of the paper's model.
 
     It assumes three lights, with the directions at the undeformed surface.
@@ -151,18 +141,18 @@ def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float)
             "paper's model ignores: heights on steep walls may be too low; use the "
             "full model"
         )
-        notes.append(Note(text.format(percent=100.0 * share)))
+        notes.append(_note("shadow", text.format(percent=100.0 * share)))
     if deepest > FROZEN_SHARE * least_height_mm:
         text = tr(
             "the press is deep for its lights, and the paper's model uses the light "
             "of the undeformed surface: depths may be wrong by 5 % or more; use the "
             "full model"
         )
-        notes.append(Note(text))
+        notes.append(_note("deep_for_lights", text))
     return tuple(notes)
 
 
-def condition_notes(calibration: Calibration, leds_mm: NDArray[np.float64]) -> Notes:
+def condition_notes(calibration: Calibration, leds_mm: NDArray[np.float64]) -> tuple[Finding, ...]:
     """Return the note on light directions that are nearly coplanar somewhere, if they are."""
     table = calibration.table
     points = table.grid.points_mm()[table.valid]
@@ -175,10 +165,10 @@ def condition_notes(calibration: Calibration, leds_mm: NDArray[np.float64]) -> N
         "the light directions lie nearly in one plane in part of the field (condition number "
         "{c:.0f}): depths scatter more than stated; place the LEDs wider apart"
     )
-    return (Note(text.format(c=condition)),)
+    return (_note("light_condition", text.format(c=condition)),)
 
 
-def unanchored_note() -> Note:
+def unanchored_note() -> Finding:
     """Return the note on a map without an anchor, which may be wrong by a constant.
 
     Not doubtful: depth differences are valid, and the flag makes the others doubtful.
@@ -188,20 +178,21 @@ def unanchored_note() -> Note:
         "are valid, but all depths may be wrong by one constant; press so that "
         "more of the boundary stays free"
     )
-    return Note(text, doubtful=False)
+    return _note("unanchored", text, Heights.STATED)
 
 
-def rounds_notes(stopped: str) -> Notes:
+def rounds_notes(stopped: str) -> tuple[Finding, ...]:
     """Return the note on near-light rounds that ended in this way, if it matters."""
     texts = {
         "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
         "unsettled": tr("the near-light rounds did not converge: damping did not help"),
         "grows": tr("the near-light rounds did not converge: the last round was undone"),
     }
-    return (Note(texts[stopped], doubtful=stopped != "damped"),) if stopped in texts else ()
+    heights = Heights.STATED if stopped == "damped" else Heights.DOUBTFUL
+    return (_note("rounds", texts[stopped], heights),) if stopped in texts else ()
 
 
-def unsolved_notes(share: float) -> Notes:
+def unsolved_notes(share: float) -> tuple[Finding, ...]:
     """Return the note on nodes that the light alone does not determine, if there are many."""
     if share <= UNSOLVED_SHARE:
         return ()
@@ -209,10 +200,10 @@ def unsolved_notes(share: float) -> Notes:
         "{percent:.1f} % of the membrane is lit by less than two LEDs or faces "
         "away from the camera, as on steep walls: heights there may be too low"
     )
-    return (Note(text.format(percent=100.0 * share)),)
+    return (_note("steep_walls", text.format(percent=100.0 * share)),)
 
 
-def small_image_notes(pitch_mm: float, decay_mm: float) -> Notes:
+def small_image_notes(pitch_mm: float, decay_mm: float) -> tuple[Finding, ...]:
     """Return the note on a map whose nodes do not resolve the drape, if they do not."""
     if pitch_mm <= MOST_PITCH * decay_mm:
         return ()
@@ -221,10 +212,10 @@ def small_image_notes(pitch_mm: float, decay_mm: float) -> Notes:
         "and the decay length of the drape is {d:.2f} mm; heights may be too low "
         "by several percent; use larger images"
     )
-    return (Note(text.format(p=pitch_mm, d=decay_mm)),)
+    return (_note("small_image", text.format(p=pitch_mm, d=decay_mm)),)
 
 
-def visible_depth_notes(visible_mm: float) -> Notes:
+def visible_depth_notes(visible_mm: float) -> tuple[Finding, ...]:
     """Return the note on a map without a contact, of a sensor that hides deep ones."""
     if visible_mm <= MOST_HIDDEN_MM:
         return ()
@@ -232,7 +223,7 @@ def visible_depth_notes(visible_mm: float) -> Notes:
         "no contact was found, but this calibration's noise hides faces of less than {um:.0f} um: "
         "calibrate again with more light or less gain"
     )
-    return (Note(text.format(um=1e3 * visible_mm)),)
+    return (_note("hidden_depth", text.format(um=1e3 * visible_mm)),)
 
 
 def refuse_coplanar_lights(calibration: Calibration, leds_mm: NDArray[np.float64]) -> None:

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import Finding
 from gelpolight_core.health.finding import Health
 from gelpolight_core.reconstruction.trace import Trace
 
@@ -87,8 +88,9 @@ class HeightMap:
         ``paper`` or ``full``.
     source : str
         Name of the image, such as ``press_03.png``.
-    notes : tuple of str
-        Notes on this map for the user.
+    findings : tuple of Finding
+        About this map: why heights may be wrong, the faults of its image, and what else to know. A
+        measurement of it is not better than they are.
     slope_sd, depth_sd_mm : (rows, columns) float32 or None
         Scatter of repeated images: standard deviations of the slopes of the surface (root mean
         square of x and y) and of the depth, from the noise of the image. None where they were
@@ -110,12 +112,8 @@ class HeightMap:
         images that show none at first sight.
     trace : Trace or None
         Which steps were done, and why the others were left out.
-    faults : tuple of str
-        Why no measurement of this map is reliable: the fault of a calibration that failed, the
-        notes that say that depths may be wrong, and the faults of the image. Empty if there are
-        none.
     health : Health or None
-        The faults of its frame.
+        The check of its frame.
     lateral_per_mm : float
         Relative error of the width of an object per mm of its depth: the paper's model uses the
         point where the ray meets the undeformed surface. 0 for the full model.
@@ -143,7 +141,7 @@ class HeightMap:
     calibration_id: str
     model: str
     source: str
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     slope_sd: NDArray[np.float32] | None = None
     depth_sd_mm: NDArray[np.float32] | None = None
     slope_model_sd: NDArray[np.float32] | None = None
@@ -153,9 +151,13 @@ class HeightMap:
     lateral_scale_sd: float | None = None
     visible_depth_mm: float | None = None
     trace: Trace | None = None
-    faults: tuple[str, ...] = ()
     health: Health | None = None
     lateral_per_mm: float = 0.0
+
+    @property
+    def doubts(self) -> tuple[Finding, ...]:
+        """The findings by which heights may be wrong."""
+        return tuple(finding for finding in self.findings if finding.doubtful)
 
     def __post_init__(self) -> None:
         """Check that the shapes match."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import failed_calibration
 from gelpolight_core.health.finding import KEYS, Health
 from gelpolight_core.reconstruction.checks import accepted
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -267,6 +268,7 @@ class Reconstructor:
             frame, self._wanted(health, normals=normals, uncertainty=uncertainty)
         )
         known = health or Health()
+        failed = failed_calibration(self.calibration.quality)
         grid, noise = self.calibration.table.grid, solved.noise
         return HeightMap(
             depth_mm=solved.depth_mm,
@@ -278,15 +280,7 @@ class Reconstructor:
             calibration_id=self.calibration.identity,
             model=self.model,
             source=name,
-            notes=(
-                *(finding.line for finding in known.findings),
-                *(note.text for note in solved.notes),
-            ),
-            faults=(
-                *filter(None, (self.calibration.fault,)),
-                *(note.text for note in solved.notes if note.doubtful),
-                *(finding.text for finding in known.faults),
-            ),
+            findings=(*failed, *solved.findings, *known.findings),
             **({} if noise is None else {f.name: getattr(noise, f.name) for f in fields(noise)}),
             depth_scale_sd=solved.depth_scale_sd,
             lateral_scale_sd=solved.lateral_scale_sd,

@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import Finding
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.expected import raw_background
 from gelpolight_core.health.finding import Health, LightGain
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
-from gelpolight_core.reconstruction.checks import Notes, condition_notes
+from gelpolight_core.reconstruction.checks import condition_notes
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.reconstruction.near_light.contact import ContactFinder, contact_finder
@@ -111,8 +112,8 @@ class Solved:
         Unit normals, z < 0; None where they were not requested.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
-    notes : tuple of Note
-        For the user.
+    findings : tuple of Finding
+        About this map.
     trace : Trace
         What was done and what was left out.
     noise : DepthNoise or None
@@ -124,7 +125,7 @@ class Solved:
     depth_mm: Map
     normals: Map | None
     flags: NDArray[np.uint8]
-    notes: Notes
+    findings: tuple[Finding, ...]
     trace: Trace
     noise: DepthNoise | None = None
     depth_scale_sd: float | None = None

@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import Verdict
 from gelpolight_core.lights.positions import direction_condition
 from gelpolight_core.measurement.indenter_tools import mode_error
 from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
 from gelpolight_core.measurement.spread import BALL_SLOPE
-from gelpolight_core.reconstruction.checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -169,8 +169,10 @@ def own_share(found: HeightMap) -> float:
 
 
 def warnings_of(found: HeightMap) -> tuple[str, ...]:
-    """Return the notes of a map that report an unreliable depth."""
-    harmless = {free_boundary_note().text}
-    if found.health is not None:
-        harmless |= {finding.line for finding in found.health.findings if not finding.doubtful}
-    return tuple(note for note in found.notes if note not in harmless)
+    """Return the findings on a map that report an unreliable depth, as texts."""
+    corrected = () if found.health is None else found.health.findings
+    return tuple(
+        finding.text
+        for finding in found.findings
+        if finding.doubtful or (finding.verdict is not Verdict.PASS and finding not in corrected)
+    )

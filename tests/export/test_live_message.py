@@ -19,7 +19,9 @@ def heightmap() -> HeightMap:
     normals = np.dstack([0.0 * depth, 0.0 * depth, 0.0 * depth - 1.0]).astype(np.float32)
     flags = np.arange(12, dtype=np.uint8).reshape(3, 4)
     x, y = np.arange(4) * 0.1 - 2.0, np.arange(3) * 0.1 - 1.0
-    return HeightMap(depth, x, y, 0.1, normals, flags, "c-1", "full", "f", notes=("a note",))
+    return HeightMap(
+        depth, x, y, 0.1, normals, flags, "c-1", "full", "f", findings=(Finding("a", "a note"),)
+    )
 
 
 def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap: HeightMap) -> None:
@@ -31,7 +33,7 @@ def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap: HeightMa
         assert arrays[name].dtype == getattr(heightmap, name).dtype
     assert (header["frame"], header["time_s"], header["serial"]) == (7, 12.5, "A-001")
     assert (header["x0_mm"], header["y0_mm"], header["pitch_mm"]) == (-2.0, -1.0, 0.1)
-    assert header["notes"] == ["a note"] and header["health"]["checked"] is False
+    assert header["notes"] == ["A note."] and header["health"]["checked"] is False
 
 
 def test_normals_are_left_out_if_there_are_none_and_faults_are_named(heightmap: HeightMap) -> None:

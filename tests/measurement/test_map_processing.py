@@ -32,7 +32,7 @@ def test_levelling_leaves_out_the_pressed_object() -> None:
     middle = level.depth_mm[level.depth_mm.shape[0] // 2, level.depth_mm.shape[1] // 2]
     assert middle == pytest.approx(0.5, abs=2e-4)
     assert np.median(level.depth_mm) == pytest.approx(0.0, abs=2e-4)
-    assert "plane" in level.notes[-1]
+    assert "plane" in level.findings[-1].text
     assert level.normals is None
 
 
@@ -54,7 +54,7 @@ def test_a_mask_keeps_points_and_leaves_the_others_out_of_every_later_step() -> 
     assert np.abs(level.depth_mm[~face]).max() < 1e-5, "the face has no part in the plane"
     counts, _ = histogram(masked(press, face))
     assert counts.sum() == face.sum()
-    assert f"{100.0 * face.mean():.0f} %" in bare.notes[-1]
+    assert f"{100.0 * face.mean():.0f} %" in bare.findings[-1].text
     with pytest.raises(InputError, match="mask"):
         masked(press, np.zeros_like(face))
 

@@ -83,7 +83,7 @@ def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str)
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
     # A straight wall across the whole field gives its own error to all that lies behind it.
     assert error_um(found, press) < (30.0 if name in ("edge 0.5", "half plane") else 15.0)
-    assert free_boundary_note().text in found.notes
+    assert free_boundary_note() in found.findings
     assert not (found.flags & int(Flag.UNANCHORED)).any()
 
 
@@ -125,7 +125,7 @@ def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_ancho
     press = scene("ring 8")
     found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
     assert error_um(found, press) < 10.0
-    assert unanchored_note().text in found.notes
+    assert unanchored_note() in found.findings
     inside = (found.flags & int(Flag.OUTSIDE)) == 0
     assert (found.flags[inside] & int(Flag.UNANCHORED)).all()
     assert found.depth_model_sd_mm is not None
@@ -145,13 +145,13 @@ def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
     press = scene("cylinder 12 at 10.5")
     paper = Reconstructor(sensor().calibration, model="paper")
     found = paper.depth(press.frame)
-    assert fixed_boundary_note().text in found.notes
+    assert fixed_boundary_note() in found.findings
     measured = measure_object(
         found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=found.flags
     )
     assert measured.verdict == "doubtful"
     central = sensor().pressed(Ball(4.0, DEPTH_MM), x_mm=1.0, samples=1)
-    assert not paper.depth(central.frame).notes
+    assert not paper.depth(central.frame).findings
 
 
 def test_a_face_without_an_anchor_is_doubtful() -> None:

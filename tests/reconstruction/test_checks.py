@@ -86,7 +86,7 @@ def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(
     reconstruct: Reconstructor,
 ) -> None:
     frame = standard_press().frame
-    assert not reconstruct.depth(frame).notes
+    assert not reconstruct.depth(frame).findings
     for wrong, key in (
         (frame * np.float32(0.9), "exposure"),
         (frame * np.float32(0.5), "exposure"),
@@ -96,7 +96,7 @@ def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(
         found = reconstruct.depth(wrong)
         assert found.health is not None and found.health.meaningless is not None
         assert found.health.meaningless.key == key
-        assert found.health.line in found.notes
+        assert found.health.findings[0] in found.findings
 
 
 def test_light_that_has_drifted_by_two_per_cent_is_reported_with_its_amount() -> None:
@@ -107,7 +107,7 @@ def test_light_that_has_drifted_by_two_per_cent_is_reported_with_its_amount() ->
         assert health is not None and health.keys == ("led_weak",)
         assert health.findings[0].value == pytest.approx(2.0, abs=0.1)
         eight_bit = np.rint(frame * 255.0 * 1.0005).astype(np.uint8)
-        assert not reconstruct.depth(eight_bit).notes
+        assert not reconstruct.depth(eight_bit).findings
 
 
 def test_known_bad_pixels_are_left_out_of_the_solve() -> None:
@@ -127,14 +127,14 @@ def test_known_bad_pixels_are_left_out_of_the_solve() -> None:
         worst = float(np.abs(mended.depth_mm - good.depth_mm).max())
         assert worst < 0.01
         assert float(np.abs(seen.depth_mm - good.depth_mm).max()) > 3.0 * worst
-        assert not mended.notes
+        assert not mended.findings
         assert seen.health is not None and "bad_line" in seen.health.keys
 
 
 def test_a_contact_on_the_rim_is_not_taken_for_another_sensor() -> None:
     press = standard_sensor().pressed(Ball(4.0, 1.0), x_mm=11.0, samples=1)
-    notes = STANDARD[0].depth(press.frame).notes
-    assert notes and not any("exposure" in note for note in notes)
+    notes = STANDARD[0].depth(press.frame).findings
+    assert notes and not any(note.key == "exposure" for note in notes)
 
 
 def test_lights_in_one_plane_are_refused_with_their_condition() -> None:

@@ -138,7 +138,7 @@ def test_a_calibration_whose_noise_hides_presses_says_so() -> None:
         found = reconstruct.depth(press.frame)
         assert reconstruct.visible_depth_mm is not None
         (note,) = visible_depth_notes(reconstruct.visible_depth_mm)
-        assert note.text in found.notes
+        assert note in found.findings
     assert not visible_depth_notes(Reconstructor(known.calibration).visible_depth_mm or 1.0)
 
 
@@ -155,7 +155,7 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort: str)
     assert found.trace.effort == "best"
     assert (f"effort {effort}" in found.trace.left_out) == (effort != "best")
     (note,) = small_image_notes(found.pitch_mm, 0.7)
-    assert note.text in found.notes
+    assert note in found.findings
 
 
 @lru_cache(maxsize=1)
@@ -175,7 +175,7 @@ def test_walls_are_right_or_reported_to_be_too_steep(decay_mm: float, effort: st
     steep, press = steep_press(decay_mm)
     found = Reconstructor(steep.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=12.0))
-    assert found.notes or error_um < 15.0
+    assert found.findings or error_um < 15.0
 
 
 @lru_cache(maxsize=1)
@@ -195,4 +195,4 @@ def test_wide_lenses_are_right_or_reported_to_see_too_little(focal_px: float, ef
     known, press = wide_press(focal_px)
     found = Reconstructor(known.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=7.0))
-    assert found.notes or error_um < 10.0
+    assert found.findings or error_um < 10.0

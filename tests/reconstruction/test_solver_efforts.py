@@ -134,8 +134,8 @@ def test_walls_that_light_does_not_decide_are_reported_at_every_effort(
     """Walls of 57 degrees, and of 84."""
     surface = pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, decay_mm=decay_mm)
     image = shown(PressedMembrane(surface))
-    notes = Reconstructor(virtual_calibration, effort=effort).depth(image).notes
-    assert any("steep walls" in note for note in notes) is output
+    notes = Reconstructor(virtual_calibration, effort=effort).depth(image).findings
+    assert any(note.key == "steep_walls" for note in notes) is output
 
 
 @pytest.mark.parametrize("effort", EFFORTS)

@@ -87,8 +87,8 @@ def test_a_rim_that_is_held_pulls_a_contact_that_crosses_it_down(
     rgb = frame.astype(np.float32) / 255.0
     free = solved(rgb, virtual_calibration)
     held = solved(rgb, virtual_calibration, free_boundary=False)
-    assert free_boundary_note() in free.notes
-    assert free_boundary_note() not in held.notes
+    assert free_boundary_note() in free.findings
+    assert free_boundary_note() not in held.findings
     grid = virtual_calibration.table.grid
     x, y = np.meshgrid(grid.x_mm, grid.y_mm)
     top = (np.hypot(x + 11.0, y - 3.0) < 2.7) & (np.hypot(x, y) < 12.0)

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.checks import Note, Notes, free_boundary_note
+from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.reconstruction.checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
     Flag,
@@ -111,7 +112,7 @@ class InPlaceSolver:
             record.left_out(tr("standard deviations"), tr("not requested"))
         light = light_step(seen.gain)
         changed = np.abs(seen.gain - 1.0).max() > STATED_CHANGE
-        notes = [Note(light.reason, doubtful=False)] if changed else []
+        notes = [Finding("light", light.reason, verdict=Verdict.WARN)] if changed else []
         notes += [free_boundary_note()] if crossed else []
         normals = None
         if wanted.normals:
@@ -180,7 +181,7 @@ class InPlaceSolver:
         )
 
 
-def _difference_notes(change: Map) -> Notes:
+def _difference_notes(change: Map) -> tuple[Finding, ...]:
     thin = change[::4, ::4]
     if float(np.median(np.abs(thin).max(axis=2))) <= DIFFERENT:
         return ()
@@ -188,4 +189,4 @@ def _difference_notes(change: Map) -> Notes:
         "most of the image does not look like this sensor's membrane: another "
         "exposure, crop, gel or sensor; the depth is not reliable"
     )
-    return (Note(text),)
+    return (Finding("other_sensor", text, verdict=Verdict.WARN, heights=Heights.DOUBTFUL),)

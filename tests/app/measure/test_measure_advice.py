@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.live.advice import Known, LiveState
 from app.measure.advice import measuring_advice
+from gelpolight_core.finding import Finding
 
 USED = Known("A-1", (1280, 960))
 
@@ -28,7 +29,8 @@ def test_a_press_is_requested_and_a_frozen_one_needs_no_advice() -> None:
     ready = LiveState(kind="camera", size=(1280, 960), used=USED)
     assert "Press" in measuring_advice(ready, frozen=False, refused="").text
     assert measuring_advice(ready, frozen=True, refused="").text == ""
-    noted = measuring_advice(ready, frozen=True, refused="", notes=("it is dim.", "it is cut off"))
-    assert (noted.text, noted.role) == ("It is dim. It is cut off.", "warn")
+    cut = (Finding("dim", "it is dim", remedy="Light it"), Finding("cut", "it is cut off"))
+    noted = measuring_advice(ready, frozen=True, refused="", findings=cut)
+    assert (noted.text, noted.role) == ("It is dim. Light it. It is cut off.", "warn")
     refused = measuring_advice(ready, frozen=True, refused="it is grey")
     assert (refused.text, refused.act) == ("it is grey", "live")
