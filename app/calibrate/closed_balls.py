@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from gelpolight_core.calibration.in_place_session import (
     SETTLED,
     InPlaceRun,
     expected_gain,
+    stated_grid,
 )
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.status import StageState
@@ -42,7 +43,7 @@ from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.calibrate import LEAST_PRESSES
 from gelpolight_core.in_place.press import find_contact
 from gelpolight_core.reconstruction.in_place.change import Reference, reference
-from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.session.session import InPlace
 from gelpolight_core.translation import tr
 
@@ -69,8 +70,7 @@ class Untouched:
     def grid(self) -> WorkingGrid:
         """The grid on which images are compared."""
         rows, columns = self._image.shape[:2]
-        assert self.stated.mm_per_px is not None
-        return WorkingGrid(ImageSize(columns, rows), self.stated.mm_per_px[0])
+        return stated_grid(self.stated, (columns, rows))
 
     @cached_property
     def base(self) -> Reference:
@@ -114,9 +114,7 @@ def detect_closed_ball(
         seen = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
         radius = radius_mm / grid.pitch_mm
         found, _ = find_contact(seen, untouched.base, ball_radius=radius, name=tr("Image"))
-        size = grid.factor
-        u, v = (size * c + 0.5 * (size - 1) for c in (found.x, found.y))
-        contact = Circle(u, v, size * found.radius, "good", handle="ball" if editable else "")
+        contact = Circle(*astuple(grid.in_image(found)), "good", handle="ball" if editable else "")
         text = tr("Ball found: contact radius {c:.2f} mm.")
         return Detection(
             Overlay(markers=marks, circles=(contact,)),

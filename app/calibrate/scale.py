@@ -5,22 +5,25 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from app.calibrate.detection import Detection, Detector, or_refusal, refuse_size, too_early
 from app.calibrate.image_step import ImageStep
 from app.calibrate.light_checks import KnownImage, refuse_grey
 from app.calibrate.step_data import Step
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
+from gelpolight_core.calibration.in_place_session import stated_grid
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.scale import find_pins, find_punch
-from gelpolight_core.session.session import InPlace, PressedScale
+from gelpolight_core.session.session import InPlace
 from gelpolight_core.translation import tr
 
 
 def detect_scale(
-    rgb: Rgb, background: Rgb, *, pressed: PressedScale, response: CameraResponse | None = None
+    rgb: Rgb, background: Rgb, *, stated: InPlace, response: CameraResponse | None = None
 ) -> Detection:
     """Find the pressed object, and show what it says about the size of a pixel.
 
@@ -28,8 +31,8 @@ def detect_scale(
     ----------
     rgb, background : (rows, columns, 3)
         The frame, and the untouched membrane.
-    pressed : PressedScale
-        Size of the object.
+    stated : InPlace
+        Size of the object, and the membrane's part of the image.
     response : CameraResponse, optional
         Response of the camera.
     """
@@ -37,15 +40,20 @@ def detect_scale(
     def detect() -> Detection:
         refuse_grey(rgb)
         refuse_size(rgb, (background.shape[1], background.shape[0]))
-        seen, bare = (linear_image(raw, "", response=response).rgb for raw in (rgb, background))
+        images = [linear_image(raw, "", response=response) for raw in (rgb, background)]
+        grid, pressed = stated_grid(stated, images[1].size), stated.pressed_scale
+        seen, bare = (grid.cut(image.rgb) for image in images)
+        left, top = grid.region[:2]
         if pressed.pin_spacing_mm is not None:
-            grid = find_pins(seen, bare, where=tr("Image"))
-            marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in grid.pins_px))
+            pins = find_pins(seen, bare, where=tr("Image"))
+            at = pins.pins_px + np.array([left, top])
+            marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in at))
             text = tr("{n} pins found: a pixel is {s:.4f} mm wide.")
-            said = text.format(n=len(grid.pins_px), s=pressed.pin_spacing_mm / grid.spacing_px)
+            said = text.format(n=len(at), s=pressed.pin_spacing_mm / pins.spacing_px)
         else:
             disc = find_punch(seen, bare, where=tr("Image"))
-            marks = Overlay(circles=(Circle(disc.x, disc.y, disc.radius, "good"),))
+            circle = Circle(left + disc.x, top + disc.y, disc.radius, "good")
+            marks = Overlay(circles=(circle,))
             wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
             said = tr("Contact of the punch found: a pixel is {s:.4f} mm wide.").format(s=wide)
         return Detection(marks, said, True)
@@ -76,9 +84,10 @@ class ScaleStep(ImageStep):
         files = session.found(FOLDERS[Stage.BACKGROUND])
         if not files:
             return too_early
-        pressed = (session.in_place or InPlace()).pressed_scale
         known = KnownImage(files)
-        return partial(_detect, known=known, pressed=pressed, response=session.response)
+        return partial(
+            _detect, known=known, stated=session.in_place or InPlace(), response=session.response
+        )
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the size of the pressed object, and the background."""
@@ -87,9 +96,9 @@ class ScaleStep(ImageStep):
 
 
 def _detect(
-    rgb: Rgb, known: KnownImage, pressed: PressedScale, response: CameraResponse | None
+    rgb: Rgb, known: KnownImage, stated: InPlace, response: CameraResponse | None
 ) -> Detection:
     background = known.rgb
     if background is None:
         return too_early(rgb)
-    return detect_scale(rgb, background, pressed=pressed, response=response)
+    return detect_scale(rgb, background, stated=stated, response=response)

@@ -13,6 +13,7 @@ from gelpolight_core.calibration.in_place_session import (
     judge_scale,
     measured_scale,
     stages_of,
+    stated_grid,
 )
 from gelpolight_core.calibration.inputs import FOLDERS, Stage, StageInputs
 from gelpolight_core.calibration.project import CalibrationProject
@@ -116,6 +117,8 @@ class ClosedProject(StagedProject[ClosedResults]):
         try:
             if stage is Stage.BACKGROUND:
                 image = session.averaged("background")
+                grid = stated_grid(session.in_place or InPlace(), image.size)
+                image = replace(image, rgb=grid.cut(image.rgb))
                 require_colour(image, where=str(session.folder / "background"))
                 table = check_bare_membrane(image.rgb).quality
                 results = replace(results, background=table)
@@ -156,7 +159,8 @@ class ClosedProject(StagedProject[ClosedResults]):
         stated = session.in_place or InPlace()
         scale = stated.stated_scale, stated.mm_per_px_sd, stated.pressed_scale
         cut = () if stated.region_px is None else (stated.region_px,)
-        background = self._inputs_of(("background",), session.declared_response, ())
+        response = session.declared_response
+        background = self._inputs_of(("background",), (response, *cut) if cut else response, ())
         folders = ("balls", *stages_of(session)[2:])
         balls = self._inputs_of(folders, (radii, circles, scale, *cut), (background.fingerprint,))
         found = {Stage.BACKGROUND: background}

@@ -89,11 +89,13 @@ def calibrate_closed_session(
     refuse_copies(files)
     progress(tr("background"), 0.0)
     background = session.averaged("background")
-    require_colour(background, where=str(session.folder / "background"))
     stated = session.in_place or InPlace()
+    grid = stated_grid(stated, background.size)
+    membrane = replace(background, rgb=grid.cut(background.rgb))
+    require_colour(membrane, where=str(session.folder / "background"))
     scale = None if stated.mm_per_px is not None else measured_scale(session, stated, background)
     mm_per_px, scale_sd = _scale(stated, scale)
-    grid = WorkingGrid(ImageSize(*background.size), mm_per_px)
+    grid = replace(grid, mm_per_px=mm_per_px)
     progress(tr("ball presses"), 0.05)
     presses, unreadable = _presses(session, background)
     result = calibrate_in_place(
@@ -108,7 +110,7 @@ def calibrate_closed_session(
     calibration = InPlaceCalibration(
         sensor=ClosedSensor(session.serial),
         in_place=result.model,
-        noise=_noise(background.rgb),
+        noise=_noise(membrane.rgb),
         balls=tuple(_ball_entry(press.name, press.ball, grid) for press in result.presses),
         quality=judge_in_place(result, scale_sd),
         provenance=provenance_of(session, files),
@@ -138,6 +140,25 @@ def _refuse_missing(session: Session) -> None:
         )
 
 
+def stated_grid(stated: InPlace, size: tuple[int, int]) -> WorkingGrid:
+    """Return the grid of the images of a session; of scale 1 where that is to be measured.
+
+    Parameters
+    ----------
+    stated : InPlace
+        Scale and region.
+    size : (width, height)
+        Of the images.
+
+    Raises
+    ------
+    InputError
+        If the region is not in the image, or too small.
+    """
+    x, y = stated.mm_per_px or (1.0, 1.0)
+    return WorkingGrid(ImageSize(*size), x, y / x, stated.region_px)
+
+
 def measured_scale(session: Session, stated: InPlace, background: LinearImage) -> MeasuredScale:
     """Return the scale by the images of ``scale/``.
 
@@ -156,20 +177,21 @@ def measured_scale(session: Session, stated: InPlace, background: LinearImage) -
         If an image does not show the object.
     """
     images = session.images("scale")
-    rgb = [image.rgb for image in images]
+    grid = stated_grid(stated, background.size)
+    rgb, bare = [grid.cut(image.rgb) for image in images], grid.cut(background.rgb)
     where, pressed = str(session.folder / "scale"), stated.pressed_scale
     require_size(images[0].size, background.size, where=where)
     if pressed.pin_spacing_mm is not None:
         return scale_from_pins(
             rgb,
-            background.rgb,
+            bare,
             spacing_mm=pressed.pin_spacing_mm,
             where=where,
         )
     assert pressed.punch_diameter_mm is not None
     return scale_from_punch(
         rgb,
-        background.rgb,
+        bare,
         diameter_mm=pressed.punch_diameter_mm,
         where=where,
     )

@@ -15,6 +15,7 @@ from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
@@ -343,15 +344,7 @@ def _seen_colours(work: _Work) -> Map:
         shown = seen.change[seen.usable & ((rho < ball.contact) | (rho > 1.4 * ball.contact))]
         cell = colour_cells(shown)
         cells[cell[:, 0], cell[:, 1], cell[:, 2]] = 1.0
-    grown = cells.copy()
-    for axis in range(3):
-        for shift in (-1, 1):
-            moved = np.roll(cells, shift, axis)
-            edge: list[slice | int] = [slice(None)] * 3
-            edge[axis] = 0 if shift == 1 else -1
-            moved[tuple(edge)] = 0.0
-            grown = np.maximum(grown, moved)
-    return grown
+    return np.asarray(ndimage.binary_dilation(cells), np.float32)
 
 
 def _steepest(ball: Ball) -> float:

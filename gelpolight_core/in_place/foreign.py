@@ -91,16 +91,19 @@ def read_foreign(folder: Path) -> ForeignFolder:
             found = read(folder, table)
             break
     else:
-        raise InputError(
-            tr("The folder has none of the known tables"),
-            where=str(folder),
-            advice=tr("Choose a calibration folder with one of: {forms}").format(forms=FORMS),
-        )
+        raise _unusable(tr("The folder has none of {forms}").format(forms=FORMS), folder)
     if not found.presses:
-        raise InputError(
-            tr("The table lists no image"), where=str(table), advice=tr("Choose another folder")
-        )
+        raise _unusable(tr("The table lists no image"), table)
     return found
+
+
+def _unusable(found: str, where: Path | str) -> InputError:
+    advice = tr("Choose a calibration folder of another library that is complete")
+    return InputError(found, where=str(where), advice=advice)
+
+
+def _wrong_line(found: str, where: str) -> InputError:
+    return InputError(found, where=where, advice=tr("Correct or remove this line"))
 
 
 def _catalog(folder: Path, table: Path) -> ForeignFolder:
@@ -127,11 +130,8 @@ def _annotations(folder: Path, table: Path) -> ForeignFolder:
         radius = _number(stated["probe_radius_mm"], str(about), *RADIUS_RANGE)
         scale = 1.0 / _number(stated["px_per_mm"], str(about), 0.1, 1e4)
     except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            tr("The file does not state px_per_mm and probe_radius_mm"),
-            where=str(about),
-            advice=tr("Annotate the folder with its own library first"),
-        ) from error
+        found = tr("The file does not state px_per_mm and probe_radius_mm")
+        raise _unusable(found, about) from error
     paths: dict[tuple[str, str], Path] = {}
     for number, row in _rows(table, ("img_name", "x_mm", "y_mm")):
         where = f"{table}, {tr('line {n}').format(n=number)}"
@@ -155,11 +155,8 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
         if not row or (number == 1 and len(row) == 4 and not _is_number(row[1])):
             continue
         if len(row) != 4:
-            raise InputError(
-                tr("The line has {n} values").format(n=len(row)),
-                where=where,
-                advice=tr("Each line needs the image and x, y and radius of the circle in pixels"),
-            )
+            needed = tr("The line has {n} values, not image, x, y and radius")
+            raise _wrong_line(needed.format(n=len(row)), where)
         # The table contains paths of the computer on which it was made.
         name = PureWindowsPath(PurePosixPath(row[0]).name).name
         paths = (folder / name, folder / "images" / name)
@@ -174,21 +171,12 @@ def _rows(table: Path, columns: tuple[str, ...]) -> list[tuple[int, Mapping[str,
     reader = csv.DictReader(io.StringIO(_text(table)), skipinitialspace=True)
     missing = [name for name in columns if name not in (reader.fieldnames or ())]
     if missing:
-        raise InputError(
-            tr("The table has no column {name}").format(name=missing[0]),
-            where=str(table),
-            advice=tr("A calibration with balls needs the columns {names}").format(
-                names=", ".join(columns)
-            ),
-        )
+        raise _unusable(tr("The table has no column {name}").format(name=missing[0]), table)
     rows: list[tuple[int, Mapping[str, str]]] = []
     for row in reader:
         if any(row[name] is None for name in columns):
-            raise InputError(
-                tr("The line has too few values"),
-                where=f"{table}, {tr('line {n}').format(n=reader.line_num)}",
-                advice=tr("Correct or remove this line"),
-            )
+            where = f"{table}, {tr('line {n}').format(n=reader.line_num)}"
+            raise _wrong_line(tr("The line has too few values"), where)
         rows.append((reader.line_num, row))
     return rows
 
@@ -197,11 +185,7 @@ def _text(table: Path) -> str:
     try:
         return read_file(table, TABLE_LIMIT).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(
-            tr("The file is not text in UTF-8"),
-            where=str(table),
-            advice=tr("Save the table as CSV in UTF-8"),
-        ) from error
+        raise _unusable(tr("The file is not text in UTF-8"), table) from error
 
 
 def _label(path: Path) -> PlacedCircle:
@@ -210,18 +194,14 @@ def _label(path: Path) -> PlacedCircle:
         label = read_arrays(path, ("center", "radius"))
         x, y = label["center"].astype(np.float64).ravel()
         radius = float(label["radius"].astype(np.float64).reshape(()))
+        if not all(map(math.isfinite, (x, y, radius))) or radius <= 0.0:
+            raise ValueError(radius)
     except (FileNotFoundError, ValueError, KeyError) as error:
         raise InputError(
             tr("The label contains no circle (center, radius)"),
             where=str(path),
             advice=tr("Label the image again, or remove this file"),
         ) from error
-    if not all(map(math.isfinite, (x, y, radius))) or radius <= 0.0:
-        raise InputError(
-            tr("The circle of the label is not valid"),
-            where=str(path),
-            advice=tr("Label the image again, or remove this file"),
-        )
     return PlacedCircle(float(x), float(y), radius)
 
 
@@ -229,21 +209,14 @@ def _inside(folder: Path, name: str, where: str) -> Path:
     """Return a file or folder that a table names, which must be inside its folder."""
     path = folder / PureWindowsPath(name).as_posix()
     if not path.resolve().is_relative_to(folder.resolve()):
-        raise InputError(
-            tr("The line names a path outside the folder: {name}").format(name=brief(name)),
-            where=where,
-            advice=tr("Put the images into the folder and correct the table"),
-        )
+        found = tr("The line names a path outside the folder: {name}")
+        raise _wrong_line(found.format(name=brief(name)), where)
     return path
 
 
 def _image(path: Path, where: str) -> Path:
     if not path.is_file():
-        raise InputError(
-            tr("The image {path} does not exist").format(path=path),
-            where=where,
-            advice=tr("Copy the whole calibration folder, or remove this line"),
-        )
+        raise _wrong_line(tr("The image {path} does not exist").format(path=path), where)
     return path
 
 
@@ -265,11 +238,6 @@ def _number(value: object, where: str, low: float, high: float) -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not low <= number <= high:
-        raise InputError(
-            tr("{value} is not a number from {low:g} to {high:g}").format(
-                value=brief(value, 40), low=low, high=high
-            ),
-            where=where,
-            advice=tr("Correct this value"),
-        )
+        found = tr("{value} is not a number from {low:g} to {high:g}")
+        raise _wrong_line(found.format(value=brief(value, 40), low=low, high=high), where)
     return number

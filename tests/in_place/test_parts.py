@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -178,3 +179,52 @@ def test_a_pin_grid_gives_the_scale() -> None:
     assert abs(found.mm_per_px - 2.0 / spacing_px) < 4.0 * found.sd_mm_per_px
     with pytest.raises(InputError, match="no regular grid"):
         scale_from_pins([background], background, spacing_mm=2.0)
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.25, 0.7])
+@pytest.mark.parametrize("size", [(320, 240), (1280, 960)])
+def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states(
+    size: tuple[int, int], aspect: float
+) -> None:
+    width, height = size
+    region = (width // 9, height // 5, width // 2, height // 3)
+    grid = WorkingGrid(ImageSize(*size), 0.02, aspect, region)
+    v, u = np.mgrid[:height, :width].astype(np.float32)
+    nodes, table = grid.reduce(np.stack([u, v, u], axis=-1)), grid.table()
+    inner = np.s_[1:-1, 1:-1]  # outside of the outermost pixels' centres nothing is known
+    assert nodes.shape[:2] == grid.shape
+    assert np.abs(nodes[..., 0] - table.u_px)[inner].max() < 1e-3
+    assert np.abs(nodes[..., 1] - table.v_px)[inner].max() < 0.02 * grid.step_px[1]
+    assert np.diff(grid.x_mm) == pytest.approx(grid.pitch_mm)
+    assert np.diff(grid.y_mm) == pytest.approx(grid.pitch_mm)
+    pixel = np.array([[region[0] + 3.0, region[1] + 7.0]])
+    middle = 0.5 * (np.array(size) - 1.0)  # of the whole image
+    place = (pixel - middle) * [0.02, 0.02 * aspect]
+    assert grid.to_pixels(place) == pytest.approx(pixel)
+    node = grid.on_nodes(Circle(*pixel[0], 9.0))
+    assert grid.x_mm[0] + node.x * grid.pitch_mm == pytest.approx(place[0, 0])
+    assert grid.y_mm[0] + node.y * grid.pitch_mm == pytest.approx(place[0, 1])
+    back = grid.in_image(node)
+    assert (back.x, back.y, back.radius) == pytest.approx((*pixel[0], 9.0))
+
+
+@pytest.mark.parametrize(
+    "region", [(300, 10, 21, 100), (0, 200, 100, 41), (10, 10, 31, 100), (-1, 0, 100, 100)]
+)
+def test_a_region_that_cannot_hold_a_press_is_refused(
+    region: tuple[int, int, int, int],
+) -> None:
+    with pytest.raises(
+        InputError, match=r"is not inside the image of 320 x 240 pixels or too small"
+    ):
+        WorkingGrid(ImageSize(320, 240), 0.1, region_px=region)
+
+
+def test_a_grid_of_square_pixels_and_the_whole_image_is_named_as_in_earlier_programs() -> None:
+    usual = WorkingGrid(ImageSize(320, 240), 0.1)
+    assert repr(usual) == "WorkingGrid(image=ImageSize(width=320, height=240), mm_per_px=0.1)"
+    others = [
+        replace(usual, aspect=2.0),
+        replace(usual, region_px=(0, 0, 320, 239)),
+    ]
+    assert len({repr(grid) for grid in (usual, *others)}) == 3

@@ -144,11 +144,15 @@ def in_place_arrays(c: InPlaceCalibration) -> dict[str, NDArray[Any]]:
 def in_place_entry(c: InPlaceCalibration) -> dict[str, Any]:
     """Return the manifest entries of a closed sensor's calibration."""
     model = c.in_place
+    grid = model.grid
+    usual = WorkingGrid(grid.image, grid.mm_per_px)
+    unusual = {} if grid == usual else {"aspect": grid.aspect, "region_px": grid.region_px}
     return {
         "sensor": {"serial": c.sensor.serial},
         "camera": {"width": c.camera.width, "height": c.camera.height},
         "in_place": {
-            "mm_per_px": model.grid.mm_per_px,
+            "mm_per_px": grid.mm_per_px,
+            **unusual,
             "scale_sd": model.scale_sd,
             "steepest_slope": model.steepest,
             "follow_gain": model.follow_gain,
@@ -177,7 +181,10 @@ def read_in_place(
     size = ImageSize(camera["width"], camera["height"])
     if not all(type(n) is int and 32 <= n <= 20_000 for n in (size.width, size.height)):
         raise ValueError("the image size is not possible")
-    grid = WorkingGrid(size, _number(entry["mm_per_px"], 1e-5, 100.0))
+    scale, aspect = _number(entry["mm_per_px"], 1e-5, 100.0), entry.get("aspect", 1.0)
+    region = entry.get("region_px")
+    cut: Any = None if region is None else tuple(map(int, region))
+    grid = WorkingGrid(size, scale, _number(aspect, 1e-7, 1e7), cut)
     errors = ErrorCurve(
         arrays["error_slopes"],
         arrays["error_slope_sd"],

@@ -1,0 +1,128 @@
+"""Images in which the membrane is only a part, and cameras whose pixels are not square."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.measure.press_check import to_image
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
+from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import Session, read_session
+
+Image = NDArray[Any]
+LEFT, TOP, RIGHT, BOTTOM = 60, 9, 12, 35
+"""Widths of the housing around the membrane: its middle is not that of the image."""
+
+
+def in_housing(image: Image) -> Image:
+    """Return an image with a housing around it that mirrors the membrane."""
+    return cv2.copyMakeBorder(image, TOP, BOTTOM, LEFT, RIGHT, cv2.BORDER_REFLECT)
+
+
+def changed(folder: Path, into: Path, change: Callable[[Image], Image], stated: str) -> Session:
+    """Return a copy of a session with all images changed and `stated` in [in_place]."""
+    shutil.copytree(folder, into)
+    for path in [*(into / "background").iterdir(), *(into / "balls").iterdir()]:
+        assert cv2.imwrite(str(path), change(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)))
+    text = (into / "session.toml").read_text()
+    lines = [line for line in text.splitlines() if not line.startswith("mm_per_px")]
+    (into / "session.toml").write_text(
+        "\n".join(lines).replace("[in_place]", f"[in_place]\n{stated}") + "\n"
+    )
+    return read_session(into)
+
+
+def scale_of(session: Session) -> float:
+    """Return the stated size of a pixel on the membrane."""
+    assert session.in_place is not None and isinstance(session.in_place.stated_scale, float)
+    return session.in_place.stated_scale
+
+
+@pytest.fixture(scope="module")
+def housed_session(
+    closed_folder: Path, closed_session: Session, tmp_path_factory: pytest.TempPathFactory
+) -> Session:
+    """Return the closed sensor's session with a housing around the membrane."""
+    width, height = closed_session.averaged("background").size
+    stated = f"mm_per_px = {scale_of(closed_session)}\nmm_per_px_sd = 0.0001\n"
+    stated += f"region_px = [{LEFT}, {TOP}, {width}, {height}]"
+    into = tmp_path_factory.mktemp("housed") / "session"
+    return changed(closed_folder, into, in_housing, stated)
+
+
+def test_a_region_gives_the_depth_of_the_membrane_alone_at_the_places_of_the_whole_image(
+    housed_session: Session, closed_run: InPlaceRun, closed_session: Session, tmp_path: Path
+) -> None:
+    run = calibrate_closed_session(housed_session)
+    path = tmp_path / "housed.gplcal"
+    write_calibration(run.calibration, path)
+    calibration = read_calibration(path)
+    assert calibration.identity == run.calibration.identity != closed_run.calibration.identity
+    name = run.result.presses[0].name
+    whole = housed_session.image(housed_session.folder / "balls" / name).rgb
+    alone = closed_session.image(closed_session.folder / "balls" / name).rgb
+    found = Reconstructor(calibration).depth(whole, uncertainty=True)
+    wanted = Reconstructor(closed_run.calibration).depth(alone)
+    assert np.array_equal(found.depth_mm, wanted.depth_mm)
+    assert found.depth_sd_mm is not None
+    # The middle of the membrane is this far from the middle of the image, in pixels.
+    shift = 0.5 * np.array([LEFT - RIGHT, TOP - BOTTOM]) * scale_of(closed_session)
+    assert found.x_mm == pytest.approx(wanted.x_mm + shift[0], abs=1e-6)
+    assert found.y_mm == pytest.approx(wanted.y_mm + shift[1], abs=1e-6)
+    table = calibration.table
+    assert (table.u_px[0, 0], table.v_px[0, 0]) == pytest.approx((LEFT, TOP), abs=1e-3)
+    ball = run.result.presses[0].ball
+    place = np.array([run.calibration.balls[0][1:3]])
+    assert to_image(place, calibration)[0] == pytest.approx((ball.x + LEFT, ball.y + TOP))
+
+
+def test_a_region_beyond_the_image_is_refused(housed_session: Session) -> None:
+    assert housed_session.in_place is not None
+    beyond = replace(housed_session.in_place, region_px=(LEFT, TOP, 10_000, 60))
+    with pytest.raises(InputError, match="is not inside the image"):
+        calibrate_closed_session(replace(housed_session, in_place=beyond))
+
+
+@pytest.fixture(scope="module")
+def squeezed_session(
+    closed_folder: Path, closed_session: Session, tmp_path_factory: pytest.TempPathFactory
+) -> Session:
+    """Return the closed sensor's session as a camera with fewer rows of taller pixels sees it."""
+    width, height = closed_session.averaged("background").size
+
+    def squeeze(image: Image) -> Image:
+        return cv2.resize(image, (width, height * 4 // 5), interpolation=cv2.INTER_AREA)
+
+    scale = scale_of(closed_session)
+    stated = f"mm_per_px = [{scale}, {1.25 * scale}]\nmm_per_px_sd = 0.0001"
+    return changed(closed_folder, tmp_path_factory.mktemp("tall") / "session", squeeze, stated)
+
+
+def test_pixels_that_are_not_square_give_a_metric_map(
+    squeezed_session: Session, closed_run: InPlaceRun, tmp_path: Path
+) -> None:
+    run = calibrate_closed_session(squeezed_session)
+    path = tmp_path / "tall.gplcal"
+    write_calibration(run.calibration, path)
+    name = run.result.presses[0].name
+    image = squeezed_session.image(squeezed_session.folder / "balls" / name).rgb
+    found = Reconstructor(read_calibration(path)).depth(image)
+    assert np.diff(found.y_mm) == pytest.approx(np.diff(found.x_mm)[0])
+    assert found.depth_mm.shape == closed_run.result.model.grid.shape
+    for (_, *ball), (_, *wanted) in zip(
+        run.calibration.balls, closed_run.calibration.balls, strict=True
+    ):
+        assert ball == pytest.approx(wanted, abs=0.15)
+    ratios = [press.held_out.diameter_ratio for press in run.result.presses]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.03)
