@@ -39,6 +39,7 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import Session
+from gelpolight_core.set_up import judge_set_up
 from gelpolight_core.translation import tr
 
 
@@ -171,12 +172,15 @@ class SetupForm(QScrollArea):
         known = values.preset != OTHER and not values.optics
         self.values.rows.setRowVisible(self.facts, known or values.source == "stated")
         try:
-            session_of(self.session, values)
+            sensor = session_of(self.session, values).sensor
+            unusual = () if not values.optics else judge_set_up(sensor)
         except InputError as error:
+            unusual = ()
             problem = f"{error.found}. {error.advice}."
         if not values.serial.strip():
             problem = tr("Enter a serial number for the sensor.")
-        self.problem.setText(problem)
+        warnings = (f"{found.stated}. {found.remedy}." for found in unusual)
+        self.problem.setText(problem or " ".join(warnings))
         self.accept.setEnabled(not problem)
 
     def _build_boards(self) -> QGroupBox:

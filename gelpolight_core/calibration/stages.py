@@ -52,6 +52,7 @@ from gelpolight_core.sensor_calibration import (
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.images import require_colour
 from gelpolight_core.session.session import Session
+from gelpolight_core.set_up import judge_set_up, judge_set_up_by_pose
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -138,6 +139,11 @@ def _run_lights(session: Session, results: StageResults, _progress: Progress) ->
         plane_distance_sd_mm=pose.distance_sd_mm,
         plane_normal_sd_rad=float(np.radians(pose.normal_sd_deg)),
     )
+    poor = (
+        *judge_set_up(session.sensor),
+        *judge_set_up_by_pose(session.sensor, lens.camera, pose.plane, lights.led_positions_mm),
+    )
+    lights = replace(lights, quality=QualityTable((*lights.quality.figures, *poor)))
     crosstalk = find_crosstalk(spots, _single_led(session, lens))
     return replace(results, lights=lights, crosstalk=crosstalk)
 

@@ -1,0 +1,115 @@
+"""The cause that explains most findings of a calibration, shown in place of their remedies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from gelpolight_core.finding import Finding, QualityTable, Verdict
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One mistake, and the findings that it moves.
+
+    Attributes
+    ----------
+    key : str
+        Name for scripts.
+    remedy : str
+        What to do about it, as a sentence without a full stop.
+    moves : frozenset of str
+        Keys of the findings.
+    """
+
+    key: str
+    remedy: str
+    moves: frozenset[str]
+
+
+BALLS = ("lowest_cosine", "press_dirt_percent", "press_radius_percent")
+HEIGHTS = ("ball_height_error_percent", "depth_sd_percent")
+MODEL = ("scatter_percent", "factor_spread_percent", "gloss")
+"""Light that no reflectance curve explains: it is fitted as gloss and as an uneven membrane."""
+CAUSES = (
+    Cause(
+        "led_height",
+        tr("Check the LED height"),
+        frozenset({*MODEL, "led_in_view", "led_outside_elastomer", "worst_misfit_percent"}),
+    ),
+    Cause(
+        "refractive_index",
+        tr("Check the refractive index of the elastomer"),
+        frozenset({*HEIGHTS, "stated_index"}),
+    ),
+    Cause(
+        "thickness",
+        tr("Check the thickness of the elastomer"),
+        frozenset({*HEIGHTS, "led_outside_elastomer"}),
+    ),
+    Cause(
+        "ball_radius",
+        tr("Check that the radii of the balls are stated, not their diameters"),
+        frozenset({*BALLS, *HEIGHTS, *MODEL}),
+    ),
+    Cause(
+        "working_diameter",
+        tr("Check the working diameter"),
+        frozenset({"field_over_view", "led_in_view", "whiteboard_unlit_percent"}),
+    ),
+    Cause(
+        "square_size",
+        tr("Check the square size of the board on the top surface"),
+        frozenset({*HEIGHTS, "field_over_view", "press_radius_percent", "reprojection_rms"}),
+    ),
+    Cause(
+        "membrane",
+        tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
+        frozenset({"factor_spread_percent", "membrane_unusable_percent"}),
+    ),
+    Cause(
+        "focus",
+        tr("Focus the lens on the top surface, and calibrate again"),
+        frozenset({"blur", "edge_width", "reprojection_rms", "held_out_rms"}),
+    ),
+)
+
+
+def ranked_causes(findings: Iterable[Finding]) -> tuple[Cause, ...]:
+    """Return the causes of two or more poor findings, the best explanation first.
+
+    A cause is better, the more poor findings it moves, less the ones that it would move and that
+    are not poor.
+
+    Parameters
+    ----------
+    findings : iterable of Finding
+        Of all stages of a calibration.
+    """
+    poor = {finding.key for finding in findings if finding.verdict is not Verdict.PASS}
+
+    def agreement(cause: Cause) -> int:
+        return len(cause.moves & poor) - len(cause.moves - poor)
+
+    likely = [cause for cause in CAUSES if len(cause.moves & poor) > 1]
+    return tuple(sorted(likely, key=agreement, reverse=True))
+
+
+def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]:
+    """Return the remedy of a calibration's most likely cause, and the findings that follow from it.
+
+    Parameters
+    ----------
+    quality : mapping of str to QualityTable
+        Of every stage.
+
+    Returns
+    -------
+    remedy : str
+        Empty if no cause explains two findings.
+    keys : frozenset of str
+        Findings whose own remedies are not shown.
+    """
+    causes = ranked_causes(finding for table in quality.values() for finding in table.figures)
+    return (causes[0].remedy, causes[0].moves) if causes else ("", frozenset())

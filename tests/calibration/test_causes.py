@@ -1,0 +1,37 @@
+"""One wrong number of the set-up moves many figures: the number itself is named first."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.causes import CAUSES, explained
+from gelpolight_core.session.session import read_session
+
+
+@pytest.mark.parametrize(
+    ("cause", "number", "factor"),
+    [
+        ("led_height", r"(led_height_mm = )([\d.]+)", 5.0 / 13.7),
+        ("refractive_index", r"(elastomer_refractive_index = )([\d.]+)", 1.0 / 1.41),
+        ("thickness", r"(elastomer_thickness_mm = )([\d.]+)", 0.5),
+        ("working_diameter", r"(working_diameter_mm = )([\d.]+)", 40.0 / 26.0),
+        ("ball_radius", r"(default = |\.png\" = )([\d.]+)", 2.0),
+    ],
+)
+def test_the_number_that_is_wrong_is_the_first_cause(
+    small_session: Path, tmp_path: Path, cause: str, number: str, factor: float
+) -> None:
+    folder = tmp_path / "session"
+    shutil.copytree(small_session, folder)
+    path = folder / "session.toml"
+    text, count = re.subn(number, lambda m: f"{m[1]}{float(m[2]) * factor:.4f}", path.read_text())
+    assert count
+    path.write_text(text)
+    remedy, follow = explained(calibrate_session(read_session(folder)).calibration.quality)
+    assert remedy == next(known.remedy for known in CAUSES if known.key == cause)
+    assert len(follow) > 1
