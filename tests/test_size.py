@@ -50,7 +50,7 @@ MOST = {
     "gelpolight_core/calibration": 3528,
     "gelpolight_core/design": 295,
     "gelpolight_core/design_check": 320,
-    "gelpolight_core/export": 629,
+    "gelpolight_core/export": 619,
     "gelpolight_core/factors": 192,
     "gelpolight_core/health": 1112,
     "gelpolight_core/image": 391,

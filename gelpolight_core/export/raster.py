@@ -31,16 +31,7 @@ GREY_LEVELS = 65_535
 """Largest 16-bit value, as one value is reserved for unknown depths."""
 NPZ_MAPS = ("depth_mm", "normals", *SD_MAPS)
 NPZ_NUMBERS = ("pitch_mm", "lateral_per_mm", *SENSOR_NUMBERS)
-NPZ_TEXTS = (
-    "calibration_id",
-    "model",
-    "source",
-    "notes",
-    "finding_keys",
-    "faults",
-    "doubts",
-    "flag_names",
-)
+NPZ_TEXTS = ("calibration_id", "model", "source", "notes", "faults", "doubts", "flag_names")
 NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags")
 LEAST_STEP_MM = 1e-6
 """Step for a map with constant depth."""
@@ -96,9 +87,8 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         "calibration_id": np.array(heightmap.calibration_id),
         "model": np.array(heightmap.model),
         "source": np.array(heightmap.source),
-        "notes": np.array([english(found.text) for found in heightmap.findings], dtype=np.str_),
+        "notes": np.array(list(map(_note, heightmap.findings)), dtype=np.str_),
         "faults": np.array([english(found.text) for found in heightmap.doubts], dtype=np.str_),
-        "finding_keys": np.array([found.key for found in heightmap.findings], dtype=np.str_),
         "lateral_per_mm": np.float64(heightmap.lateral_per_mm),
     }
     if heightmap.normals is not None:
@@ -138,7 +128,7 @@ def read_npz(path: Path) -> HeightMap:
         texts = {name: stored[name].tolist() for name in NPZ_TEXTS if name in stored}
         # Files of one earlier state of the program have the faults under another name.
         faults = [*texts.pop("faults", ()), *texts.pop("doubts", ())]
-        findings = _findings(texts.pop("notes", []), faults, texts.pop("finding_keys", []))
+        findings = _findings(texts.pop("notes", []), faults)
         if not {*texts.pop("flag_names", ())} <= {*flag_names()}:
             raise ValueError("flag_names")
         values: dict[str, Any] = {"normals": None}
@@ -156,18 +146,20 @@ def read_npz(path: Path) -> HeightMap:
     return heightmap
 
 
-def _findings(notes: list[str], faults: list[str], keys: list[str]) -> tuple[Finding, ...]:
-    """Return the findings of a file; older ones have no keys, and faults that are not notes."""
-    texts = tuple(dict.fromkeys((*notes, *faults)))
-    known = dict(zip(notes, keys, strict=False))
+def _note(finding: Finding) -> str:
+    return finding.line if finding.remedy else english(finding.text)
+
+
+def _findings(notes: list[str], faults: list[str]) -> tuple[Finding, ...]:
+    """Return the findings of a file, which holds their texts."""
     return tuple(
         Finding(
-            known.get(text, "note"),
+            "note",
             text_of_file(text),
             verdict=Verdict.WARN if text in faults else Verdict.PASS,
             heights=Heights.DOUBTFUL if text in faults else Heights.STATED,
         )
-        for text in texts
+        for text in dict.fromkeys((*notes, *faults))
     )
 
 
