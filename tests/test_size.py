@@ -27,7 +27,7 @@ NO_CODE = {
 MOST = {
     "app/.": 171,
     "app/bench": 252,
-    "app/calibrate": 6484,
+    "app/calibrate": 6488,
     "app/cameras": 606,
     "app/command_line": 2050,
     "app/context": 407,
@@ -47,7 +47,7 @@ MOST = {
     "app/workspace": 727,
     "gelpolight_core/.": 925,
     "gelpolight_core/batch": 608,
-    "gelpolight_core/calibration": 3528,
+    "gelpolight_core/calibration": 3534,
     "gelpolight_core/design": 295,
     "gelpolight_core/design_check": 320,
     "gelpolight_core/export": 619,
