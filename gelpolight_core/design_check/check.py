@@ -43,12 +43,6 @@ VEIL_WARN, VEIL_FAIL = 0.05, 0.2
 """Light reflected by the lower face brightens shadows; a fit of one light per channel reads a veil
 of 5 % as a slope of 3 degrees."""
 
-BLOCKED_FAIL = 0.01
-
-_GRID_CELLS = 81
-_VEIL_CELLS = 31
-_OUTLINE_POINTS = 48
-
 
 @dataclass(frozen=True, slots=True)
 class DesignCheckResult:
@@ -98,7 +92,7 @@ def check_design(design: SensorDesign) -> DesignCheckResult:
     """
     validate_design(design)
     radius_mm = 0.5 * design.membrane.working_diameter_mm
-    cells = np.linspace(-radius_mm, radius_mm, _GRID_CELLS)
+    cells = np.linspace(-radius_mm, radius_mm, 81)
     x, y = np.meshgrid(cells, cells)
     outside = np.hypot(x, y) > radius_mm
     condition = light_condition(design, x, y)
@@ -180,7 +174,7 @@ def blocked_pixels(design: SensorDesign) -> tuple[NDArray[np.bool_], float]:
     camera = design.camera
     rays = trace_pixels(camera, design.layers)
     working = np.hypot(rays.x_mm, rays.y_mm) <= 0.5 * design.membrane.working_diameter_mm
-    angle = np.linspace(0.0, 2.0 * math.pi, _OUTLINE_POINTS, endpoint=False)
+    angle = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
     radius = 0.5 * design.ring.body_diameter_mm
     body = np.zeros((camera.height_px, camera.width_px), dtype=np.uint8)
     for led in design.leds:
@@ -210,7 +204,7 @@ def veil_share(design: SensorDesign) -> float:
         The sensor.
     """
     layers, radius_mm = design.layers, 0.5 * design.membrane.working_diameter_mm
-    cells = np.linspace(-radius_mm, radius_mm, _VEIL_CELLS)
+    cells = np.linspace(-radius_mm, radius_mm, 31)
     x, y = (a[np.hypot(*np.meshgrid(cells, cells)) <= radius_mm] for a in np.meshgrid(cells, cells))
     direct = flat_irradiance(design, x, y)
     path_mm = 2.0 * (layers.elastomer_thickness_mm + layers.window_thickness_mm)
@@ -332,7 +326,7 @@ def _blocked_figure(share: float) -> Finding:
         100.0 * share,
         "%",
         warn=0.0,
-        fail=100.0 * BLOCKED_FAIL,
+        fail=1.0,
         remedy=tr("Move the LEDs outward, use smaller ones, or reduce the working diameter"),
     )
 

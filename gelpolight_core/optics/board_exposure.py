@@ -17,11 +17,6 @@ Array = NDArray[np.float64]
 
 # Ten steps of an 8-bit image: below this, rounding alone moves an edge by 1/20 pixel.
 MIN_CONTRAST = 10.0 / 255.0
-# The camera may have clipped values from here on. An edge wider than 1/200 of the image resolves
-# fewer than 100 line pairs across it, too few for a depth map.
-MAX_EDGE_OF_WIDTH = 1.0 / 200.0
-# Three pixels are sharp enough for any fit, however small the image.
-MAX_EDGE_AT_LEAST_PX = 3.0
 # 10 % to 90 % of an edge blurred by a Gaussian of sd 1.
 EDGE_OF_SIGMA = 2.563
 
@@ -99,7 +94,9 @@ def edge_limit_px(width_px: int) -> float:
     width_px : int
         Width of the image.
     """
-    return max(MAX_EDGE_AT_LEAST_PX, MAX_EDGE_OF_WIDTH * width_px)
+    # An edge wider than 1/200 of the image resolves fewer than 100 line pairs across it, too few
+    # for a depth map. Three pixels are sharp enough for any fit, however small the image.
+    return max(3.0, width_px / 200.0)
 
 
 def sharpest_edge_px(grey: NDArray[np.float32]) -> float:

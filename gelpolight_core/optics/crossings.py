@@ -115,7 +115,7 @@ def fit_crossings(
 
 
 def _fit_shapes(
-    grey: NDArray[np.float32], shape: Array, radius: Array, *, free_blur: bool, rounds: int = 12
+    grey: NDArray[np.float32], shape: Array, radius: Array, *, free_blur: bool
 ) -> tuple[Array, Array]:
     """Improve shapes (N, 5) in windows of the given radii until no centre moves; and amplitudes."""
     base = np.zeros_like(shape)
@@ -126,7 +126,7 @@ def _fit_shapes(
     trust = np.ones(len(shape))
     local = shape - base
     step, amplitude, misfit = _propose(local, window, bound)
-    for _ in range(rounds):
+    for _ in range(12):
         trial = local + trust[:, None] * step
         trial[:, 4] = np.clip(trial[:, 4], _SIGMA_OF_PIXEL, radius)
         moved_px = np.abs(trial - local)[:, :2].max()

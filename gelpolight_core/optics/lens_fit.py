@@ -21,9 +21,6 @@ from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-_JACKKNIFE_GROUPS = 12
-_FLAGS = cv2.CALIB_FIX_K3
-
 
 @dataclass(frozen=True, slots=True)
 class LensFit:
@@ -153,7 +150,7 @@ def solve_lens(
     LensFit or None
         None if OpenCV finds the views degenerate.
     """
-    flags = _FLAGS
+    flags = cv2.CALIB_FIX_K3
     matrix, distortion = np.eye(3), np.zeros(5)
     if start is not None:
         flags |= cv2.CALIB_USE_INTRINSIC_GUESS
@@ -209,7 +206,7 @@ def hold_out(
     HeldOutViews
         Without the groups whose remaining views are degenerate.
     """
-    groups = min(len(seen), _JACKKNIFE_GROUPS)
+    groups = min(len(seen), 12)
     group_of = np.arange(len(seen)) % groups
     values = []
     view_rms = np.full(len(seen), np.nan)

@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 MIN_NORMAL_SPREAD_DEG = 5.0
 # A focal length error of 1 % makes every length of the sensor wrong by 1 %.
 MAX_FOCAL_SD = 0.01
-COVERAGE_CELLS = (6, 8)
 
 
 def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
@@ -86,7 +85,7 @@ def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray
     """
     corners = np.concatenate([view.corners_px for view in seen]) + 0.5
     counts, _, _ = np.histogram2d(
-        corners[:, 1], corners[:, 0], bins=COVERAGE_CELLS, range=[(0, size[1]), (0, size[0])]
+        corners[:, 1], corners[:, 0], bins=(6, 8), range=[(0, size[1]), (0, size[0])]
     )
     return counts.astype(np.int64)
 

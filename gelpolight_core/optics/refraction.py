@@ -113,7 +113,7 @@ def radius_on_membrane(tangent_in_air: Array, stack: LayerStack) -> tuple[Array,
     return radius, tangent
 
 
-def tangent_in_air(radius_mm: Array, stack: LayerStack, *, tolerance_mm: float = 1e-12) -> Array:
+def tangent_in_air(radius_mm: Array, stack: LayerStack) -> Array:
     """Return the tangent in air of the ray that meets the top surface at `radius_mm`.
 
     Newton's method on the concave, monotone :func:`radius_on_membrane`: a start below the root
@@ -125,8 +125,6 @@ def tangent_in_air(radius_mm: Array, stack: LayerStack, *, tolerance_mm: float =
         Distance from the foot of the perpendicular.
     stack : LayerStack
         The layers.
-    tolerance_mm : float, optional
-        Largest accepted error of the radius.
     """
     radius = np.asarray(radius_mm, dtype=np.float64)
     # The paraxial slope is the steepest, so its estimate lies below the root.
@@ -135,7 +133,7 @@ def tangent_in_air(radius_mm: Array, stack: LayerStack, *, tolerance_mm: float =
     for _ in range(60):
         value, _ = radius_on_membrane(tangent, stack)
         error = value - radius
-        if not np.any(np.abs(error) > tolerance_mm):
+        if not np.any(np.abs(error) > 1e-12):
             break
         tangent = np.maximum(tangent - error / _radius_slope(tangent, stack), 0.0)
     return tangent

@@ -29,8 +29,6 @@ from gelpolight_core.studies.trial import (
 )
 
 Change = Callable[[Calibration], dict[str, Any]]
-HOLED_UM = 8.0
-"""As of bad pixels: a hole of 1 mm beside a press of 1 mm."""
 
 
 def calibration_cases() -> list[Case]:
@@ -66,7 +64,8 @@ def _standard() -> tuple[Calibration, FullModel]:
 
 def _with(calibration: Calibration, *, needs: tuple[Flag, ...] = ()) -> Seen:
     known = KnownSensor(standard_sensor().sensor, calibration)
-    return judged(known, standard_press(), HOLED_UM, needs=needs)
+    # As of bad pixels: a hole of 1 mm beside a press of 1 mm.
+    return judged(known, standard_press(), 8.0, needs=needs)
 
 
 def _hole(field: str) -> Seen:

@@ -32,9 +32,6 @@ Change = Callable[[Map], NDArray[Any]]
 BAD_PIXELS = 40
 SPOILT_UM = 8.0
 """Of 40 bad pixels, a twentieth of a per cent, on a press of 1 mm."""
-SAME_UM = 1.0
-BESIDE_UM = 2.0
-"""Effect of the skipped field beside a contact, root mean square."""
 HIDDEN_MM = 1.0
 BAD_VALUES = {
     "nan": np.nan,
@@ -169,11 +166,12 @@ def _kind(make: Change) -> Seen:
     """Reconstruct other number types, which must give the usual depth."""
     known, press = standard_sensor(), standard_press()
     frame = make(press.frame)
-    seen = judged(known, press, BESIDE_UM, frame=frame)
+    # Effect of the skipped field beside a contact, root mean square.
+    seen = judged(known, press, 2.0, frame=frame)
     solver = Reconstructor(known.calibration)
     apart = solver.depth(frame).depth_mm - solver.depth(press.frame).depth_mm
     apart_um = rms_um(apart.astype(np.float64))
-    modes = tuple(replace(mode, right=mode.right and apart_um < SAME_UM) for mode in seen.modes)
+    modes = tuple(replace(mode, right=mode.right and apart_um < 1.0) for mode in seen.modes)
     summary = f"{seen.summary}; {apart_um:.2f} um from the usual number type"
     return replace(seen, summary=summary, modes=modes)
 

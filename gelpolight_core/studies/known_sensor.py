@@ -30,8 +30,6 @@ from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
 
 Map = NDArray[np.float32]
-# Of an exact calibration: far below the noise of any camera.
-MISFIT = 0.002
 LEAST_COSINE = 0.02
 
 
@@ -135,6 +133,7 @@ def exact_calibration(
     background = np.maximum(unmix(raw, mixing), 0.0).astype(np.float32)
     shot, read = design.camera.shot_variance, design.camera.read_sd
     middle = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
+    # Of an exact calibration: far below the noise of any camera.
     return Calibration(
         sensor=stated,
         model="full",
@@ -155,7 +154,7 @@ def exact_calibration(
             membrane=exact_membrane(design),
             background=background,
             decay_mm=design.membrane.decay_length_mm,
-            misfit=MISFIT,
+            misfit=0.002,
             held_out=(0.0, 0.0),
             kept="mirror",
         ),
