@@ -26,7 +26,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.user import user_name
-from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 

@@ -8,14 +8,12 @@ from pathlib import Path
 from app.command_line.common import stage_progress
 from app.command_line.reconstructing import add_model, load_reconstructor
 from app.command_line.terminal import say
+from gelpolight_core.batch.presses import measure_presses
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.measurement.evaluation_report import evaluation_table
-from gelpolight_core.measurement.evaluation_run import evaluate_presses
-from gelpolight_core.measurement.press_pool import measure_folder
-from gelpolight_core.measurement.presses import open_ledger, press_measurement
-from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
-from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
+from gelpolight_core.measurement.protocol_run import presses_folder
 from gelpolight_core.report.evaluation import write_evaluation_files
 from gelpolight_core.translation import tr
 
@@ -44,28 +42,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Measure every press, write the report's files and print the table."""
     reconstructor = load_reconstructor(options.calibration, model=options.model)
-    presses = presses_folder(options.presses)
-    read_truth(presses)  # before a folder is created for nothing
-    crossing = crossing_of(presses)
+    presses = presses_folder(options.presses)  # before a folder is created for nothing
     make_folder(options.output)
-    ledger = open_ledger(None, reconstructor)
+    measure = press_measurement(reconstructor)
     with stage_progress() as progress:
         if options.workers > 1:
-            measure_folder(
+            outcomes = measure_presses(
                 presses,
                 options.calibration,
-                ledger,
                 model=options.model,
                 workers=options.workers,
                 progress=progress,
             )
-        evaluation = evaluate_presses(
-            presses,
-            press_measurement(reconstructor),
-            progress=progress,
-            crossing=crossing,
-            ledger=ledger,
-        )
+            evaluation = evaluate_presses(presses, lambda image, _shape: outcomes[image.name])
+        else:
+            evaluation = evaluate_presses(presses, measure, progress=progress)
     written = write_evaluation_files(
         evaluation, options.output, calibration=reconstructor.calibration
     )
@@ -74,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     if len(evaluation.failed) == len(evaluation.results):
         raise InputError(
             tr("None of the {n} presses could be measured ({reason})").format(
-                n=len(evaluation.results), reason=evaluation.failed[0].failure.rstrip(".")
+                n=len(evaluation.results), reason=str(evaluation.failed[0].outcome).rstrip(".")
             ),
             where=str(presses),
             advice=tr("Check that the calibration belongs to this sensor"),

@@ -24,10 +24,10 @@ from gelpolight_core.io.atomic import write_json
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES
+from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.result import Comparison, Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Tool, ToolResult, result_as_dict
 from gelpolight_core.measurement.trust import judged
-from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 

@@ -15,10 +15,8 @@ from gelpolight_core.calibration.any_session import calibrate_any
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import refuse_unwritable
-from gelpolight_core.measurement.evaluation_run import evaluate_presses
-from gelpolight_core.measurement.presses import press_measurement
-from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
-from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
+from gelpolight_core.measurement.protocol_run import presses_folder
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import calibration_report, run_report
@@ -77,10 +75,7 @@ def _presses(given: Path | None) -> Path | None:
             where=str(given),
             advice=tr("Give the folder that contains truth.csv and its images"),
         )
-    presses = presses_folder(given)
-    read_truth(presses)
-    crossing_of(presses)
-    return presses
+    return presses_folder(given)
 
 
 def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report:
@@ -117,5 +112,4 @@ def _validate(
     if presses is None:
         return None
     measure = press_measurement(Reconstructor(calibration))
-    crossing = crossing_of(presses)
-    return validation_of(evaluate_presses(presses, measure, progress=progress, crossing=crossing))
+    return validation_of(evaluate_presses(presses, measure, progress=progress))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.live.overlay import Line, Marker, Overlay, Role
 from app.measure.placing import kind_label
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.protocol import PressWanted
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.steadiness import find_contact
 from gelpolight_core.optics.refraction import membrane_to_camera
@@ -50,7 +50,7 @@ class Target:
 
     Attributes
     ----------
-    press : PressWanted
+    press : Press
         The requested press.
     outline_px : (N, 2)
         Closed outline of the object's face.
@@ -62,7 +62,7 @@ class Target:
         Scale there.
     """
 
-    press: PressWanted
+    press: Press
     outline_px: Array
     circle_px: Array
     centre_px: tuple[float, float]
@@ -79,7 +79,7 @@ class Target:
         return Overlay(markers=(marker,), lines=lines)
 
 
-def make_target(press: PressWanted, calibration: AnyCalibration) -> Target:
+def make_target(press: Press, calibration: AnyCalibration) -> Target:
     """Return a press in image coordinates, through the calibration of the sensor."""
     centre = np.array(press.position_mm)
     one_mm = to_image(centre + np.array([[-0.5, 0.0], [0.5, 0.0]]), calibration)
@@ -166,7 +166,7 @@ class PressCheck:
         return PressSeen(target.overlay("good"), tr("Hold it still."), at_mark=True)
 
 
-def _face(press: PressWanted) -> Array:
+def _face(press: Press) -> Array:
     half = 0.5 * press.truth.size_mm
     if press.truth.shape == "cylinder":
         return _circle(half)

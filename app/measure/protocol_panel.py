@@ -21,7 +21,8 @@ from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
-from gelpolight_core.measurement.protocol import SAME_REGION, PressWanted
+from gelpolight_core.measurement.press import Press
+from gelpolight_core.measurement.protocol import SAME_REGION
 from gelpolight_core.measurement.protocol_run import RunProgress
 from gelpolight_core.measurement.result import Measurement, compare
 from gelpolight_core.translation import tr
@@ -139,7 +140,7 @@ class RunPanel(QWidget):
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         return table
 
-    def show_press(self, press: PressWanted | None, repeats: int) -> None:
+    def show_press(self, press: Press | None, repeats: int) -> None:
         """Show the next press. None: all are done."""
         if press is None:
             self.title.setText(tr("All presses are done"))
@@ -181,7 +182,7 @@ class RunPanel(QWidget):
         self.take_back.setEnabled(progress.done > 0)
         self.evaluate.setEnabled(progress.done > 0)
 
-    def show_measured(self, press: PressWanted, outcome: Measurement | str) -> None:
+    def show_measured(self, press: Press, outcome: Measurement | str) -> None:
         """Add a measured press to the top of the list."""
         texts = [_press_name(press), tr("not measured"), ""]
         tip = outcome if isinstance(outcome, str) else outcome.reason
@@ -210,14 +211,14 @@ class RunPanel(QWidget):
                     item.setForeground(theme.colour("warn"))
 
 
-def region_name(press: PressWanted) -> str:
+def region_name(press: Press) -> str:
     """Return the name of a press's region for the user."""
     if press.region == SAME_REGION:
         return tr("Same region")
     return tr("Random region {n}").format(n=press.region.removeprefix("r").lstrip("0"))
 
 
-def _press_name(press: PressWanted) -> str:
+def _press_name(press: Press) -> str:
     truth = press.truth
     return tr("{shape} {size:g} x {height:g}, {region}").format(
         shape=kind_label(truth.shape),

@@ -24,10 +24,10 @@ from gelpolight_core.measurement.evaluation import (
     RANDOM,
     SAME,
     Evaluation,
-    PressResult,
-    dimension_mm,
+    errors_by_dimension,
     region_kinds,
 )
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.translation import tr
 
 # Colours of Okabe and Ito for the light and the dark theme. The symbols differ, too.
@@ -81,12 +81,12 @@ class Fig13(QWidget):
         parts = [
             f"<span style='color:{_colour(shape).name()}'>{WORDS[shape]}</span> {kind_label(shape)}"
             for shape in COLOURS
-            if any(r.press.truth.shape == shape for r in evaluation.results)
+            if any(r.truth.shape == shape for r in evaluation.results)
         ]
         parts.append(tr("bars: mean, whiskers: one standard deviation, dashes: the paper's mean"))
         self.legend.setText("&nbsp;&nbsp;&nbsp;".join(parts))
 
-    def _panel(self, results: Sequence[PressResult], direction: str, regions: str) -> pg.PlotWidget:
+    def _panel(self, results: Sequence[Press], direction: str, regions: str) -> pg.PlotWidget:
         plot = without_menus(
             pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False), background=theme.colour("base"))
         )
@@ -96,7 +96,7 @@ class Fig13(QWidget):
             plot.getAxis(name).setPen(theme.colour("line"))
             plot.getAxis(name).setTextPen(text)
             plot.getAxis(name).enableAutoSIPrefix(False)
-        dimensions = sorted({dimension_mm(r, direction) for r in results})
+        dimensions, bars = errors_by_dimension(results, direction)
         plot.getAxis("bottom").setTicks([[(k, f"{d:g}") for k, d in enumerate(dimensions)]])
         across = tr("diameter or side (mm)") if direction == "planar" else tr("height (mm)")
         plot.setLabel("bottom", across, color=text.name())
@@ -105,19 +105,10 @@ class Fig13(QWidget):
         words = {SAME: tr("same region"), RANDOM: tr("random regions")}.get(regions)
         plot.setTitle(title if words is None else f"{title}, {words}", color=text.name())
         top = PAPER_PERCENT[direction]
-        for k, (shape, sign) in enumerate(SIGNS.items()):
-            for centre, dimension in enumerate(dimensions):
-                found = np.array(
-                    [
-                        abs(r.error_percent(direction))
-                        for r in results
-                        if r.press.truth.shape == shape and dimension_mm(r, direction) == dimension
-                    ]
-                )
-                errors = found[np.isfinite(found)]
-                if errors.size:
-                    _bar(plot, centre + (k - 0.5) * BAR_WIDTH * 1.1, errors, _colour(shape), sign)
-                    top = max(top, float(errors.max()))
+        for (shape, place), errors in bars.items():
+            centre = place + (list(SIGNS).index(shape) - 0.5) * BAR_WIDTH * 1.1
+            _bar(plot, centre, errors, _colour(shape), SIGNS[shape])
+            top = max(top, float(errors.max()))
         dashes = pg.mkPen(text, width=1.2, dash=[5, 4])
         plot.addItem(pg.InfiniteLine(PAPER_PERCENT[direction], angle=0, pen=dashes))
         plot.setMouseEnabled(x=False, y=False)

@@ -28,7 +28,7 @@ from app.sources.processor import Failure
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox
 from app.widgets.naming import named
-from gelpolight_core.measurement.protocol import PressWanted
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.steadiness import judge_press
 from gelpolight_core.translation import tr
 
@@ -51,7 +51,7 @@ class BenchHand:
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
-        self._laid: PressWanted | None = None
+        self._laid: Press | None = None
 
     def lift(self) -> None:
         """Remove everything from the sensor."""
@@ -59,7 +59,7 @@ class BenchHand:
         if self._bench.scene.item != "bare":
             self._bench.lay("bare")
 
-    def press(self, wanted: PressWanted) -> None:
+    def press(self, wanted: Press) -> None:
         """Press an object in, once."""
         if wanted == self._laid:
             return

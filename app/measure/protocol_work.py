@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,17 +12,16 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from app.services.jobs import Job, Jobs
+from gelpolight_core import __version__
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
 from gelpolight_core.measurement.evaluation import Evaluation
-from gelpolight_core.measurement.evaluation_run import evaluate_presses, measure_press
+from gelpolight_core.measurement.evaluation_run import Outcome, evaluate_presses, press_measurement
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.presses import open_ledger, press_measurement
-from gelpolight_core.measurement.protocol import PressWanted
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.protocol_run import ProtocolRun
-from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.evaluation import write_evaluation_files
 from gelpolight_core.translation import tr
@@ -73,7 +73,8 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
         )
     lock = RunLock(run.folder)
     try:
-        ledger = open_ledger(run.folder / LEDGER, reconstructor)
+        name = f"{made.identity} {made.verdict} {reconstructor.model} {__version__}"
+        ledger = Ledger(run.folder / LEDGER, name)
         return Equipped(run, reconstructor, ledger, lock)
     except BaseException:
         lock.release()
@@ -86,7 +87,7 @@ class ProtocolWork(QObject):
     Signals
     -------
     measured(object, object)
-        A PressWanted, and its Measurement or the sentence why there is none.
+        A Press, and its Measurement or the sentence why there is none.
     changed()
         The next press or the number of measured ones changed.
     evaluated(object)
@@ -110,8 +111,10 @@ class ProtocolWork(QObject):
         super().__init__(parent)
         self._equipped = equipped
         self.run = equipped.run
-        self._measure_press = press_measurement(equipped.reconstructor)
-        self._outcomes: dict[str, Measurement | str] = {}
+        self._outcome_of = partial(
+            equipped.ledger.outcome, measure=press_measurement(equipped.reconstructor)
+        )
+        self._outcomes: dict[str, Outcome] = {}
         self._jobs = Jobs("protocol", self)
         self._jobs.progressed.connect(self.busy)
         self._jobs.refused.connect(self.refused)
@@ -132,7 +135,7 @@ class ProtocolWork(QObject):
             if press.file not in self._outcomes:
                 self._measure(press)
 
-    def accept(self, press: PressWanted, frames: Sequence[NDArray[Any]]) -> bool:
+    def accept(self, press: Press, frames: Sequence[NDArray[Any]]) -> bool:
         """Save a press and measure it. Return whether it was written to disk."""
         if not self._on_disk(lambda: self.run.accept(press, frames)):
             return False
@@ -140,7 +143,7 @@ class ProtocolWork(QObject):
         self.changed.emit()
         return True
 
-    def refuse(self, press: PressWanted, reason: str) -> None:
+    def refuse(self, press: Press, reason: str) -> None:
         """Count a refused press."""
         self._on_disk(lambda: self.run.refuse(press, reason))
         self.changed.emit()
@@ -157,12 +160,7 @@ class ProtocolWork(QObject):
         """Compare all presses with their true values, after the running measurements."""
         self._do(
             tr("Evaluating"),
-            lambda: evaluate_presses(
-                self.run.presses,
-                self._measure_press,
-                crossing=self.run.protocol.crossing,
-                ledger=self._equipped.ledger,
-            ),
+            lambda: evaluate_presses(self.run.presses, self._outcome_of),
             self.evaluated.emit,
         )
 
@@ -219,18 +217,17 @@ class ProtocolWork(QObject):
             self._jobs.close()
             self.gone.emit()
 
-    def _measure(self, press: PressWanted) -> None:
-        image, shape, ledger = self.run.image(press), press.truth.shape, self._equipped.ledger
+    def _measure(self, press: Press) -> None:
+        image, shape = self.run.image(press), press.truth.shape
 
-        def done(outcome: Measurement | str) -> None:
+        def done(outcome: Outcome) -> None:
             # It may have been discarded meanwhile.
             if press in self.run.done:
                 self._outcomes[press.file] = outcome
                 self.measured.emit(press, outcome)
                 self.changed.emit()
 
-        measure = self._measure_press
-        self._do(tr("Measuring"), lambda: measure_press(image, shape, measure, ledger), done)
+        self._do(tr("Measuring"), lambda: self._outcome_of(image, shape), done)
 
     def _on_disk(self, change: Callable[[], object]) -> bool:
         """Change the run. Return whether it was written to disk."""

@@ -34,8 +34,8 @@ from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
+from gelpolight_core.measurement.statistics import Statistics, statistics_of
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.statistics import Statistics, statistics_of
 from gelpolight_core.translation import tr
 
 IMAGE_WIDTH = 130

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.atomic import write_text
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.measurement.profile import Profile
 
 COLUMNS = ("along_mm", "x_mm", "y_mm", "depth_mm", "depth_sd_mm", "flags", "line")
@@ -32,15 +31,12 @@ def write_profiles(profiles: Mapping[int, Profile], path: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows = []
     for number, profile in profiles.items():
         sd = profile.depth_sd_mm
         for k, (x, y) in enumerate(profile.points_mm.tolist()):
             spread = math.nan if sd is None else float(sd[k])
             lengths = (float(profile.along_mm[k]), x, y, float(profile.depth_mm[k]), spread)
             cells = [f"{v:.6f}" if math.isfinite(v) else "" for v in lengths]
-            writer.writerow([*cells, int(profile.flags[k]), number])
-    data = stream.getvalue().encode()
-    write_atomically(path, lambda file: file.write(data))
+            rows.append([*cells, int(profile.flags[k]), number])
+    write_text(path, csv_text(COLUMNS, rows))

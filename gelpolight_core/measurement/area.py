@@ -76,6 +76,22 @@ class Rectangle:
         y = self.centre_mm[1] + sin * along_mm + cos * across_mm
         return np.stack([x, y], axis=-1)
 
+    def from_centre(self, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
+        """Return how far points (...) lie from the centre, along and across the first side."""
+        cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
+        dx, dy = x_mm - self.centre_mm[0], y_mm - self.centre_mm[1]
+        return cos * dx + sin * dy, cos * dy - sin * dx
+
+    def too_few(self, nodes: int) -> InputError:
+        """Return the error for a rectangle with too few nodes of a map."""
+        return InputError(
+            tr("the rectangle contains {n} points of the map").format(n=nodes),
+            where=tr("rectangle at ({x:g}, {y:g}) mm").format(
+                x=self.centre_mm[0], y=self.centre_mm[1]
+            ),
+            advice=tr("Make it larger, or move it into the working area"),
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class AreaNodes:
@@ -126,12 +142,7 @@ def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
     columns = np.flatnonzero((heightmap.x_mm >= low[0]) & (heightmap.x_mm <= high[0]))
     rows = np.flatnonzero((heightmap.y_mm >= low[1]) & (heightmap.y_mm <= high[1]))
     x, y = np.meshgrid(heightmap.x_mm[columns], heightmap.y_mm[rows])
-    yaw = math.radians(rectangle.yaw_deg)
-    dx, dy = x - rectangle.centre_mm[0], y - rectangle.centre_mm[1]
-    along, across = (
-        math.cos(yaw) * dx + math.sin(yaw) * dy,
-        math.cos(yaw) * dy - math.sin(yaw) * dx,
-    )
+    along, across = rectangle.from_centre(x, y)
     depth = heightmap.depth_mm[np.ix_(rows, columns)].astype(np.float64)
     flags = heightmap.flags[np.ix_(rows, columns)]
     inside = (np.abs(along) <= 0.5 * rectangle.sides_mm[0] + slack) & (
@@ -139,11 +150,5 @@ def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
     )
     inside &= ((flags & int(Flag.OUTSIDE)) == 0) & np.isfinite(depth)
     if int(inside.sum()) < LEAST_NODES:
-        raise InputError(
-            tr("the rectangle contains {n} points of the map").format(n=int(inside.sum())),
-            where=tr("rectangle at ({x:g}, {y:g}) mm").format(
-                x=rectangle.centre_mm[0], y=rectangle.centre_mm[1]
-            ),
-            advice=tr("Make it larger, or move it into the working area"),
-        )
+        raise rectangle.too_few(int(inside.sum()))
     return AreaNodes(x[inside], y[inside], depth[inside], flags[inside])

@@ -45,7 +45,6 @@ CENTRE_NODES = 0.1
 radius to one node."""
 ROUNDS = 3
 """Of a rectangle."""
-LEAST_POINTS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +243,7 @@ def _edge_offsets(
     least = max(FLAT_SHARE * float(np.median(top)), LEAST_SLOPE)
     index, found = _half_slope(steep, best, deeper_first=smooth[:, 0] > smooth[:, -1])
     there = inner & (top > least) & found
-    if int(there.sum()) < LEAST_POINTS:
+    if int(there.sum()) < 5:
         raise InputError(
             tr("there is no edge near the drawn shape"),
             where=tr("steepest slope"),

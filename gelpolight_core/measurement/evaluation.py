@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gelpolight_core.measurement.result import Measurement, Truth, compare
-from gelpolight_core.measurement.truth import PressTruth
+from gelpolight_core.measurement.press import LENGTHS, Press
+from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.statistics import Statistics, statistics_of
 from gelpolight_core.translation import tr
 
 PAPER_PERCENT = {"planar": 5.0, "depth": 8.0}
 """Mean errors that the paper reports for random regions."""
-DIRECTIONS = ("planar", "depth")
+DIRECTIONS = tuple(LENGTHS)
 SAME, RANDOM, ALL = "same region", "random regions", "all"
 
 
@@ -53,55 +55,6 @@ class Crossing:
 
 
 @dataclass(frozen=True, slots=True)
-class PressResult:
-    """One press: its truth, and its measurement or why there is none.
-
-    Attributes
-    ----------
-    press : PressTruth
-        The row of ``truth.csv``.
-    measurement : Measurement or None
-        None where it could not be measured.
-    failure : str
-        Why not; empty otherwise.
-    planar_percent, depth_percent : float
-        Signed errors of size and height; NaN without a measurement.
-    """
-
-    press: PressTruth
-    measurement: Measurement | None
-    failure: str
-    planar_percent: float
-    depth_percent: float
-
-    def error_percent(self, direction: str) -> float:
-        """Return the error in the ``planar`` or ``depth`` direction."""
-        return self.planar_percent if direction == "planar" else self.depth_percent
-
-
-@dataclass(frozen=True, slots=True)
-class Statistic:
-    """Errors of a group of presses.
-
-    Attributes
-    ----------
-    count : int
-        Measured presses.
-    mean_absolute_percent, mean_percent, sd_percent : float
-        NaN where there are too few.
-    lowest_percent, highest_percent : float
-        Extremes of the signed errors.
-    """
-
-    count: int
-    mean_absolute_percent: float
-    mean_percent: float
-    sd_percent: float
-    lowest_percent: float
-    highest_percent: float
-
-
-@dataclass(frozen=True, slots=True)
 class Group:
     """A statistic and what it is of.
 
@@ -115,15 +68,15 @@ class Group:
         Nominal size (planar) or height (depth); None: all.
     regions : str
         ``same region``, ``random regions`` or ``all``.
-    statistic : Statistic
-        The errors.
+    statistic : Statistics
+        The errors in percent.
     """
 
     direction: str
     shape: str
     dimension_mm: float | None
     regions: str
-    statistic: Statistic
+    statistic: Statistics
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +104,7 @@ class Evaluation:
 
     Attributes
     ----------
-    results : tuple of PressResult
+    results : tuple of Press
         Every press that has a true size, measured or not.
     groups : tuple of Group
         Statistics by direction, shape, dimension and regions.
@@ -163,14 +116,14 @@ class Evaluation:
         Which presses count in which direction; None: all in both.
     """
 
-    results: tuple[PressResult, ...]
+    results: tuple[Press, ...]
     groups: tuple[Group, ...]
     repeatability: tuple[Repeatability, ...]
     skipped: tuple[str, ...] = ()
     crossing: Crossing | None = None
 
     @property
-    def failed(self) -> tuple[PressResult, ...]:
+    def failed(self) -> tuple[Press, ...]:
         """The presses that could not be measured."""
         return tuple(result for result in self.results if result.measurement is None)
 
@@ -183,27 +136,25 @@ class Evaluation:
             failed=len(self.failed), all=len(self.results)
         )
 
-    def overall(self, direction: str) -> Statistic:
-        """Return the statistic of all presses that count in one direction."""
-        return _statistic([r.error_percent(direction) for r in self.series(direction)])
+    def overall(self, direction: str) -> Statistics:
+        """Return the statistics of all presses that count in one direction."""
+        return statistics_of(press.error_percent(direction) for press in self.series(direction))
 
-    def series(
-        self, direction: str, results: Sequence[PressResult] | None = None
-    ) -> tuple[PressResult, ...]:
+    def series(self, direction: str, results: Sequence[Press] | None = None) -> tuple[Press, ...]:
         """Return those of `results` (by default all) that count in one direction.
 
         Parameters
         ----------
         direction : str
             ``planar`` or ``depth``.
-        results : sequence of PressResult, optional
+        results : sequence of Press, optional
             To choose from.
         """
         return _series(self.results if results is None else results, direction, self.crossing)
 
 
 def evaluate(
-    rows: Sequence[PressTruth],
+    rows: Sequence[Press],
     outcomes: Sequence[Measurement | str],
     *,
     skipped: Sequence[str] = (),
@@ -213,7 +164,7 @@ def evaluate(
 
     Parameters
     ----------
-    rows : sequence of PressTruth
+    rows : sequence of Press
         What was pressed.
     outcomes : sequence of Measurement or str
         For every row its measurement, or why there is none.
@@ -222,49 +173,12 @@ def evaluate(
     crossing : Crossing, optional
         Of the series, where a protocol was pressed.
     """
-    results = tuple(_result(row, outcome) for row, outcome in zip(rows, outcomes, strict=True))
+    results = tuple(replace(row, outcome=o) for row, o in zip(rows, outcomes, strict=True))
     groups = _groups(results, crossing)
     return Evaluation(results, groups, _repeatability(results), tuple(skipped), crossing)
 
 
-def _result(row: PressTruth, outcome: Measurement | str) -> PressResult:
-    if isinstance(outcome, str):
-        return PressResult(row, None, outcome, math.nan, math.nan)
-    comparison = compare(outcome, row.truth)
-    return PressResult(
-        row, outcome, "", comparison.size_error_percent, comparison.height_error_percent
-    )
-
-
-def _statistic(errors: Iterable[float]) -> Statistic:
-    values = np.array([error for error in errors if math.isfinite(error)])
-    if values.size == 0:
-        return Statistic(0, *([math.nan] * 5))
-    return Statistic(
-        int(values.size),
-        float(np.abs(values).mean()),
-        float(values.mean()),
-        float(values.std(ddof=1)) if values.size > 1 else math.nan,
-        float(values.min()),
-        float(values.max()),
-    )
-
-
-def dimension_mm(result: PressResult, direction: str) -> float:
-    """Return the nominal dimension that a direction's error is sorted by.
-
-    Parameters
-    ----------
-    result : PressResult
-        A press.
-    direction : str
-        ``planar``: size; ``depth``: height.
-    """
-    truth = result.press.truth
-    return truth.size_mm if direction == "planar" else truth.height_mm
-
-
-def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]:
+def region_kinds(results: Sequence[Press]) -> dict[str, list[Press]]:
     """Sort presses into the paper's two series.
 
     An object pressed several times in one region belongs to "same region" there; an object pressed
@@ -273,15 +187,15 @@ def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]
 
     Parameters
     ----------
-    results : sequence of PressResult
+    results : sequence of Press
         All presses.
     """
-    kinds: dict[str, list[PressResult]] = {ALL: list(results)}
+    kinds: dict[str, list[Press]] = {ALL: list(results)}
     for presses in by_object(results).values():
-        regions: dict[str, list[PressResult]] = defaultdict(list)
+        regions: dict[str, list[Press]] = defaultdict(list)
         for result in presses:
-            if result.press.region:
-                regions[result.press.region].append(result)
+            if result.region:
+                regions[result.region].append(result)
         for region, here in regions.items():
             name = region.lower()
             if name != "random" and (name == "same" or len(here) > 1):
@@ -292,49 +206,70 @@ def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]
 
 
 def _series(
-    results: Sequence[PressResult], direction: str, crossing: Crossing | None
-) -> tuple[PressResult, ...]:
+    results: Sequence[Press], direction: str, crossing: Crossing | None
+) -> tuple[Press, ...]:
     if crossing is None:
         return tuple(results)
-    return tuple(r for r in results if crossing.holds(r.press.truth, direction))
+    return tuple(r for r in results if crossing.holds(r.truth, direction))
 
 
-def _groups(results: Sequence[PressResult], crossing: Crossing | None) -> tuple[Group, ...]:
+def _groups(results: Sequence[Press], crossing: Crossing | None) -> tuple[Group, ...]:
     groups: list[Group] = []
     for regions, everything in region_kinds(results).items():
         for direction in DIRECTIONS:
             presses = _series(everything, direction, crossing)
-            shapes = sorted({r.press.truth.shape for r in presses})
-            groups.append(_group(presses, direction, ALL, None, regions))
-            for shape in shapes:
-                own = [r for r in presses if r.press.truth.shape == shape]
-                groups.append(_group(own, direction, shape, None, regions))
-                for dimension in sorted({dimension_mm(r, direction) for r in own}):
-                    groups.append(_group(own, direction, shape, dimension, regions))
+            kinds: set[tuple[str, float | None]] = {(ALL, None)}
+            for press in presses:
+                kinds |= {(press.truth.shape, None)}
+                kinds |= {(press.truth.shape, press.true_mm(direction))}
+            for shape, dimension in sorted(kinds, key=lambda kind: (kind[0], kind[1] or 0.0)):
+                errors = [
+                    press.error_percent(direction)
+                    for press in presses
+                    if shape in (ALL, press.truth.shape)
+                    and dimension in (None, press.true_mm(direction))
+                ]
+                groups.append(Group(direction, shape, dimension, regions, statistics_of(errors)))
     return tuple(groups)
 
 
-def _group(
-    presses: Sequence[PressResult],
-    direction: str,
-    shape: str,
-    dimension: float | None,
-    regions: str,
-) -> Group:
-    chosen = [r for r in presses if dimension is None or dimension_mm(r, direction) == dimension]
-    statistic = _statistic(r.error_percent(direction) for r in chosen)
-    return Group(direction, shape, dimension, regions, statistic)
+def errors_by_dimension(
+    results: Sequence[Press], direction: str
+) -> tuple[list[float], dict[tuple[str, int], NDArray[np.float64]]]:
+    """Return the bars of the paper's Fig. 13.
+
+    Parameters
+    ----------
+    results : sequence of Press
+        Of one series.
+    direction : str
+        ``planar`` or ``depth``.
+
+    Returns
+    -------
+    dimensions_mm : list of float
+        Nominal sizes or heights.
+    errors_percent : dict
+        Absolute errors of each shape and index in `dimensions_mm`; no entry without a measurement.
+    """
+    dimensions = sorted({press.true_mm(direction) for press in results})
+    bars: dict[tuple[str, int], list[float]] = defaultdict(list)
+    for press in results:
+        if press.measurement is not None:
+            key = press.truth.shape, dimensions.index(press.true_mm(direction))
+            bars[key].append(abs(press.error_percent(direction)))
+    return dimensions, {key: np.array(errors) for key, errors in bars.items()}
 
 
-def by_object(results: Sequence[PressResult]) -> dict[Truth, list[PressResult]]:
+def by_object(results: Sequence[Press]) -> dict[Truth, list[Press]]:
     """Return the presses of each object."""
-    objects: dict[Truth, list[PressResult]] = defaultdict(list)
+    objects: dict[Truth, list[Press]] = defaultdict(list)
     for result in results:
-        objects[result.press.truth].append(result)
+        objects[result.truth].append(result)
     return objects
 
 
-def _repeatability(results: Sequence[PressResult]) -> tuple[Repeatability, ...]:
+def _repeatability(results: Sequence[Press]) -> tuple[Repeatability, ...]:
     """Return one-way analysis of variance with regions as groups, pooled over the objects."""
     found = []
     for direction in DIRECTIONS:
@@ -344,7 +279,7 @@ def _repeatability(results: Sequence[PressResult]) -> tuple[Repeatability, ...]:
     return tuple(found)
 
 
-def _variances(results: Sequence[PressResult], direction: str) -> tuple[float, float]:
+def _variances(results: Sequence[Press], direction: str) -> tuple[float, float]:
     """Return the variances (mm**2) within a region and between regions."""
     objects = [lengths_by_region(own, direction) for own in by_object(results).values()]
     within = variance_within([region for regions in objects for region in regions])
@@ -385,28 +320,22 @@ def variance_between(groups: Sequence[Sequence[float]], within: float) -> float:
     return float(np.var([np.mean(values) for values in groups], ddof=1)) - share * within
 
 
-def lengths_by_region(results: Iterable[PressResult], direction: str) -> list[list[float]]:
+def lengths_by_region(results: Iterable[Press], direction: str) -> list[list[float]]:
     """Return the measured lengths (mm) of an object, one list for each position.
 
     Parameters
     ----------
-    results : iterable of PressResult
+    results : iterable of Press
         Of one object; presses without a region or a measurement are left out.
     direction : str
         ``planar`` (its size) or ``depth`` (its height).
     """
     regions: dict[str, list[float]] = defaultdict(list)
     for result in results:
-        value = _measured_mm(result, direction)
+        value = result.measured_mm(direction)
         # "random" is not one position: two such presses are not repeats of each other.
-        if math.isfinite(value) and result.press.region:
-            name = result.press.region
-            key = f"{name} {result.press.file}" if name.lower() == "random" else name
+        if math.isfinite(value) and result.region:
+            name = result.region
+            key = f"{name} {result.file}" if name.lower() == "random" else name
             regions[key].append(value)
     return list(regions.values())
-
-
-def _measured_mm(result: PressResult, direction: str) -> float:
-    if result.measurement is None:
-        return math.nan
-    return result.measurement.size_mm if direction == "planar" else result.measurement.height_mm

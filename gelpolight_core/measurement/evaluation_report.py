@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
 from operator import methodcaller
 from pathlib import Path
 from typing import Any
@@ -20,17 +18,17 @@ from numpy.typing import NDArray
 
 from gelpolight_core.drawing_thread import in_drawing_thread
 from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
     PAPER_PERCENT,
     Evaluation,
     Group,
-    PressResult,
-    Statistic,
-    dimension_mm,
+    errors_by_dimension,
     region_kinds,
 )
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.translation import tr
 
 COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}
@@ -46,7 +44,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
     evaluation : Evaluation
         From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
     """
-    lines = [_press_head(evaluation), *(_press_line(evaluation, r) for r in evaluation.results)]
+    lines = list(_press_lines(evaluation))
     head = f"{'':44}{'n':>4}{'mean |e|':>10}{'mean':>9}{'sd':>8}{'lowest':>9}{'highest':>9}  (%)"
     lines += ["", head]
     lines += [_group_line(group) for group in evaluation.groups]
@@ -86,14 +84,14 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     """
     return {
         "paper_percent": dict(PAPER_PERCENT),
-        "overall": {d: _statistic_json(evaluation.overall(d)) for d in DIRECTIONS},
+        "overall": {d: evaluation.overall(d).as_json("percent") for d in DIRECTIONS},
         "groups": [
             {
                 "direction": group.direction,
                 "shape": group.shape,
                 "dimension_mm": group.dimension_mm,
                 "regions": group.regions,
-                **_statistic_json(group.statistic),
+                **group.statistic.as_json("percent"),
             }
             for group in evaluation.groups
         ],
@@ -105,7 +103,7 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
             }
             for gauge in evaluation.repeatability
         ],
-        "presses": [_press_values(result) for result in evaluation.results],
+        "presses": [press.as_row() for press in evaluation.results],
         "failed": len(evaluation.failed),
         "skipped": list(evaluation.skipped),
     }
@@ -161,11 +159,12 @@ def write_evaluation(evaluation: Evaluation, folder: Path) -> tuple[Path, ...]:
     InputError
         A file cannot be written.
     """
+    rows = [press.as_row() for press in evaluation.results]
     image = io.BytesIO()
     evaluation_figure(evaluation).savefig(image, format="png", dpi=150)
     contents = {
         "evaluation.txt": (evaluation_table(evaluation) + "\n").encode(),
-        "evaluation.csv": _csv_text(evaluation).encode(),
+        "evaluation.csv": csv_text(list(rows[0]), (row.values() for row in rows)).encode(),
         "evaluation.json": (
             json.dumps(evaluation_json(evaluation), indent=2, allow_nan=False) + "\n"
         ).encode(),
@@ -176,28 +175,25 @@ def write_evaluation(evaluation: Evaluation, folder: Path) -> tuple[Path, ...]:
     return tuple(folder / name for name in contents)
 
 
-def _press_head(evaluation: Evaluation) -> str:
-    width = _name_width(evaluation)
-    return (
+def _press_lines(evaluation: Evaluation) -> Iterator[str]:
+    """Yield the heads of the columns, then the presses."""
+    width = max(4, *(len(press.file) for press in evaluation.results))
+    yield (
         f"{'file':{width}}  {'shape':8}{'size':>8}{'measured':>10}{'error':>9}"
         f"{'height':>9}{'measured':>10}{'error':>9}  verdict"
     )
-
-
-def _press_line(evaluation: Evaluation, result: PressResult) -> str:
-    truth, measured = result.press.truth, result.measurement
-    start = f"{result.press.file:{_name_width(evaluation)}}  {truth.shape:8}"
-    if measured is None:
-        return f"{start}  " + tr("not measured: {reason}").format(reason=result.failure)
-    verdict = measured.verdict + (f": {measured.reason}" if measured.reason else "")
-    return (
-        f"{start}{truth.size_mm:8.2f}{measured.size_mm:10.3f}{result.planar_percent:+8.2f}%"
-        f"{truth.height_mm:9.2f}{measured.height_mm:10.3f}{result.depth_percent:+8.2f}%  {verdict}"
-    )
-
-
-def _name_width(evaluation: Evaluation) -> int:
-    return max(4, *(len(result.press.file) for result in evaluation.results))
+    for press in evaluation.results:
+        truth, measured = press.truth, press.measurement
+        line = f"{press.file:{width}}  {truth.shape:8}"
+        if measured is None:
+            yield f"{line}  " + tr("not measured: {reason}").format(reason=press.outcome)
+            continue
+        for true_mm, value_mm, error, form in (
+            (truth.size_mm, measured.size_mm, press.error_percent("planar"), "8.2f"),
+            (truth.height_mm, measured.height_mm, press.error_percent("depth"), "9.2f"),
+        ):
+            line += f"{true_mm:{form}}{value_mm:10.3f}{error:+8.2f}%"
+        yield f"{line}  {measured.verdict}" + (f": {measured.reason}" if measured.reason else "")
 
 
 def _group_line(group: Group) -> str:
@@ -205,9 +201,9 @@ def _group_line(group: Group) -> str:
     s = group.statistic
     return (
         f"{group.regions:16}{group.direction:8}{group.shape:10}{size:>10}{s.count:>4}"
-        f"{_number(s.mean_absolute_percent):>10}{_number(s.mean_percent, sign=True):>9}"
-        f"{_number(s.sd_percent):>8}{_number(s.lowest_percent, sign=True):>9}"
-        f"{_number(s.highest_percent, sign=True):>9}"
+        f"{_number(s.mean_absolute):>10}{_number(s.mean, sign=True):>9}"
+        f"{_number(s.sd):>8}{_number(s.lowest, sign=True):>9}"
+        f"{_number(s.highest, sign=True):>9}"
     )
 
 
@@ -221,58 +217,16 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _statistic_json(statistic: Statistic) -> dict[str, Any]:
-    return {name: _finite(value) for name, value in asdict(statistic).items()}
-
-
-def _press_values(result: PressResult) -> dict[str, Any]:
-    truth, measured = result.press.truth, result.measurement
-    return {
-        "file": result.press.file,
-        "shape": truth.shape,
-        "region": result.press.region,
-        "repeat": result.press.repeat,
-        "true_size_mm": truth.size_mm,
-        "size_mm": measured.size_mm if measured else None,
-        "size_sd_mm": measured.size_sd_mm if measured else None,
-        "planar_error_percent": _finite(result.planar_percent),
-        "true_height_mm": truth.height_mm,
-        "height_mm": measured.height_mm if measured else None,
-        "height_sd_mm": measured.sd["height_mm"] if measured else None,
-        "depth_error_percent": _finite(result.depth_percent),
-        "verdict": measured.verdict if measured else "not measured",
-        "reason": measured.reason if measured else result.failure,
-    }
-
-
-def _csv_text(evaluation: Evaluation) -> str:
-    text = io.StringIO()
-    rows = [_press_values(result) for result in evaluation.results]
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
-
-
-def _panel(axes: Axes, results: Sequence[PressResult], direction: str, regions: str) -> None:
+def _panel(axes: Axes, results: Sequence[Press], direction: str, regions: str) -> None:
     """Draw one direction of one series: bars by nominal dimension, one colour for each shape."""
-    dimensions = sorted({dimension_mm(r, direction) for r in results})
-    shapes = [shape for shape in COLOURS if any(r.press.truth.shape == shape for r in results)]
+    dimensions, bars = errors_by_dimension(results, direction)
+    shapes = [shape for shape in COLOURS if any(r.truth.shape == shape for r in results)]
     top = PAPER_PERCENT[direction]
-    for k, shape in enumerate(shapes):
-        offset = (k - (len(shapes) - 1) / 2.0) * BAR_WIDTH
-        for x, dimension in enumerate(dimensions):
-            errors = np.array(
-                [
-                    abs(r.error_percent(direction))
-                    for r in results
-                    if r.press.truth.shape == shape and dimension_mm(r, direction) == dimension
-                ]
-            )
-            errors = errors[np.isfinite(errors)]
-            if errors.size:
-                _bar(axes, x + offset, errors, COLOURS[shape])
-                top = max(top, float(errors.max()))
+    for (shape, x), errors in bars.items():
+        offset = (shapes.index(shape) - (len(shapes) - 1) / 2.0) * BAR_WIDTH
+        _bar(axes, x + offset, errors, COLOURS[shape])
+        top = max(top, float(errors.max()))
+    for shape in shapes:
         axes.bar(0.0, 0.0, color=COLOURS[shape], alpha=0.55, label=shape)
     axes.axhline(
         PAPER_PERCENT[direction],

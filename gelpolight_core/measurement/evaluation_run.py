@@ -6,22 +6,45 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.evaluation import Crossing, Evaluation, evaluate
-from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.evaluation import Evaluation, evaluate
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measurable import measurable_depth
+from gelpolight_core.measurement.press import read_truth
+from gelpolight_core.measurement.protocol_run import crossing_of
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.measurement.trust import judged
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
-Progress = Callable[[str, float], None]
+Outcome = Measurement | str
+"""A measurement, or the sentence why there is none."""
+
+
+def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, str], Measurement]:
+    """Return the function that measures the object of a given shape in an image file.
+
+    Parameters
+    ----------
+    reconstructor : Reconstructor
+        With the calibration under test, whose verdict is part of the measurement's.
+    """
+    calibration = reconstructor.calibration
+
+    def measure(path: Path, shape: str) -> Measurement:
+        image = read_image(path, response=calibration.response)
+        require_colour(image, where=str(path))
+        heightmap = measurable_depth(reconstructor, image.rgb, name=path.name, where=str(path))
+        return judged(measure_heightmap(heightmap, shape=shape), heightmap)
+
+    return measure
 
 
 def evaluate_presses(
     folder: Path,
-    measure: Callable[[Path, str], Measurement],
+    measure: Callable[[Path, str], Outcome],
     *,
-    progress: Progress | None = None,
-    crossing: Crossing | None = None,
-    ledger: Ledger | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Evaluation:
     """Measure every press of a folder with ``truth.csv`` and compare it with the truth.
 
@@ -29,14 +52,10 @@ def evaluate_presses(
     ----------
     folder : Path
         Images and ``truth.csv``.
-    measure : callable (image's path, shape) -> Measurement
-        From :func:`~gelpolight_core.measurement.presses.press_measurement`.
+    measure : callable (image's path, shape) -> Measurement or str
+        Such as :func:`press_measurement` returns.
     progress : callable, optional
         Called with the file name and the share done, 0..1.
-    crossing : Crossing, optional
-        Of the series, where a protocol was pressed.
-    ledger : Ledger, optional
-        What is written there is not measured again; what is measured is written there.
 
     Raises
     ------
@@ -54,45 +73,19 @@ def evaluate_presses(
             where=str(folder / "truth.csv"),
             advice=tr("Put the images beside truth.csv or take their rows out"),
         )
-    outcomes: list[Measurement | str] = []
+    outcomes: list[Outcome] = []
     for k, row in enumerate(table.rows):
         if progress is not None:
             progress(row.file, k / len(table.rows))
-        outcomes.append(measure_press(folder / row.file, row.truth.shape, measure, ledger))
+        outcomes.append(outcome_of(measure, folder / row.file, row.truth.shape))
     if progress is not None:
         progress("", 1.0)
-    return evaluate(table.rows, outcomes, skipped=table.skipped, crossing=crossing)
+    return evaluate(table.rows, outcomes, skipped=table.skipped, crossing=crossing_of(folder))
 
 
-def measure_press(
-    path: Path,
-    shape: str,
-    measure: Callable[[Path, str], Measurement],
-    ledger: Ledger | None = None,
-) -> Measurement | str:
-    """Measure the object in an image, or return as a sentence why it cannot be measured.
-
-    Parameters
-    ----------
-    path : Path
-        The image.
-    shape : str
-        What is pressed.
-    measure : callable (image's path, shape) -> Measurement
-        As for :func:`evaluate_presses`.
-    ledger : Ledger, optional
-        Holds what was measured before.
-    """
-    key = None if ledger is None else ledger.key(path, shape)
-    if ledger is not None and key is not None:
-        known = ledger.find(key)
-        if known is not None:
-            return known
-    outcome: Measurement | str
+def outcome_of(measure: Callable[[Path, str], Outcome], image: Path, shape: str) -> Outcome:
+    """Measure the object in an image, or return as a sentence why it cannot be measured."""
     try:
-        outcome = measure(path, shape)
+        return measure(image, shape)
     except InputError as error:  # a failed press is a result of the evaluation and does not stop it
-        outcome = error.text
-    if ledger is not None and key is not None:
-        ledger.keep(key, outcome)
-    return outcome
+        return error.text

@@ -17,9 +17,10 @@ from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.edges import fit_circle
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measured import Measured, length, map_errors, measured
-from gelpolight_core.measurement.profile import Profile, take_profile
+from gelpolight_core.measurement.profile import Profile
+from gelpolight_core.measurement.profile_tools import Section
 from gelpolight_core.measurement.roughness import ERROR_NODES, above_plane
-from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
+from gelpolight_core.measurement.tool import ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import joined, tr
 
@@ -86,7 +87,7 @@ class Pit:
 
 
 @dataclass(frozen=True, slots=True)
-class Scratch:
+class Scratch(Section):
     """A scratch or ridge that a section crosses.
 
     Attributes
@@ -97,13 +98,10 @@ class Scratch:
     """
 
     name: ClassVar[str] = "scratch"
-    start_mm: Point
-    end_mm: Point
-    width_mm: float = 0.0
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure height against the surroundings, and width at half of it."""
-        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        profile = self.profile(heightmap)
         there = _complete(profile)
         along, whole = profile.along_mm[there], float(profile.along_mm[-1])
         beside = (along < SURROUNDINGS * whole) | (along > (1.0 - SURROUNDINGS) * whole)
@@ -128,7 +126,7 @@ class Scratch:
 
 
 @dataclass(frozen=True, slots=True)
-class EdgeRadius:
+class EdgeRadius(Section):
     """The radius of a rounded edge or groove, from a section across the rounding.
 
     Attributes
@@ -139,13 +137,10 @@ class EdgeRadius:
     """
 
     name: ClassVar[str] = "edge-radius"
-    start_mm: Point
-    end_mm: Point
-    width_mm: float = 0.0
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Fit a circle to the section."""
-        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        profile = self.profile(heightmap)
         there = _complete(profile)
         along = profile.along_mm[there]
         circle = fit_circle(np.stack([along, profile.depth_mm[there]], axis=1))
@@ -175,23 +170,15 @@ class EdgeRadius:
 
 def _margin(nodes: AreaNodes, area: Rectangle) -> Mask:
     """Return which nodes lie in the margin of a rectangle."""
-    yaw = math.radians(area.yaw_deg)
-    dx, dy = nodes.x_mm - area.centre_mm[0], nodes.y_mm - area.centre_mm[1]
-    along = np.abs(math.cos(yaw) * dx + math.sin(yaw) * dy) / (0.5 * area.sides_mm[0])
-    across = np.abs(math.cos(yaw) * dy - math.sin(yaw) * dx) / (0.5 * area.sides_mm[1])
-    return np.asarray(np.maximum(along, across) > 1.0 - SURROUNDINGS)
+    along, across = area.from_centre(nodes.x_mm, nodes.y_mm)
+    shares = np.abs(along) / (0.5 * area.sides_mm[0]), np.abs(across) / (0.5 * area.sides_mm[1])
+    return np.asarray(np.maximum(*shares) > 1.0 - SURROUNDINGS)
 
 
 def _relief_of_area(nodes: AreaNodes, around: Mask, area: Rectangle) -> Array:
     """Return the height of nodes above the plane of the margin."""
     if min(int(around.sum()), int((~around).sum())) < LEAST_CORE:
-        raise InputError(
-            tr("the rectangle contains {n} points of the map").format(n=nodes.x_mm.size),
-            where=tr("rectangle at ({x:g}, {y:g}) mm").format(
-                x=area.centre_mm[0], y=area.centre_mm[1]
-            ),
-            advice=tr("Make it larger, or move it into the working area"),
-        )
+        raise area.too_few(nodes.x_mm.size)
     return above_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm, around)
 
 

@@ -36,11 +36,6 @@ CORNER_MM = 0.6
 """Pixels closer to a corner are not used: the strength alone does not describe the shape there."""
 MOST_ROUNDS = 6
 """Rounds of reweighting before a fit counts as not converged."""
-CORRELATION_SIZE = 250
-"""Pixels along a side of the map for the correlation of residuals."""
-FIT_TOLERANCE = 1e-4
-"""Relative change of the cost at which the fit of a round ends. The next round starts from
-there."""
 SURE = 2.0
 """Standard deviations by which another fillet must be more likely than a usual one."""
 SETTLED = 0.3
@@ -332,7 +327,8 @@ def correlated_pixels(residual_mm: Array) -> float:
         Residuals; NaN where there are none.
     """
     # A stride saves most of the time; correlations extend over many pixels.
-    stride = max(1, round(max(residual_mm.shape) / CORRELATION_SIZE))
+    # Pixels along a side of the map for the correlation of residuals.
+    stride = max(1, round(max(residual_mm.shape) / 250))
     residual_mm = residual_mm[::stride, ::stride]
     there = np.isfinite(residual_mm)
     values = np.where(there, residual_mm, 0.0)
@@ -426,7 +422,9 @@ def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array
         slopes[: scale.size, tilts[1]] = scale * (problem.y_mm - problem.centre_mm[1])
         return slopes
 
-    fit = fit_least_squares(residuals, jacobian, inside, (low, high), tolerance=FIT_TOLERANCE)
+    # Relative change of the cost at which the fit of a round ends. The next round starts from
+    # there.
+    fit = fit_least_squares(residuals, jacobian, inside, (low, high), tolerance=1e-4)
     assert fit.slopes is not None, "the fit is not robust in itself"
     return fit.x, fit.slopes, fit.converged
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,7 +52,7 @@ def describe_fit_problems(
         As for the fit.
     """
     reasons = [
-        _no_end(fit),
+        "" if fit.converged else tr("the fit did not converge"),
         _wrong_shape(shape, fit, window, region, edge),
         _wide(shape, fit),
         _odd_drape(fit),
@@ -74,8 +76,16 @@ def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> str:
     return tr("the contact leaves too little of the boundary free, so the height has no zero level")
 
 
-def _no_end(fit: FitResult) -> str:
-    return "" if fit.converged else tr("the fit did not converge")
+def residuals_of(
+    shapes: Iterable[str], window: WindowData, region: PressedRegion, edge: EdgePrior
+) -> dict[str, float]:
+    """Return the residual (mm, root mean square) of each shape after one round of its fit."""
+    return {
+        shape: fit_indenter(
+            MODELS[shape], window, MODELS[shape].start(region), edge=edge, most_rounds=1
+        ).residual_rms_mm
+        for shape in shapes
+    }
 
 
 def _wrong_shape(
@@ -89,13 +99,7 @@ def _wrong_shape(
     if share <= GOOD_RESIDUAL:
         return ""
     tried = [name for name in MODELS if name != "cuboid" or share > EDGED_RESIDUAL]
-    rivals = {
-        name: fit_indenter(
-            MODELS[name], window, MODELS[name].start(region), edge=edge, most_rounds=1
-        ).residual_rms_mm
-        for name in tried
-        if name != shape
-    }
+    rivals = residuals_of([name for name in tried if name != shape], window, region, edge)
     best = min(rivals, key=lambda name: rivals[name])
     if rivals[best] < BETTER_SHAPE * fit.residual_rms_mm:
         return tr(

@@ -18,26 +18,9 @@ from gelpolight_core.measurement.evaluation import (
     variance_between,
     variance_within,
 )
+from gelpolight_core.measurement.press import LENGTHS
 from gelpolight_core.measurement.result import Truth
-
-
-@dataclass(frozen=True, slots=True)
-class Series:
-    """Measured lengths of one object in one series of presses.
-
-    Attributes
-    ----------
-    count : int
-        Measured presses, or regions.
-    mean_mm : float
-        NaN without any.
-    sd_mm : float
-        Standard deviation; NaN where there are too few.
-    """
-
-    count: int
-    mean_mm: float
-    sd_mm: float
+from gelpolight_core.measurement.statistics import Statistics, statistics_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +33,11 @@ class GaugeRow:
         ``planar`` (its size) or ``depth`` (its height).
     truth : Truth
         The object.
-    same : Series
-        Repeats in one region, or in each of several: their sd about the region's mean is the
-        repeatability.
-    random : Series
+    same : Statistics
+        Repeats in one region, or in each of several, in mm.
+    repeatability_mm : float
+        Their standard deviation about the mean of their region.
+    random : Statistics
         One value for each of several regions: its press, or the mean of its repeats.
     reproducibility_mm : float
         Standard deviation between regions, in addition to the repeatability; NaN if one of the two
@@ -62,14 +46,15 @@ class GaugeRow:
 
     direction: str
     truth: Truth
-    same: Series
-    random: Series
+    same: Statistics
+    repeatability_mm: float
+    random: Statistics
     reproducibility_mm: float
 
     @property
     def true_mm(self) -> float:
         """The true length."""
-        return self.truth.size_mm if self.direction == "planar" else self.truth.height_mm
+        return float(getattr(self.truth, LENGTHS[self.direction]))
 
 
 def gauge_rows(evaluation: Evaluation) -> tuple[GaugeRow, ...]:
@@ -98,23 +83,14 @@ def _row(
     direction: str, truth: Truth, repeated: list[list[float]], regions: list[list[float]]
 ) -> GaugeRow:
     within = variance_within(repeated)
-    presses = [value for values in repeated for value in values]
-    means = [float(np.mean(values)) for values in regions]
     added = math.nan
-    if len(means) > 1 and math.isfinite(within):
+    if len(regions) > 1 and math.isfinite(within):
         added = math.sqrt(max(variance_between(regions, within), 0.0))
     return GaugeRow(
         direction,
         truth,
-        Series(len(presses), _mean(presses), math.sqrt(within)),
-        Series(len(means), _mean(means), _sd(means)),
+        statistics_of(value for values in repeated for value in values),
+        math.sqrt(within),
+        statistics_of(float(np.mean(values)) for values in regions),
         added,
     )
-
-
-def _mean(values: list[float]) -> float:
-    return float(np.mean(values)) if values else math.nan
-
-
-def _sd(values: list[float]) -> float:
-    return float(np.std(values, ddof=1)) if len(values) > 1 else math.nan

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
-from gelpolight_core.measurement.measure import SHAPES, measure_object
+from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Measurement
@@ -60,8 +60,8 @@ def measure_heightmap(
 def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:
     """Return the shape that is pressed."""
     proposal = propose(heightmap, seed_mm=seed_mm)
-    if proposal is not None and proposal.shape in SHAPES:
-        return proposal.shape
+    if proposal is not None and len(proposal.candidates) == 1:
+        return proposal.candidates[0]
     if proposal is None:
         found = tr("no ball, cylinder or cuboid is pressed")
     else:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,11 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import append_durably
 from gelpolight_core.io.reading import parse_json, plain_text, read_file
 from gelpolight_core.io.texts import text_of_file
+from gelpolight_core.measurement.evaluation_run import Outcome, outcome_of
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.translation import english, tr
 
 SIZE_LIMIT = 100_000_000
-PAIRS = ("side_mm", "centre_mm")
-SPREADS = ("sd", "noise_sd", "calibration_sd")
-"""Fields of a measurement that are arrays, and those that contain several values."""
 
 
 class Ledger:
@@ -33,8 +32,8 @@ class Ledger:
 
     Parameters
     ----------
-    path : Path or None
-        The file, made with the first line; None: nothing is written.
+    path : Path
+        The file, made with the first line.
     name : str
         What else the results depend on, such as the calibration's identity and the model.
 
@@ -44,11 +43,9 @@ class Ledger:
         If the file is there and cannot be read.
     """
 
-    def __init__(self, path: Path | None, name: str) -> None:
+    def __init__(self, path: Path, name: str) -> None:
         self._path, self._name = path, name
-        self._known: dict[str, Measurement | str] = {}
-        if path is None:
-            return
+        self._known: dict[str, Outcome] = {}
         try:
             lines = read_file(path, SIZE_LIMIT).decode().split("\n")
         except FileNotFoundError:
@@ -57,6 +54,32 @@ class Ledger:
             raise _damaged(path) from error
         for line in lines:
             self._take_in(line)
+
+    def outcome(self, image: Path, shape: str, measure: Callable[[Path, str], Outcome]) -> Outcome:
+        """Return the result of an image, which is measured and kept if it is not known.
+
+        Parameters
+        ----------
+        image : Path
+            The press.
+        shape : str
+            What is pressed.
+        measure : callable (image, shape) -> Measurement
+            As for :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
+
+        Raises
+        ------
+        InputError
+            If the file of the ledger cannot be written.
+        """
+        key = self.key(image, shape)
+        known = None if key is None else self.find(key)
+        if known is not None:
+            return known
+        outcome = outcome_of(measure, image, shape)
+        if key is not None:
+            self.keep(key, outcome)
+        return outcome
 
     def key(self, image: Path, shape: str) -> str | None:
         """Return what an image's result is found by; None where the image cannot be read."""
@@ -68,11 +91,11 @@ class Ledger:
         digest.update(f"\n{shape}\n{self._name}".encode())
         return digest.hexdigest()
 
-    def find(self, key: str) -> Measurement | str | None:
+    def find(self, key: str) -> Outcome | None:
         """Return a result: a measurement, a sentence why there is none, or None if not known."""
         return self._known.get(key)
 
-    def keep(self, key: str, outcome: Measurement | str) -> None:
+    def keep(self, key: str, outcome: Outcome) -> None:
         """Write a result to the end of the file.
 
         Raises
@@ -81,8 +104,6 @@ class Ledger:
             If the file cannot be written.
         """
         self._known[key] = outcome
-        if self._path is None:
-            return
         plain = english(outcome) if isinstance(outcome, str) else _as_json(outcome)
         line = json.dumps({"key": key, "outcome": plain}, separators=(",", ":")) + "\n"
         append_durably(self._path, line.encode())
@@ -122,17 +143,17 @@ def _as_json(measurement: Measurement) -> dict[str, Any]:
 
 
 def _measurement(content: dict[str, Any]) -> Measurement:
-    values: dict[str, Any] = {
-        key: tuple(v) if key in PAIRS and v else v for key, v in content.items()
-    }
-    for part in SPREADS:
-        values[part] = _spread(content[part])
+    values = {key: _restored(value) for key, value in content.items()}
+    for part in ("sd", "noise_sd", "calibration_sd", "mode_sd"):
+        if not isinstance(values.get(part), dict | None):
+            raise TypeError(f"{part} is no table")
     values["reason"] = text_of_file(content["reason"])
     values["outline_mm"] = np.array(content["outline_mm"], np.float64)
     return Measurement(**values)
 
 
-def _spread(content: dict[str, Any] | None) -> dict[str, Any] | None:
-    if content is None:
-        return None
-    return {key: tuple(v) if isinstance(v, list) else v for key, v in content.items()}
+def _restored(value: Any) -> Any:
+    """Return a value of JSON with tuples in place of lists."""
+    if isinstance(value, dict):
+        return {key: _restored(part) for key, part in value.items()}
+    return tuple(value) if isinstance(value, list) else value

@@ -20,13 +20,7 @@ from gelpolight_core.translation import tr
 Mask = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 Point = tuple[float, float]
-LEAST_NODES = 3
-MOST_NEAR_LINE = 1e-3
-"""Least area of the triangle of three points, relative to its longest side squared; below it, the
-points lie on a line."""
 LARGEST_MEDIAN = 15
-ROUNDS = 3
-"""Rounds of levelling without the object: each excludes points far from the previous plane."""
 FAR = 3.0
 """Standard deviations."""
 
@@ -89,8 +83,9 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     depth = heightmap.depth_mm.astype(np.float64)
     left = depth
-    for _ in range(ROUNDS if mask is None else 1):
-        if there.sum() < LEAST_NODES:
+    # Rounds of levelling without the object: each excludes points far from the previous plane.
+    for _ in range(3 if mask is None else 1):
+        if there.sum() < 3:
             raise InputError(
                 tr("fewer than three points have a depth"),
                 where=tr("levelling"),
@@ -128,7 +123,9 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     depth = depth_at(heightmap, positions[:, 0], positions[:, 1])
     (ax, ay), (bx, by) = positions[1] - positions[0], positions[2] - positions[0]
     longest = max(ax**2 + ay**2, bx**2 + by**2, 1e-12)
-    if not np.isfinite(depth).all() or abs(ax * by - ay * bx) < MOST_NEAR_LINE * longest:
+    # Least area of the triangle of three points, relative to its longest side squared; below it,
+    # the points lie on a line.
+    if not np.isfinite(depth).all() or abs(ax * by - ay * bx) < 1e-3 * longest:
         raise InputError(
             tr("the three points lie on a line, or one has no depth"),
             where=tr("levelling"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,8 @@ OTHER_REACH_MM = 2.5
 DRAPE_MM = 1.5
 """Where the drape falls to a tenth of the height, about two decay lengths."""
 EDGE_RADIUS_MM = 0.08
-"""Start value of the edge radius of an object."""
+"""Fillet of an object's edge if the map does not show it, known to half of itself: edges of printed
+and machined indenters have 0.05 to 0.1 mm."""
 UNKNOWN_BLUR_MM = 0.1
 """Root of the sd of the squared blur where nothing is known of it."""
 SEED_REACH_MM = 1.0
@@ -66,13 +67,11 @@ def measure_object(
     shape: str,
     seed_mm: tuple[float, float] | None = None,
     flags: NDArray[np.uint8] | None = None,
-    depth_sd_mm: NDArray[np.floating] | None = None,
     noise_mm: NDArray[np.float32] | None = None,
     depth_scale_sd: float | None = None,
     lateral_scale_sd: float | None = None,
     mode: ModeError | None = None,
     reach_mm: float = 0.0,
-    edge_radius_mm: float = EDGE_RADIUS_MM,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane; its drape is fitted, too.
 
@@ -88,9 +87,6 @@ def measure_object(
         A point on the object (x, y); needed where several objects are pressed.
     flags : (rows, columns) uint8, optional
         Bit 1: outside the working area, left out; any other bit: doubtful, weighted down.
-    depth_sd_mm : (rows, columns), optional
-        Standard deviation of each pixel, used as its relative weight. A single number would have no
-        effect and is refused.
     noise_mm : (examples, rows / 4, columns / 4), optional
         Examples of the errors by the map's noise, as stored in a height map. With them, the result
         contains the scatter of repeated measurements.
@@ -101,9 +97,6 @@ def measure_object(
     reach_mm : float, optional
         Least correlation length of the map's errors. Errors of maps that were integrated from
         slopes are correlated over the drape; 0 if they can be white noise.
-    edge_radius_mm : float, optional
-        Fillet of the object's edge if the map does not show it; its uncertainty is about half of
-        it. Edges of printed and machined indenters have a fillet of 0.05 to 0.1 mm.
 
     Raises
     ------
@@ -117,19 +110,17 @@ def measure_object(
             where=tr("shape"),
             advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
         )
-    found = find_object(
+    window, region, prior = find_object(
         depth_mm,
         x_mm,
         y_mm,
         seed_mm=seed_mm,
         flags=flags,
-        depth_sd_mm=depth_sd_mm,
         reach_mm=reach_mm,
-        edge_radius_mm=edge_radius_mm,
         blur_mm2=0.0 if mode is None else mode.blur_mm2,
     )
-    window, region, prior = found.window, found.region, found.edge
-    fit = _fit(shape, window, region, prior)
+    model = MODELS[shape]
+    fit = fit_indenter(model, window, model.start(region), edge=prior)
     reasons = (describe_fit_problems(shape, fit, window, region, prior), no_anchor(flags, region))
     reason = joined("; ", (found for found in reasons if found))
     face = _face(shape, fit, window)
@@ -148,25 +139,6 @@ def measure_object(
     return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, reason)
 
 
-@dataclass(frozen=True, slots=True)
-class FoundObject:
-    """An object before its shape is known.
-
-    Attributes
-    ----------
-    window : WindowData
-        It and the ground around it.
-    region : PressedRegion
-        The segmented bump.
-    edge : EdgePrior
-        What is known of its edge.
-    """
-
-    window: WindowData
-    region: PressedRegion
-    edge: EdgePrior
-
-
 def find_object(
     depth_mm: NDArray[np.floating],
     x_mm: NDArray[np.floating],
@@ -174,16 +146,14 @@ def find_object(
     *,
     seed_mm: tuple[float, float] | None = None,
     flags: NDArray[np.uint8] | None = None,
-    depth_sd_mm: NDArray[np.floating] | None = None,
     reach_mm: float = 0.0,
-    edge_radius_mm: float = EDGE_RADIUS_MM,
     blur_mm2: float = 0.0,
-) -> FoundObject:
-    """Find the object that is to be measured; parameters and errors as :func:`measure_object`.
+) -> tuple[WindowData, PressedRegion, EdgePrior]:
+    """Return the object with the ground around it, its segmented bump, and what its edge may be.
 
     Parameters
     ----------
-    depth_mm, x_mm, y_mm, seed_mm, flags, depth_sd_mm, reach_mm, edge_radius_mm
+    depth_mm, x_mm, y_mm, seed_mm, flags, reach_mm
         As for :func:`measure_object`.
     blur_mm2 : float, optional
         Variance of the map's blur, known to one pixel squared; 0 if it is not known.
@@ -193,7 +163,7 @@ def find_object(
     InputError
         As :func:`measure_object`, but for the shape.
     """
-    depth, x, y, weight = _checked(depth_mm, x_mm, y_mm, flags, depth_sd_mm)
+    depth, x, y, weight = _checked(depth_mm, x_mm, y_mm, flags)
     regions = find_pressed_regions(depth, x, y, weight > 0.0)
     region = _chosen_region(regions, x, y, seed_mm)
     if region.cut:
@@ -207,8 +177,8 @@ def find_object(
     window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
     pixel_mm2 = window.pitch_mm**2
     blur = (blur_mm2, pixel_mm2) if blur_mm2 else (pixel_mm2, UNKNOWN_BLUR_MM**2)
-    edge = EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, *blur, blur_known=blur_mm2 > 0.0)
-    return FoundObject(window, region, edge)
+    edge = EdgePrior(EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, *blur, blur_known=blur_mm2 > 0.0)
+    return window, region, edge
 
 
 def _checked(
@@ -216,14 +186,12 @@ def _checked(
     x_mm: NDArray[np.floating],
     y_mm: NDArray[np.floating],
     flags: NDArray[np.uint8] | None,
-    depth_sd_mm: NDArray[np.floating] | None,
 ) -> tuple[Array, Array, Array, Array]:
     """Return depth (finite), x, y and weights in [0, 1]."""
     depth = np.asarray(depth_mm, dtype=np.float64)
     x, y = np.asarray(x_mm, dtype=np.float64), np.asarray(y_mm, dtype=np.float64)
     fits = depth.ndim == 2 and depth.shape == (y.size, x.size) and min(depth.shape) >= 8
-    beside = (m for m in (flags, depth_sd_mm) if m is not None)
-    if not fits or any(np.shape(m) != depth.shape for m in beside):
+    if not fits or (flags is not None and flags.shape != depth.shape):
         raise InputError(
             tr(
                 "the depth map has shape {shape}, but there are positions for {x} "
@@ -242,12 +210,6 @@ def _checked(
             where=tr("depth map"),
             advice=tr("Check the image and the working area"),
         )
-    if depth_sd_mm is not None:
-        usable = (weight > 0.0) & np.isfinite(depth_sd_mm) & (depth_sd_mm > 0.0)
-        typical = float(np.median(depth_sd_mm[usable])) if usable.any() else 1.0
-        # A pixel with a much smaller standard deviation than its neighbours must not decide alone.
-        share = np.divide(typical, depth_sd_mm, out=np.zeros_like(depth), where=usable)
-        weight *= np.minimum(share, 2.0) ** 2
     return np.where(weight > 0.0, depth, 0.0), x, y, weight
 
 
@@ -337,11 +299,6 @@ def _seen_share(core: Mask, weight: Array, own_mm: Array, pitch: float) -> float
     padded = ndimage.distance_transform_edt(~np.pad(part, wide)) * pitch
     there = (own_mm > 0.0) & (own_mm < DRAPE_MM) & (weight > 0.0)
     return float(there.sum() / max(int(((padded > 0.0) & (padded < DRAPE_MM)).sum()), 1))
-
-
-def _fit(shape: str, window: WindowData, region: PressedRegion, prior: EdgePrior) -> FitResult:
-    model = MODELS[shape]
-    return fit_indenter(model, window, model.start(region), edge=prior)
 
 
 def _face(shape: str, fit: FitResult, window: WindowData) -> Mask | None:

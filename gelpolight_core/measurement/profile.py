@@ -172,7 +172,7 @@ def _profile_errors(
     return MapErrors(examples, found.depth_scale_sd, found.lateral_scale_sd)
 
 
-def step_height(profile: Profile, *, first_mm: Point, second_mm: Point) -> Measured:
+def step_height(profile: Profile, first_mm: Point, second_mm: Point) -> Measured:
     """Return how much deeper the second part of a profile lies than the first.
 
     Parameters

@@ -21,8 +21,27 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)
-class ProfileStep:
-    """The step between two ranges of a profile.
+class Section:
+    """A section through the map.
+
+    Attributes
+    ----------
+    start_mm, end_mm, width_mm
+        As in :func:`~gelpolight_core.measurement.profile.take_profile`.
+    """
+
+    start_mm: Point
+    end_mm: Point
+    width_mm: float = 0.0
+
+    def profile(self, heightmap: HeightMap) -> Profile:
+        """Return the depth along it."""
+        return take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class _BetweenRanges:
+    """A figure from two ranges of a profile.
 
     Attributes
     ----------
@@ -32,7 +51,8 @@ class ProfileStep:
         Ranges along it.
     """
 
-    name: ClassVar[str] = "profile-step"
+    name: ClassVar[str]
+    compute: ClassVar[staticmethod[[Profile, Range, Range], Measured]]
     start_mm: Point
     end_mm: Point
     first_mm: Range
@@ -42,12 +62,26 @@ class ProfileStep:
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
-        figure = step_height(profile, first_mm=self.first_mm, second_mm=self.second_mm)
+        figure = type(self).compute(profile, self.first_mm, self.second_mm)
         return _profile_result(self, profile, (figure,), (self.first_mm, self.second_mm))
 
 
+class ProfileStep(_BetweenRanges):
+    """The step between two ranges of a profile."""
+
+    name = "profile-step"
+    compute = staticmethod(step_height)
+
+
+class ProfileAngle(_BetweenRanges):
+    """By how much a profile turns from one range to another; a line is fitted to each."""
+
+    name = "profile-angle"
+    compute = staticmethod(angle_between)
+
+
 @dataclass(frozen=True, slots=True)
-class ProfileWidth:
+class ProfileWidth(Section):
     """The width of what a profile crosses, at a level.
 
     Attributes
@@ -61,45 +95,16 @@ class ProfileWidth:
     """
 
     name: ClassVar[str] = "profile-width"
-    start_mm: Point
-    end_mm: Point
-    width_mm: float = 0.0
     level_mm: float | None = None
     between_mm: Range | None = None
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
-        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        profile = self.profile(heightmap)
         figure = width_at(profile, self.level_mm, between=self.between_mm)
         left, right, level = width_ends(profile, self.level_mm, between=self.between_mm)
         figures = (figure, Measured(level, None, "mm", "level"))
         return _profile_result(self, profile, figures, ((left, right),))
-
-
-@dataclass(frozen=True, slots=True)
-class ProfileAngle:
-    """By how much a profile turns from one range to another.
-
-    Attributes
-    ----------
-    start_mm, end_mm, width_mm
-        The profile, as in :func:`~gelpolight_core.measurement.profile.take_profile`.
-    first_mm, second_mm : (float, float)
-        Ranges along it; a straight line is fitted to each.
-    """
-
-    name: ClassVar[str] = "profile-angle"
-    start_mm: Point
-    end_mm: Point
-    first_mm: Range
-    second_mm: Range
-    width_mm: float = 0.0
-
-    def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure."""
-        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
-        figure = angle_between(profile, self.first_mm, self.second_mm)
-        return _profile_result(self, profile, (figure,), (self.first_mm, self.second_mm))
 
 
 def _profile_result(

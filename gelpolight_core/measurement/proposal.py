@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.measurement.fit import fit_indenter
-from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL
+from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL, residuals_of
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measure import find_object
 from gelpolight_core.measurement.segmentation import PressedRegion, find_pressed_regions
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-
-UNCLEAR = "unclear"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,23 +19,14 @@ class Proposal:
 
     Attributes
     ----------
-    shape : str
-        ``ball``, ``cylinder`` or ``cuboid``; ``unclear`` if the best two fit equally well.
     candidates : tuple of str
         The possible shapes, the best first: one, or the two that fit equally well.
     at_mm : (float, float)
         Where it is, (x, y): the centroid of its upper half.
-    height_mm : float
-        Its approximate height.
-    residual_mm : mapping of str to float
-        Root mean square residual of each shape.
     """
 
-    shape: str
     candidates: tuple[str, ...]
     at_mm: tuple[float, float]
-    height_mm: float
-    residual_mm: Mapping[str, float]
 
 
 def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None) -> Proposal | None:
@@ -64,31 +51,19 @@ def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None)
     region = _tallest(heightmap)
     if region is None or (seed_mm is None and region.cut):
         return None
-    found = find_object(
+    window, region, edge = find_object(
         heightmap.depth_mm,
         heightmap.x_mm,
         heightmap.y_mm,
         seed_mm=seed_mm or _point_on(region, heightmap),
         flags=heightmap.flags,
     )
-    residual = {
-        shape: fit_indenter(
-            model, found.window, model.start(found.region), edge=found.edge, most_rounds=1
-        ).residual_rms_mm
-        for shape, model in MODELS.items()
-    }
+    residual = residuals_of(MODELS, window, region, edge)
     best, second, _ = sorted(residual, key=lambda shape: residual[shape])
-    height = found.region.height_mm
-    if residual[best] > POOR_RESIDUAL * height:
+    if residual[best] > POOR_RESIDUAL * region.height_mm:
         return None
     alike = residual[best] > BETTER_SHAPE * residual[second]
-    return Proposal(
-        UNCLEAR if alike else best,
-        (best, second) if alike else (best,),
-        found.region.centre_mm,
-        height,
-        residual,
-    )
+    return Proposal((best, second) if alike else (best,), region.centre_mm)
 
 
 def _tallest(heightmap: HeightMap) -> PressedRegion | None:

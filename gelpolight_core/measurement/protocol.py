@@ -3,7 +3,8 @@
 Objects of sizes 3 to 7 mm at one height, and of heights 0.5 to 1.5 mm at one size, each pressed
 five times in one region and once in each of 25 random regions. The position of a press depends only
 on the seed and on the press itself. A part of the protocol therefore uses the same positions as the
-whole protocol, and a resumed run continues with the same positions.
+whole protocol, and a resumed run continues with the same positions. ``protocol.toml`` holds it with
+its sensor.
 """
 
 from __future__ import annotations
@@ -12,60 +13,31 @@ import math
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import tomli_w
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import write_text
+from gelpolight_core.io.reading import brief, parse_toml, read_file
 from gelpolight_core.measurement.evaluation import Crossing
+from gelpolight_core.measurement.press import LONGEST_MM, Press
 from gelpolight_core.measurement.result import Truth
-from gelpolight_core.measurement.truth import PressTruth
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
+from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 
 SHAPES = ("cylinder", "cuboid")
 SAME_REGION = "same"
+FILE_NAME = "protocol.toml"
+FORMAT = "gelpolight-protocol"
+VERSION = 1
+SIZE_LIMIT = 100_000
 ROOM_MM = 2.0
 """Visible ground around every object: three decay lengths of 0.7 mm, where the drape has decreased
 to a twentieth of the height."""
-
-
-@dataclass(frozen=True, slots=True)
-class PressWanted:
-    """One press of the protocol.
-
-    Attributes
-    ----------
-    truth : Truth
-        The object: shape, size and height.
-    position_mm : (float, float)
-        Position of its middle, (x, y) in the sensor frame.
-    yaw_deg : float
-        Rotation of a cuboid, from x to y; 0 for a cylinder.
-    region : str
-        ``same``, or a random region's name such as ``r07``.
-    repeat : int
-        From 1.
-    """
-
-    truth: Truth
-    position_mm: tuple[float, float]
-    yaw_deg: float
-    region: str
-    repeat: int
-
-    @property
-    def file(self) -> str:
-        """The name of the image, unique in the protocol."""
-        t = self.truth
-        return (
-            f"{t.shape}_s{round(100 * t.size_mm):03d}_h{round(100 * t.height_mm):03d}"
-            f"_{self.region}_{self.repeat}.png"
-        )
-
-    @property
-    def row(self) -> PressTruth:
-        """Its row in ``truth.csv``."""
-        return PressTruth(self.file, self.truth, self.region, str(self.repeat))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,22 +87,21 @@ class Protocol:
         """Where its two series cross."""
         return Crossing(self.at_size_mm, self.at_height_mm)
 
-    def presses(self) -> tuple[PressWanted, ...]:
+    def presses(self) -> tuple[Press, ...]:
         """Return every press: object by object, first in the same region, then in the random ones.
 
         Each object is mounted only once.
         """
         return tuple(press for truth in self.objects for press in self._presses_of(truth))
 
-    def _presses_of(self, truth: Truth) -> list[PressWanted]:
+    def _presses_of(self, truth: Truth) -> list[Press]:
         wanted = [
-            PressWanted(truth, (0.0, 0.0), 0.0, SAME_REGION, repeat)
+            _press(truth, SAME_REGION, repeat, (0.0, 0.0), 0.0)
             for repeat in range(1, self.repeats + 1)
         ]
         for number in range(1, self.regions + 1):
             region = f"r{number:02d}"
-            position, yaw = self._random_position(truth, region)
-            wanted.append(PressWanted(truth, position, yaw, region, 1))
+            wanted.append(_press(truth, region, 1, *self._random_position(truth, region)))
         return wanted
 
     def _random_position(self, truth: Truth, region: str) -> tuple[tuple[float, float], float]:
@@ -143,6 +114,15 @@ class Protocol:
         position = (round(away * math.cos(angle), 2), round(away * math.sin(angle), 2))
         yaw = round(90.0 * rng.random() - 45.0, 1)
         return position, yaw if truth.shape == "cuboid" else 0.0
+
+
+def _press(
+    truth: Truth, region: str, repeat: int, position_mm: tuple[float, float], yaw_deg: float
+) -> Press:
+    """Return a press whose image has a unique name in the protocol."""
+    size, height = round(100 * truth.size_mm), round(100 * truth.height_mm)
+    file = f"{truth.shape}_s{size:03d}_h{height:03d}_{region}_{repeat}.png"
+    return Press(file, truth, region, str(repeat), position_mm, yaw_deg)
 
 
 def room_mm(truth: Truth, reach_mm: float) -> float:
@@ -245,3 +225,120 @@ def _check_lengths(protocol: Protocol, refusal: Callable[[str, str], InputError]
             raise refusal(
                 tr("{name} contains a length twice").format(name=name), tr("Name each length once")
             )
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolFile:
+    """The content of ``protocol.toml``.
+
+    Attributes
+    ----------
+    protocol : Protocol
+        What is pressed.
+    serial : str
+        The sensor's.
+    calibration : str
+        Identity of the calibration that the run began with.
+    """
+
+    protocol: Protocol
+    serial: str
+    calibration: str
+
+
+def write_protocol_file(content: ProtocolFile, folder: Path) -> None:
+    """Write ``protocol.toml``, completely or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    p = content.protocol
+    table = {
+        "format": FORMAT,
+        "version": VERSION,
+        "sensor": {"serial": content.serial, "calibration": content.calibration},
+        "objects": {
+            "shapes": list(p.shapes),
+            "sizes_mm": list(p.sizes_mm),
+            "at_height_mm": p.at_height_mm,
+            "heights_mm": list(p.heights_mm),
+            "at_size_mm": p.at_size_mm,
+        },
+        "places": {
+            "repeats": p.repeats,
+            "regions": p.regions,
+            "reach_mm": p.reach_mm,
+            "seed": p.seed,
+        },
+    }
+
+    write_text(folder / FILE_NAME, tomli_w.dumps(table))
+
+
+def read_protocol_file(folder: Path) -> ProtocolFile:
+    """Read and check ``protocol.toml``.
+
+    Raises
+    ------
+    InputError
+        If it is missing, is not TOML, has another format or a newer version, or a key that is
+        unknown, missing, of the wrong kind or out of range.
+    """
+    path = folder / FILE_NAME
+    try:
+        content = parse_toml(read_file(path, SIZE_LIMIT))
+    except FileNotFoundError as error:
+        raise InputError(
+            tr("there is no {name}").format(name=FILE_NAME),
+            where=str(folder),
+            advice=tr("Name the folder of a run of the evaluation protocol"),
+        ) from error
+    except ValueError as error:
+        raise InputError(
+            tr("the protocol cannot be read ({reason})").format(reason=brief(str(error), 200)),
+            where=str(path),
+            advice=tr("Correct the file; the presses in the folder are intact"),
+        ) from error
+    return _parse(Table(content, "", path))
+
+
+def _parse(top: Table) -> ProtocolFile:
+    top.check_version(FORMAT, VERSION)
+    sensor, objects, places = (top.table(name) for name in ("sensor", "objects", "places"))
+    top.no_more("format", "version", "sensor", "objects", "places")
+    sensor.no_more("serial", "calibration")
+    objects.no_more("shapes", "sizes_mm", "at_height_mm", "heights_mm", "at_size_mm")
+    places.no_more("repeats", "regions", "reach_mm", "seed")
+    protocol = Protocol(
+        shapes=_texts(objects, "shapes"),
+        sizes_mm=_lengths(objects, "sizes_mm"),
+        heights_mm=_lengths(objects, "heights_mm"),
+        at_size_mm=objects.number("at_size_mm", 0.05, 200.0),
+        at_height_mm=objects.number("at_height_mm", 0.05, 200.0),
+        repeats=places.whole("repeats"),
+        regions=places.whole("regions"),
+        reach_mm=places.number("reach_mm", 0.05, 200.0),
+        seed=places.whole("seed"),
+    )
+    if protocol.seed < 0:
+        raise places.wrong("seed", tr("is below zero"))
+    checked = check_protocol(protocol, where=str(top.path))
+    return ProtocolFile(checked, sensor.text("serial"), sensor.text("calibration"))
+
+
+def _texts(table: Table, key: str) -> tuple[str, ...]:
+    value: Any = table.content.get(key)
+    if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
+        raise table.wrong(key, tr("is not a list of texts"))
+    return tuple(brief(text) for text in value)
+
+
+def _lengths(table: Table, key: str) -> tuple[float, ...]:
+    value: Any = table.content.get(key)
+    if not isinstance(value, list) or not all(
+        type(x) in (int, float) and abs(x) <= LONGEST_MM for x in value
+    ):
+        raise table.wrong(key, tr("is not a list of lengths"))
+    return tuple(float(x) for x in value)

@@ -9,7 +9,6 @@ stored, so an interrupted run continues with the press that was not finished.
 from __future__ import annotations
 
 import csv
-import io
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,13 +19,16 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import append_durably, cannot_write, make_folder, write_atomically
+from gelpolight_core.io.atomic import append_durably, cannot_write, make_folder, write_text
 from gelpolight_core.io.reading import brief, read_file
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.measurement.evaluation import Crossing
-from gelpolight_core.measurement.protocol import PressWanted, Protocol, check_protocol
-from gelpolight_core.measurement.protocol_file import (
+from gelpolight_core.measurement.press import Press, read_truth
+from gelpolight_core.measurement.protocol import (
     FILE_NAME,
+    Protocol,
     ProtocolFile,
+    check_protocol,
     read_protocol_file,
     write_protocol_file,
 )
@@ -104,12 +106,12 @@ class ProtocolRun:
         return self.folder / PRESSES
 
     @property
-    def done(self) -> tuple[PressWanted, ...]:
+    def done(self) -> tuple[Press, ...]:
         """The presses that count, in the protocol's order."""
         return tuple(press for press in self.wanted if press.file in self._rows)
 
     @property
-    def left(self) -> tuple[PressWanted, ...]:
+    def left(self) -> tuple[Press, ...]:
         """The presses still to be made, in the protocol's order."""
         return tuple(press for press in self.wanted if press.file not in self._rows)
 
@@ -121,20 +123,20 @@ class ProtocolRun:
         here = sum(press.file in self._rows for press in of_object)
         return RunProgress(len(self._rows), len(self.wanted), self._refused, here, len(of_object))
 
-    def next(self) -> PressWanted | None:
+    def next(self) -> Press | None:
         """Return the next press; None at the end."""
         return next((press for press in self.wanted if press.file not in self._rows), None)
 
-    def image(self, press: PressWanted) -> Path:
+    def image(self, press: Press) -> Path:
         """Return the path of a press's image, which may not exist yet."""
         return self.presses / press.file
 
-    def accept(self, press: PressWanted, frames: Sequence[NDArray[Any]]) -> Path:
+    def accept(self, press: Press, frames: Sequence[NDArray[Any]]) -> Path:
         """Keep a press: its frames averaged in one image, and its row in ``truth.csv``.
 
         Parameters
         ----------
-        press : PressWanted
+        press : Press
             What was pressed.
         frames : sequence of (rows, columns, 3) uint8 or uint16
             RGB, of the steady press.
@@ -148,7 +150,7 @@ class ProtocolRun:
         self.record(press)
         return self.image(press)
 
-    def record(self, press: PressWanted) -> None:
+    def record(self, press: Press) -> None:
         """Count a press whose image exists already.
 
         Raises
@@ -167,7 +169,7 @@ class ProtocolRun:
         _write_rows([rows[file] for file in sorted(rows, key=order.__getitem__)], self.presses)
         self._rows = rows
 
-    def refuse(self, press: PressWanted, reason: str) -> None:
+    def refuse(self, press: Press, reason: str) -> None:
         """Log that a press was refused and why; it remains the next press.
 
         Raises
@@ -175,12 +177,11 @@ class ProtocolRun:
         InputError
             If the note cannot be written.
         """
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerow([_now(), press.file, reason])
-        append_durably(self.folder / REFUSED, text.getvalue().encode())
+        line = csv_text([_now(), press.file, reason], ())
+        append_durably(self.folder / REFUSED, line.encode())
         self._refused += 1
 
-    def take_back(self, press: PressWanted) -> Path | None:
+    def take_back(self, press: Press) -> Path | None:
         """Mark a press to be repeated: move its image to ``discarded`` and return the new path.
 
         Raises
@@ -273,9 +274,18 @@ def open_run(folder: Path) -> ProtocolRun:
 
 
 def presses_folder(folder: Path) -> Path:
-    """Return the folder of images and ``truth.csv`` that a run's or a session's folder holds."""
+    """Return the folder of images and ``truth.csv`` that a run's or a session's folder holds.
+
+    Raises
+    ------
+    InputError
+        If ``truth.csv``, or the ``protocol.toml`` of a run, cannot be used.
+    """
     inner = folder / PRESSES
-    return inner if not (folder / TRUTH).is_file() and (inner / TRUTH).is_file() else folder
+    presses = inner if not (folder / TRUTH).is_file() and (inner / TRUTH).is_file() else folder
+    read_truth(presses)
+    crossing_of(presses)
+    return presses
 
 
 def crossing_of(presses: Path) -> Crossing | None:
@@ -297,7 +307,7 @@ def crossing_of(presses: Path) -> Crossing | None:
     return read_protocol_file(folder).protocol.crossing
 
 
-def _row(press: PressWanted) -> list[str]:
+def _row(press: Press) -> list[str]:
     truth = press.truth
     size = repr(truth.size_mm)
     sizes = ["", size] if truth.shape == "cuboid" else [size, ""]
@@ -308,7 +318,7 @@ def _row(press: PressWanted) -> list[str]:
         *sizes,
         repr(truth.height_mm),
         press.region,
-        str(press.repeat),
+        press.repeat,
         *positions,
         _now(),
     ]
@@ -319,11 +329,7 @@ def _now() -> str:
 
 
 def _write_rows(rows: Sequence[Sequence[str]], presses: Path) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(rows)
-    write_atomically(presses / TRUTH, lambda stream: stream.write(text.getvalue().encode()))
+    write_text(presses / TRUTH, csv_text(COLUMNS, rows))
 
 
 def _read_rows(path: Path) -> list[list[str]]:

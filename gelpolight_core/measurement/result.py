@@ -108,6 +108,11 @@ class Measurement:
             return float(np.mean(self.sd["side_mm"]))
         return float(self.sd["diameter_mm"])
 
+    @property
+    def height_sd_mm(self) -> float:
+        """Standard deviation of `height_mm`."""
+        return float(self.sd["height_mm"])
+
     def as_json(self, comparison: Comparison | None = None) -> dict[str, Any]:
         """Return the measurement as plain values; `comparison` adds truth and errors in percent.
 
@@ -231,6 +236,11 @@ def compare(measurement: Measurement, truth: Truth) -> Comparison:
             )
     return Comparison(
         truth,
-        100.0 * (measurement.size_mm / truth.size_mm - 1.0),
-        100.0 * (measurement.height_mm / truth.height_mm - 1.0),
+        percent_error(measurement.size_mm, truth.size_mm),
+        percent_error(measurement.height_mm, truth.height_mm),
     )
+
+
+def percent_error(measured: float, true: float) -> float:
+    """Return the signed error in percent of the true value."""
+    return 100.0 * (measured / true - 1.0)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import Any
 
-from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation, Group
+from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord, Quantity
 from gelpolight_core.records.records import Records
 
 SHAPE = "evaluation"
-NAMES = {"planar": "planar_error_percent", "depth": "depth_error_percent"}
 
 
 def evaluation_record(
@@ -43,13 +41,13 @@ def evaluation_record(
         None if nothing could be measured.
     """
     limits = {"planar": size_limit_percent, "depth": height_limit_percent}
-    errors = {
-        direction: evaluation.overall(direction).mean_absolute_percent for direction in DIRECTIONS
-    }
+    errors = {direction: evaluation.overall(direction).mean_absolute for direction in DIRECTIONS}
     found = {direction: error for direction, error in errors.items() if math.isfinite(error)}
     if not found:
         return None
-    quantities = tuple(Quantity(NAMES[direction], error) for direction, error in found.items())
+    quantities = tuple(
+        Quantity(f"{direction}_error_percent", error) for direction, error in found.items()
+    )
     within = all(error <= limits[direction] for direction, error in found.items())
     failed = evaluation.failure
     return MeasurementRecord(
@@ -60,7 +58,12 @@ def evaluation_record(
         verdict=DOUBTFUL if failed else (PASSED if within else FAILED),
         reason=failed,
         settings={"limits_percent": limits},
-        details={"groups": [_plain(group) for group in evaluation.groups]},
+        details={
+            "groups": [
+                asdict(group) | {"statistic": group.statistic.as_json("percent")}
+                for group in evaluation.groups
+            ]
+        },
         operator=operator,
         picture=folder,
     )
@@ -83,12 +86,3 @@ def add_once(records: Records, record: MeasurementRecord) -> int:
         if same and known.quantities == record.quantities:
             return 0
     return records.add(record)
-
-
-def _plain(group: Group) -> dict[str, Any]:
-    """Return plain values; None for unknown ones."""
-    plain = asdict(group)
-    plain["statistic"] = {
-        key: value if math.isfinite(value) else None for key, value in plain["statistic"].items()
-    }
-    return plain

@@ -13,11 +13,9 @@ from pathlib import Path
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.io.reading import parse_json, written_text
 from gelpolight_core.io.texts import text_of_file
+from gelpolight_core.records.database import VALUE_LIMIT
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.translation import english
-
-# The size limit of one value of the database.
-MOST_TEXT = 10_000_000
 
 
 def text_of(time: datetime) -> str:
@@ -78,10 +76,10 @@ def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRe
     settings, details = parse_json(row["settings"]), parse_json(row["details"])
     if not isinstance(settings, dict) or not isinstance(details, dict):
         raise ValueError("the settings of a measurement are not a table")
-    texts = {name: written_text(row[name], MOST_TEXT) for name in _TEXTS}
+    texts = {name: written_text(row[name], VALUE_LIMIT) for name in _TEXTS}
     return MeasurementRecord(
         **texts,
-        reason=text_of_file(written_text(row["reason"], MOST_TEXT)),
+        reason=text_of_file(written_text(row["reason"], VALUE_LIMIT)),
         calibration_id=written_text(row["calibration_id"] or ""),
         quantities=quantities,
         settings=settings,

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
-from typing import Any
 
 from matplotlib.figure import Figure
 
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.atomic import write_text
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
@@ -121,12 +119,12 @@ def evaluation_errors(
         if not evaluation.series(direction):
             continue  # there is no press for this direction yet
         name = label(direction)
-        mean = evaluation.overall(direction).mean_absolute_percent
+        mean = evaluation.overall(direction).mean_absolute
         text = title.format(direction=name)
         figures.append(judge(f"{direction}_mean", text, mean, "%", fail=limit, remedy=advice))
         for group in evaluation.groups:
             overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
-            mean = group.statistic.mean_absolute_percent
+            mean = group.statistic.mean_absolute
             if group.direction == direction and overall and math.isfinite(mean):
                 regions = group.regions.replace(" ", "_")
                 text = title_in.format(direction=name, regions=label(group.regions))
@@ -152,11 +150,11 @@ def _groups(evaluation: Evaluation) -> Listing:
         (tr("shape"), lambda group: label(group.shape)),
         (tr("mm"), lambda g: "" if g.dimension_mm is None else f"{g.dimension_mm:g}"),
         (tr("n"), lambda group: str(group.statistic.count)),
-        (tr("mean |e|"), lambda group: _number(group.statistic.mean_absolute_percent, ".2f")),
-        (tr("mean"), lambda group: _number(group.statistic.mean_percent, "+.2f")),
-        (tr("sd"), lambda group: _number(group.statistic.sd_percent, ".2f")),
-        (tr("lowest"), lambda group: _number(group.statistic.lowest_percent, "+.2f")),
-        (tr("highest"), lambda group: _number(group.statistic.highest_percent, "+.2f")),
+        (tr("mean |e|"), lambda group: _number(group.statistic.mean_absolute, ".2f")),
+        (tr("mean"), lambda group: _number(group.statistic.mean, "+.2f")),
+        (tr("sd"), lambda group: _number(group.statistic.sd, ".2f")),
+        (tr("lowest"), lambda group: _number(group.statistic.lowest, "+.2f")),
+        (tr("highest"), lambda group: _number(group.statistic.highest, "+.2f")),
     )
 
 
@@ -190,21 +188,20 @@ def _gauge_listing(gauge: tuple[GaugeRow, ...]) -> Listing:
         (tr("shape"), lambda row: label(row.truth.shape)),
         (tr("true (mm)"), lambda row: f"{row.true_mm:g}"),
         (tr("n, same region"), lambda row: str(row.same.count)),
-        (tr("mean (mm)"), lambda row: _number(row.same.mean_mm, ".4f")),
-        (tr("sd: repeatability"), lambda row: _micrometres(row.same.sd_mm)),
+        (tr("mean (mm)"), lambda row: _number(row.same.mean, ".4f")),
+        (tr("sd: repeatability"), lambda row: _micrometres(row.repeatability_mm)),
         (tr("n, random regions"), lambda row: str(row.random.count)),
-        (tr("mean (mm)"), lambda row: _number(row.random.mean_mm, ".4f")),
-        (tr("sd"), lambda row: _micrometres(row.random.sd_mm)),
+        (tr("mean (mm)"), lambda row: _number(row.random.mean, ".4f")),
+        (tr("sd"), lambda row: _micrometres(row.random.sd)),
         (tr("reproducibility"), lambda row: _micrometres(row.reproducibility_mm)),
     )
 
 
 def known_objects(evaluation: Evaluation, title: str) -> Listing:
     """Return every press with its true and its measured lengths."""
-    presses: list[dict[str, Any]] = evaluation_json(evaluation)["presses"]
     return listing(
         title,
-        presses,
+        [press.as_row() for press in evaluation.results],
         (tr("image"), lambda press: press["file"]),
         (tr("shape"), lambda press: label(press["shape"])),
         (tr("size (mm)"), lambda press: f"{press['true_size_mm']:g}"),
@@ -233,7 +230,7 @@ def evaluation_sentence(evaluation: Evaluation) -> str:
         ),
     }
     for direction, text in texts.items():
-        error = evaluation.overall(direction).mean_absolute_percent
+        error = evaluation.overall(direction).mean_absolute
         if math.isfinite(error):
             summary.append(text.format(e=error, p=PAPER_PERCENT[direction]))
     return "; ".join(summary)
@@ -293,8 +290,7 @@ def write_evaluation_files(
     gauge = gauge_rows(evaluation)
     if gauge:
         path = folder / "gauge.csv"
-        text = gauge_csv(gauge)
-        write_atomically(path, lambda stream: stream.write(text.encode()))
+        write_text(path, gauge_csv(gauge))
         written.append(path)
     return tuple(written)
 
@@ -308,17 +304,13 @@ def gauge_csv(gauge: tuple[GaugeRow, ...]) -> str:
             "size_mm": row.truth.size_mm,
             "height_mm": row.truth.height_mm,
             "same_region_n": row.same.count,
-            "same_region_mean_mm": row.same.mean_mm,
-            "repeatability_sd_mm": row.same.sd_mm,
+            "same_region_mean_mm": row.same.mean,
+            "repeatability_sd_mm": row.repeatability_mm,
             "random_regions_n": row.random.count,
-            "random_regions_mean_mm": row.random.mean_mm,
-            "random_regions_sd_mm": row.random.sd_mm,
+            "random_regions_mean_mm": row.random.mean,
+            "random_regions_sd_mm": row.random.sd,
             "reproducibility_sd_mm": row.reproducibility_mm,
         }
         for row in gauge
     ]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: "" if v != v else v for k, v in row.items()} for row in rows)
-    return text.getvalue()
+    return csv_text(list(rows[0]), (["" if v != v else v for v in row.values()] for row in rows))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -12,6 +10,7 @@ import numpy as np
 
 from gelpolight_core.design.parts import BallPress
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.simulation.drape import contact_radius
 from gelpolight_core.simulation.indenters import Ball
 from gelpolight_core.simulation.plan import AVERAGED, press_names
@@ -21,14 +20,12 @@ from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 def truth_csv(design: SensorDesign) -> str:
     """Return the content of presses/truth.csv."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["file", "shape", "diameter_mm", "side_mm", "height_mm"])
+    rows = []
     for name, item in zip(press_names(design.presses), design.presses, strict=True):
         if item.shape in ("cylinder", "cuboid"):
             size = [item.size_mm, ""] if item.shape == "cylinder" else ["", item.size_mm]
-            writer.writerow([f"{name}.png", item.shape, *size, item.depth_mm])
-    return stream.getvalue()
+            rows.append([f"{name}.png", item.shape, *size, item.depth_mm])
+    return csv_text(("file", "shape", "diameter_mm", "side_mm", "height_mm"), rows)
 
 
 def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from gelpolight_core.drawing_thread import in_drawing_thread
-from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically, write_text
+from gelpolight_core.io.table import csv_text
 
 DPI = 150
 
@@ -33,11 +33,7 @@ def write_table(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_atomically(path, lambda out: out.write(text.getvalue().encode()))
+    write_text(path, csv_text(list(rows[0]), (row.values() for row in rows)))
 
 
 def write_results(

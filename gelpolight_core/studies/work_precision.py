@@ -19,13 +19,13 @@ from matplotlib.figure import Figure
 from gelpolight_core.calibration.pipeline import calibrate_session
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.score import (
     TrueDepth,
     read_true_depth,
     score_depth,
     scored_radius_mm,
 )
-from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration

@@ -12,8 +12,7 @@ from one_line import refusal
 from report_pdf import report_data, report_text
 
 from app.command_line.main import main
-from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.protocol_file import ProtocolFile, write_protocol_file
+from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
 
 
 @pytest.fixture

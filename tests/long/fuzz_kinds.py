@@ -26,8 +26,9 @@ from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.response import gamma_response
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.protocol_file import (
+from gelpolight_core.measurement.press import read_truth
+from gelpolight_core.measurement.protocol import (
+    Protocol,
     ProtocolFile,
     read_protocol_file,
     write_protocol_file,
@@ -35,7 +36,6 @@ from gelpolight_core.measurement.protocol_file import (
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.measurement.tools import tools_from_json
-from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import build_resampling_table

@@ -29,8 +29,8 @@ from gelpolight_core.measurement.evaluation_report import (
 from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.press import Press, read_truth
 from gelpolight_core.measurement.result import Measurement, Truth
-from gelpolight_core.measurement.truth import PressTruth, read_truth
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.report.evaluation import evaluation_document, write_evaluation_files
 
@@ -62,8 +62,8 @@ def measurement(shape: str, size: float, height: float) -> Measurement:
 
 def press(
     shape: str, size: float, height: float, *, region: str = "", repeat: str = "", name: str = ""
-) -> PressTruth:
-    return PressTruth(
+) -> Press:
+    return Press(
         name or f"{shape}_{size:g}_{height:g}_{region}_{repeat}.png",
         Truth(shape, size, height),
         region,
@@ -98,19 +98,19 @@ def test_errors_are_averaged_by_direction_shape_and_dimension() -> None:
     ]
     evaluation = evaluate(rows, found)
     planar = evaluation.overall("planar")
-    assert planar.mean_absolute_percent == pytest.approx((5.0 + 2.5 + 0.0) / 3)
-    assert planar.mean_percent == pytest.approx((5.0 - 2.5 + 0.0) / 3)
+    assert planar.mean_absolute == pytest.approx((5.0 + 2.5 + 0.0) / 3)
+    assert planar.mean == pytest.approx((5.0 - 2.5 + 0.0) / 3)
     groups = {(g.direction, g.shape, g.dimension_mm): g.statistic for g in evaluation.groups}
     assert groups["planar", "cylinder", 4.0].count == 2
-    assert groups["planar", "cylinder", 4.0].sd_percent == pytest.approx(7.5 / math.sqrt(2))
-    assert groups["depth", "cylinder", 1.0].mean_percent == pytest.approx(-10.0)
-    assert groups["depth", "all", None].highest_percent == pytest.approx(20.0)
+    assert groups["planar", "cylinder", 4.0].sd == pytest.approx(7.5 / math.sqrt(2))
+    assert groups["depth", "cylinder", 1.0].mean == pytest.approx(-10.0)
+    assert groups["depth", "all", None].highest == pytest.approx(20.0)
 
 
 def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path: Path) -> None:
     rows = [press("cylinder", 4.0, 1.0, name="a"), press("cylinder", 5.0, 1.0, name="b")]
     evaluation = evaluate(rows, [measurement("cylinder", 4.0, 1.0), "no object is pressed"])
-    assert [r.press.file for r in evaluation.failed] == ["b"]
+    assert [r.file for r in evaluation.failed] == ["b"]
     assert "not measured: no object is pressed" in evaluation_table(evaluation)
     assert "1 of 2 presses could not be measured" in evaluation_table(evaluation)
     write_evaluation(evaluation, tmp_path)
@@ -176,8 +176,8 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
     evaluation = evaluate_presses(
         tmp_path, measure, progress=lambda name, share: reported.append((name, share))
     )
-    assert evaluation.overall("planar").mean_absolute_percent < 0.5
-    assert [result.failure for result in evaluation.failed] == [
+    assert evaluation.overall("planar").mean_absolute < 0.5
+    assert [result.outcome for result in evaluation.failed] == [
         "c.png: the image is all black. Open the shutter."
     ]
     assert evaluation.skipped == ("coin.png",)
@@ -236,9 +236,9 @@ def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -
     planar, depth = gauge_rows(evaluate(rows, found))
     assert (depth.same.count, depth.random.count) == (3, 3)
     assert depth.true_mm == 1.0 and planar.true_mm == 5.0
-    assert depth.same.mean_mm == pytest.approx(1.0)
-    assert depth.same.sd_mm == pytest.approx(0.01)
-    assert depth.random.sd_mm == pytest.approx(0.05)
+    assert depth.same.mean == pytest.approx(1.0)
+    assert depth.repeatability_mm == pytest.approx(0.01)
+    assert depth.random.sd == pytest.approx(0.05)
     assert depth.reproducibility_mm == pytest.approx(math.sqrt(0.05**2 - 0.01**2))
     assert planar.reproducibility_mm == 0.0
     found[3:] = ["no object is pressed"] * 3

@@ -72,9 +72,9 @@ def test_a_measurement_comes_back_to_the_last_bit(
 
 
 def test_another_image_shape_or_calibration_is_measured_anew(tmp_path: Path, image: Path) -> None:
-    ledger = Ledger(None, "one")
+    ledger = Ledger(tmp_path / "m.jsonl", "one")
     keys = {ledger.key(image, "cylinder"), ledger.key(image, "cuboid")}
-    keys.add(Ledger(None, "other").key(image, "cylinder"))
+    keys.add(Ledger(tmp_path / "m.jsonl", "other").key(image, "cylinder"))
     image.write_bytes(b"taken again")
     keys.add(ledger.key(image, "cylinder"))
     assert len(keys) == 4

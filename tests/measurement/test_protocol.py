@@ -14,19 +14,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.protocol import (
     ROOM_MM,
     Protocol,
     check_protocol,
+    read_protocol_file,
 )
-from gelpolight_core.measurement.protocol_file import read_protocol_file
 from gelpolight_core.measurement.protocol_run import (
     begin_run,
     crossing_of,
     open_run,
     presses_folder,
 )
-from gelpolight_core.measurement.truth import read_truth
 
 SMALL = Protocol(shapes=("cylinder",), sizes_mm=(3.0,), heights_mm=(), repeats=2, regions=1)
 
@@ -109,7 +109,8 @@ def test_the_run_is_the_folder_that_evaluate_reads(tmp_path: Path) -> None:
     folder = presses_folder(tmp_path / "run")
     assert folder == tmp_path / "run" / "presses"
     rows = read_truth(folder).rows
-    assert list(rows) == [press.row for press in run.wanted]
+    assert [row.file for row in rows] == [press.file for press in run.wanted]
+    assert [row.truth for row in rows] == [press.truth for press in run.wanted]
     assert [row.region for row in rows] == ["same", "same", "r01"]
     assert crossing_of(folder) == SMALL.crossing
     assert presses_folder(folder) == folder

@@ -12,8 +12,8 @@ from app.measure.measuring import apply_tool
 from gelpolight_core import measure, read_height_map, write_height_map
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.finding import QualityTable, Verdict, judge
+from gelpolight_core.measurement.evaluation_run import press_measurement
 from gelpolight_core.measurement.indenter_tools import Cylinder
-from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from gelpolight_core.measurement.evaluation import Evaluation, PressResult
+from gelpolight_core.measurement.evaluation import Evaluation
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.result import Truth
-from gelpolight_core.measurement.truth import PressTruth
 from gelpolight_core.records.evaluation_entry import add_once, evaluation_record
 from gelpolight_core.records.records import NAME, Records
 
 
-class _Measured:
-    """Replaces a measurement; only its existence matters."""
-
-
 def evaluation(*errors: tuple[float, float], failed: int = 0) -> Evaluation:
-    truth = PressTruth("p.png", Truth("cylinder", 5.0, 1.0))
-    good = [PressResult(truth, _Measured(), "", size, depth) for size, depth in errors]  # type: ignore[arg-type]
-    nan = float("nan")
-    bad = [PressResult(truth, None, "too dark", nan, nan)] * failed
-    return Evaluation((*good, *bad), (), ())
+    press = Press("p.png", Truth("cylinder", 5.0, 1.0), outcome="too dark")
+    good = [
+        replace(press, outcome=SimpleNamespace(size_mm=5 + size / 20, height_mm=1 + depth / 100))  # type: ignore[arg-type]
+        for size, depth in errors
+    ]
+    return Evaluation((*good, *[press] * failed), (), ())
 
 
-def record(found: Evaluation, **more: object) -> object:
+def record(found: Evaluation) -> object:
     return evaluation_record(
         found,
         serial="A",
@@ -33,7 +32,6 @@ def record(found: Evaluation, **more: object) -> object:
         size_limit_percent=5.0,
         height_limit_percent=8.0,
         folder="run",
-        **more,  # type: ignore[arg-type]
     )
 
 

@@ -15,12 +15,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gelpolight_core.measurement.statistics import statistics_of
 from gelpolight_core.records.entry import (
     MeasurementRecord,
     Quantity,
 )
 from gelpolight_core.records.records import NAME, Records
-from gelpolight_core.records.statistics import statistics_of
 
 NOON = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 
@@ -109,7 +109,7 @@ def test_the_uses_of_a_calibration_are_counted_without_removed_ones(records: Rec
 def test_statistics_of_repeated_measurements() -> None:
     heights = [1.00, 1.02, 1.05, 0.99]
     found = statistics_of(heights)
-    assert found.n == 4
+    assert found.count == 4
     assert found.mean == pytest.approx(np.mean(heights))
     assert found.sd == pytest.approx(np.std(heights, ddof=1))
     assert found.spread == pytest.approx(0.06)

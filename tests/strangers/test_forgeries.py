@@ -28,11 +28,11 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.npy import array_of
 from gelpolight_core.io.reading import parse_json, parse_toml
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.protocol_file import (
+from gelpolight_core.measurement.press import read_truth
+from gelpolight_core.measurement.protocol import (
     read_protocol_file,
 )
 from gelpolight_core.measurement.score import read_true_depth
-from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.records.entry import MeasurementRecord, Quantity

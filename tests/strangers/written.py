@@ -22,8 +22,7 @@ from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.profile import take_profile
-from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.protocol_file import ProtocolFile, write_protocol_file
+from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, Quantity

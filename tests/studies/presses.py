@@ -14,8 +14,8 @@ from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import stages_of
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.calibration.stages import run_stage
+from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.score import TrueDepth, read_true_depth
-from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import Session
 

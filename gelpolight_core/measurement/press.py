@@ -1,25 +1,30 @@
-"""Read ``truth.csv``: the pressed objects, their positions and repeats."""
+"""One press of a known object, and ``truth.csv``, which has a row for each."""
 
 from __future__ import annotations
 
 import csv
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import brief, is_file_name, read_file
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.result import Measurement, Truth, percent_error
 from gelpolight_core.translation import tr
 
 LONGEST_MM = 1000.0
 NEEDED = ("file", "shape", "height_mm")
+LENGTHS: Mapping[str, str] = MappingProxyType({"planar": "size_mm", "depth": "height_mm"})
+"""The length that is judged in each direction of the evaluation."""
 
 
 @dataclass(frozen=True, slots=True)
-class PressTruth:
-    """One row of ``truth.csv`` that can be measured.
+class Press:
+    """One press of an object of known size, before or after its measurement.
 
     Attributes
     ----------
@@ -29,12 +34,61 @@ class PressTruth:
         Nominal sizes.
     region, repeat : str
         Position on the sensor, and number of the repeat; empty if the file does not state it.
+    position_mm : (float, float)
+        Where a protocol wants its middle, (x, y) in the sensor frame.
+    yaw_deg : float
+        Rotation of a cuboid, from x to y, in a protocol.
+    outcome : Measurement or str
+        The measurement, or the sentence why there is none; empty before.
     """
 
     file: str
     truth: Truth
     region: str = ""
     repeat: str = ""
+    position_mm: tuple[float, float] = (0.0, 0.0)
+    yaw_deg: float = 0.0
+    outcome: Measurement | str = field(default="", compare=False)
+
+    @property
+    def measurement(self) -> Measurement | None:
+        """The measurement, if there is one."""
+        return None if isinstance(self.outcome, str) else self.outcome
+
+    def true_mm(self, direction: str) -> float:
+        """Return the nominal size (``planar``) or height (``depth``)."""
+        return float(getattr(self.truth, LENGTHS[direction]))
+
+    def measured_mm(self, direction: str) -> float:
+        """Return the measured size or height; NaN without a measurement."""
+        return float(getattr(self.measurement, LENGTHS[direction], math.nan))
+
+    def error_percent(self, direction: str) -> float:
+        """Return the signed error of size or height; NaN without a measurement."""
+        return percent_error(self.measured_mm(direction), self.true_mm(direction))
+
+    def as_row(self) -> dict[str, Any]:
+        """Return the press as one line of the evaluation's tables; None: not known."""
+        truth, measured = self.truth, self.measurement
+        lengths: dict[str, float | None] = {}
+        for direction, key in LENGTHS.items():
+            known = measured is not None
+            sd_key = key.replace("_mm", "_sd_mm")
+            lengths |= {
+                f"true_{key}": self.true_mm(direction),
+                key: self.measured_mm(direction) if known else None,
+                sd_key: getattr(measured, sd_key, None),
+                f"{direction}_error_percent": self.error_percent(direction) if known else None,
+            }
+        return {
+            "file": self.file,
+            "shape": truth.shape,
+            "region": self.region,
+            "repeat": self.repeat,
+            **lengths,
+            "verdict": measured.verdict if measured else "not measured",
+            "reason": measured.reason if measured else self.outcome,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +97,13 @@ class TruthTable:
 
     Attributes
     ----------
-    rows : tuple of PressTruth
+    rows : tuple of Press
         Cylinders, cuboids and balls.
     skipped : tuple of str
         Files of other shapes, which have no size to compare.
     """
 
-    rows: tuple[PressTruth, ...]
+    rows: tuple[Press, ...]
     skipped: tuple[str, ...]
 
 
@@ -69,7 +123,7 @@ def read_truth(path: Path) -> TruthTable:
     """
     path = path / "truth.csv" if path.is_dir() else path
     records = _records(path)
-    rows: list[PressTruth] = []
+    rows: list[Press] = []
     skipped: list[str] = []
     seen: set[str] = set()
     for line, record in records:
@@ -149,10 +203,10 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     ]
 
 
-def _press(file: str, shape: str, record: dict[str, str], where: str) -> PressTruth:
+def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
     key = "side_mm" if shape == "cuboid" else "diameter_mm"
     truth = Truth(shape, _length(record, key, where), _length(record, "height_mm", where))
-    return PressTruth(file, truth, record.get("region", ""), record.get("repeat", ""))
+    return Press(file, truth, record.get("region", ""), record.get("repeat", ""))
 
 
 def _length(record: dict[str, str], key: str, where: str) -> float:

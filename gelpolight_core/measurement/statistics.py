@@ -1,0 +1,70 @@
+"""Statistics of repeated measurements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Statistics of values of one quantity, in its unit; NaN where there are too few.
+
+    Attributes
+    ----------
+    count : int
+        Number of finite values.
+    mean_absolute, mean : float
+        Mean of the absolute values and of the values.
+    sd : float
+        Standard deviation of a single value (n - 1).
+    lowest, highest : float
+        Extremes.
+    """
+
+    count: int
+    mean_absolute: float
+    mean: float
+    sd: float
+    lowest: float
+    highest: float
+
+    @property
+    def spread(self) -> float:
+        """Largest minus smallest."""
+        return self.highest - self.lowest
+
+    @property
+    def repeatability(self) -> float:
+        """Two measurements differ by less than this with a probability of 95 %.
+
+        ISO 5725-6, 4.1: the repeatability limit, 2.8 standard deviations. The difference of two
+        has sqrt(2) times the standard deviation of one.
+        """
+        return float(norm.ppf(0.975)) * math.sqrt(2.0) * self.sd
+
+    def as_json(self, unit: str) -> dict[str, float | None]:
+        """Return plain values, their names with a unit; None instead of NaN."""
+        return {
+            key if key == "count" else f"{key}_{unit}": value if math.isfinite(value) else None
+            for key, value in asdict(self).items()
+        }
+
+
+def statistics_of(values: Iterable[float]) -> Statistics:
+    """Return the statistics of values; those that are not finite are left out."""
+    known = np.array([value for value in values if math.isfinite(value)], np.float64)
+    if known.size == 0:
+        return Statistics(0, *([math.nan] * 5))
+    return Statistics(
+        known.size,
+        float(np.abs(known).mean()),
+        float(known.mean()),
+        float(known.std(ddof=1)) if known.size > 1 else math.nan,
+        float(known.min()),
+        float(known.max()),
+    )
