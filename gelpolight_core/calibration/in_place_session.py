@@ -21,6 +21,7 @@ from gelpolight_core.in_place.calibrate import (
     PressImage,
     calibrate_in_place,
 )
+from gelpolight_core.in_place.roundness import judge_stretch
 from gelpolight_core.in_place.scale import MeasuredScale, scale_from_pins, scale_from_punch
 from gelpolight_core.io.reading import as_text
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor, InPlaceCalibration
@@ -270,8 +271,10 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
     used, refused = len(result.presses), len(result.refused)
     more = tr("Press more balls at more positions")
     sizes = tr("Check the ball radii and the scale (mm per pixel)")
+    grid = result.model.grid
+    scale = judge_scale(grid.mm_per_px, scale_sd).figures
     return {
-        "scale": judge_scale(result.model.grid.mm_per_px, scale_sd),
+        "scale": QualityTable((*scale, *judge_stretch(result.stretch, grid))),
         "balls": QualityTable(
             (
                 judge(

@@ -19,6 +19,7 @@ from scipy import ndimage
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
+from gelpolight_core.in_place.dead_channel import refuse_dead_channel
 from gelpolight_core.in_place.fit import (
     FIRST_RIDGE,
     INSIDE,
@@ -38,6 +39,7 @@ from gelpolight_core.in_place.held_out import (
 )
 from gelpolight_core.in_place.next_ball import learning_curve, next_position
 from gelpolight_core.in_place.press import find_contact
+from gelpolight_core.in_place.roundness import Stretch, stretch_of
 from gelpolight_core.in_place.same_view import refuse_other_view
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reconstruction.in_place.change import (
@@ -132,6 +134,8 @@ class InPlaceResult:
         Number of balls, and root mean square slope error of other presses with this number.
     next_position_mm : tuple of 2 floats
         Best position of the next ball: farthest from all presses.
+    stretch : Stretch or None
+        Height over width of the contacts; None where too few edges are seen.
     """
 
     model: InPlaceModel
@@ -140,6 +144,7 @@ class InPlaceResult:
     ridge: Ridge = FIRST_RIDGE
     learning: tuple[tuple[int, float], ...] = ()
     next_position_mm: tuple[float, float] = (0.0, 0.0)
+    stretch: Stretch | None = None
 
 
 @dataclass(slots=True)
@@ -151,6 +156,7 @@ class _Work:
     start: list[Ball]
     balls: list[Ball]
     refused: dict[str, InputError]
+    stretches: list[tuple[float, ...]]
 
     def keep(self, kept: Sequence[bool]) -> None:
         """Keep only these presses."""
@@ -197,6 +203,7 @@ def calibrate_in_place(
     base = reference(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
     refuse_other_view(images, reduced)
+    refuse_dead_channel(images, reduced)
     work = _begin(presses, images, base, grid, say)
     sums, ridge = _sums(work), FIRST_RIDGE
     for turn in range(ROUNDS):
@@ -230,6 +237,7 @@ def calibrate_in_place(
         ridge,
         learning_curve(sums, ridge),
         next_position(work.balls, grid, base.known),
+        stretch_of(work.stretches),
     )
 
 
@@ -242,20 +250,23 @@ def _begin(
 ) -> _Work:
     """Find the contact in each reduced image."""
 
-    def find(item: tuple[PressImage, Map]) -> tuple[ColourChange, Ball] | InputError:
+    def find(
+        item: tuple[PressImage, Map],
+    ) -> tuple[ColourChange, Ball, tuple[float, ...]] | InputError:
         press, image = item
         radius = press.radius_mm / grid.pitch_mm
+        stretches: tuple[float, ...] = ()
         try:
             if press.placed is not None:
                 edge = grid.on_nodes(press.placed)
             else:
-                edge, _ = find_contact(image, base, ball_radius=radius, name=press.name)
+                edge, stretches = find_contact(image, base, ball_radius=radius, name=press.name)
         except InputError as fault:
             return fault
         seen = colour_change(image, base)
-        return seen, Ball(edge.x, edge.y, edge.radius, radius).limited()
+        return seen, Ball(edge.x, edge.y, edge.radius, radius).limited(), stretches
 
-    work = _Work([], [], [], [], {})
+    work = _Work([], [], [], [], {}, [])
     with closing(in_parallel(find, list(zip(presses, images, strict=True)))) as contacts:
         for index, (press, found) in enumerate(zip(presses, contacts, strict=True)):
             say(0.3 * (index + 1) / len(presses))
@@ -266,6 +277,7 @@ def _begin(
             work.seen.append(found[0])
             work.start.append(found[1])
             work.balls.append(found[1])
+            work.stretches.append(found[2])
     _require_presses(work)
     return work
 

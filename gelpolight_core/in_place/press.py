@@ -14,7 +14,7 @@ Map = NDArray[np.float32]
 
 def find_contact(
     image: Map, base: Reference, *, ball_radius: float | None, name: str
-) -> tuple[Circle, float]:
+) -> tuple[Circle, tuple[float, ...]]:
     """Return the contact's edge in an image, also where the border cuts it.
 
     Parameters
@@ -32,8 +32,8 @@ def find_contact(
     -------
     circle : Circle
         The edge, nodes.
-    sd : float
-        Standard deviation of its centre.
+    stretches : tuple of float
+        Logarithm of its height over its width, by the edge and by the shading.
 
     Raises
     ------
@@ -46,5 +46,5 @@ def find_contact(
     if found.indentation is None:
         assert found.refusal is not None
         raise found.refusal
-    (x, y), sd = found.indentation.centre, found.indentation.centre_sd_px
-    return Circle(x, y, found.indentation.contact_radius_px), sd
+    indentation = found.indentation
+    return Circle(*indentation.centre, indentation.contact_radius_px), indentation.stretches

@@ -299,13 +299,14 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
     """Return the kink's contour if it is clean and agrees with the shading, else the shading's."""
     rough, radius = shading.circle, shading.circle.radius
     contour = fit_edge(sharp, area, rough)
+    stretches = (*contour.stretches, shading.stretch)
     apart = float(np.hypot(contour.circle.x - rough.x, contour.circle.y - rough.y))
     clean = contour.residual_px < _CLEAN_EDGE * contour.circle.radius
     clean &= hidden < _MOST_HIDDEN_EDGE
     if clean and apart < _AGREES * radius and 0.75 < contour.circle.radius / radius < 1.33:
         systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * contour.residual_px)
         sd = float(np.hypot(contour.centre_sd_px, systematic))
-        return replace(contour, centre_sd_px=sd), "edge"
+        return replace(contour, centre_sd_px=sd, stretches=stretches), "edge"
     model_sd = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart, 0.5 * radius))
     sd = float(np.hypot(shading.centre_sd_px, model_sd))
     turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
@@ -316,7 +317,8 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
     seen = inside.copy()
     seen[inside] = area[np.rint(y[inside]).astype(int), np.rint(x[inside]).astype(int)]
     points = np.stack([x, y], axis=1)[seen]
-    return Contour(rough, points, sd, shading.axis_ratio, float(seen.mean()), sd), "shading"
+    coverage = float(seen.mean())
+    return Contour(rough, points, sd, shading.axis_ratio, coverage, sd, stretches), "shading"
 
 
 def _in_noise_units(change: ScaledDifference) -> Array:

@@ -47,6 +47,8 @@ class ShadingFit:
         Standard deviation of the centre per axis that follows from what is left unexplained.
     axis_ratio : float
         Shorter over longer axis, if the ball is fitted as an ellipse.
+    stretch : float
+        Logarithm of the axis along y over the axis along x of that ellipse.
     explained : float
         Share of the change of brightness that the ball's shading explains, 0..1, without noise.
     inner_change : float
@@ -58,6 +60,7 @@ class ShadingFit:
     decay_px: float
     centre_sd_px: float
     axis_ratio: float
+    stretch: float
     explained: float
     inner_change: float
 
@@ -272,6 +275,7 @@ def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -
         decay,
         sd,
         float((1.0 - stretch) / (1.0 + stretch)),
+        float(2.0 * np.arctanh(np.clip(oval.shape[4], -0.9, 0.9))),
         1.0 - left / signal,
         _inner_change(pixels, best),
     )

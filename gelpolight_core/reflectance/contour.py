@@ -83,6 +83,8 @@ class Contour:
         Share of the directions in which the edge is seen.
     centre_sd_px : float
         Standard deviation of the circle's centre, per axis, that follows from the residual.
+    stretches : tuple of float
+        Logarithm of the axis along y over the axis along x, by each method that measured it.
     """
 
     circle: Circle
@@ -91,6 +93,7 @@ class Contour:
     axis_ratio: float
     coverage: float
     centre_sd_px: float
+    stretches: tuple[float, ...] = ()
 
 
 def kink_table(
@@ -324,6 +327,7 @@ def trace_contour(table: KinkTable, around: Circle, *, margin: float = 0.2) -> C
         float((mean - second) / (mean + second)),
         float(on.mean()),
         spread * float(np.sqrt(2.0 / max(independent, 1.0))),
+        (float(-2.0 * ellipse[3] / mean),),
     )
 
 

@@ -62,6 +62,8 @@ class Indentation:
         Source of the circle: ``edge``, ``shading``, or ``hand`` if the user placed it.
     axis_ratio : float
         Shorter over longer axis of the ellipse through the contour.
+    stretches : tuple of float
+        Logarithm of the axis along y over that along x, by the edge and by the shading.
     coverage : float
         Share of the directions in which the edge was seen, 0..1.
     disturbed : (rows, columns) bool
@@ -87,6 +89,7 @@ class Indentation:
     radius_sd_px: float
     found_by: str
     axis_ratio: float
+    stretches: tuple[float, ...]
     coverage: float
     disturbed: Mask
     noise: tuple[float, float, float]
@@ -194,6 +197,7 @@ def describe_indentation(
         radius_sd_px=contour.centre_sd_px,
         found_by=found_by,
         axis_ratio=contour.axis_ratio,
+        stretches=contour.stretches,
         coverage=contour.coverage,
         disturbed=disturbed,
         noise=change.noise,

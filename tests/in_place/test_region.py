@@ -17,6 +17,7 @@ from app.measure.press_check import to_image
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import Session, read_session
 
@@ -126,3 +127,39 @@ def test_pixels_that_are_not_square_give_a_metric_map(
         assert ball == pytest.approx(wanted, abs=0.15)
     ratios = [press.held_out.diameter_ratio for press in run.result.presses]
     assert np.median(ratios) == pytest.approx(1.0, abs=0.03)
+
+
+def test_contacts_that_are_all_oval_alike_say_what_pixels_to_state(
+    squeezed_session: Session, closed_run: InPlaceRun, closed_session: Session
+) -> None:
+    assert squeezed_session.in_place is not None
+    scale = scale_of(closed_session)
+    nearly = replace(squeezed_session.in_place, mm_per_px=(scale, 1.15 * scale))
+    run = calibrate_closed_session(replace(squeezed_session, in_place=nearly))
+    figures = {f.key: f for f in run.calibration.quality["scale"].figures}
+    oval = figures["contact_stretch_percent"]
+    assert oval.verdict is Verdict.WARN
+    assert oval.value == pytest.approx(100.0 * np.log(1.25 / 1.15), abs=1.5)
+    stated = [float(n) for n in oval.remedy.split("[")[1].rstrip("]").split(",")]
+    assert stated == pytest.approx([scale, 1.25 * scale], rel=0.015)
+    usual = {f.key: f for f in closed_run.calibration.quality["scale"].figures}
+    assert usual["contact_stretch_percent"].verdict is Verdict.PASS
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_a_channel_without_light_in_all_images_is_named(
+    closed_folder: Path, closed_session: Session, tmp_path: Path, share: float
+) -> None:
+    random = np.random.default_rng(1)
+
+    def without_blue(image: Image) -> Image:
+        level = 1 if image.dtype == np.uint8 else 256
+        noise = random.normal(1.0, 1.0, image.shape[:2]) * level
+        blue = share * image[..., 2] + noise  # OpenCV's order: blue, green, red
+        image[..., 0] = np.maximum(blue, 0).round()
+        return image
+
+    stated = f"mm_per_px = {scale_of(closed_session)}"
+    session = changed(closed_folder, tmp_path / "session", without_blue, stated)
+    with pytest.raises(InputError, match="The blue channel shows no light of its own"):
+        calibrate_closed_session(session)

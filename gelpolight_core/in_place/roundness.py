@@ -1,0 +1,88 @@
+"""Whether the contacts of balls are round: where all are oval alike, pixels are not square."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gelpolight_core.finding import Finding, judge
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
+from gelpolight_core.translation import tr
+
+LEAST_CONTACTS = 3
+DOUBTFUL_SIGMAS = 2.0
+"""Round contacts look more oval in one of twenty calibrations."""
+
+
+class Stretch(NamedTuple):
+    """How much higher than wide the contacts of balls are.
+
+    Attributes
+    ----------
+    log_ratio : float
+        Logarithm of height over width.
+    sd : float
+        Its standard deviation.
+    """
+
+    log_ratio: float
+    sd: float
+
+
+def stretch_of(stretches: Sequence[tuple[float, ...]]) -> Stretch | None:
+    """Return the common stretch of contacts.
+
+    The edges measure it. The shading of the contacts underestimates it, but is affected less by the
+    direction of the light: the difference of both shows the systematic error.
+
+    Parameters
+    ----------
+    stretches : sequence of tuple of float
+        Logarithm of height over width of each contact, by its edge and by its shading; others
+        are left out.
+
+    Returns
+    -------
+    Stretch or None
+        None for fewer than 3 contacts.
+    """
+    pairs = np.array([pair for pair in stretches if len(pair) == 2 and np.isfinite(pair).all()])
+    if len(pairs) < LEAST_CONTACTS:
+        return None
+    edge, shading = np.median(pairs, axis=0)
+    scatter = 1.4826 * float(np.median(np.abs(pairs[:, 0] - edge)))
+    # Of a median of normal values; and of one of two values that differ by so much.
+    random, systematic = scatter * np.sqrt(0.5 * np.pi / len(pairs)), (edge - shading) / np.sqrt(2)
+    return Stretch(float(edge), float(np.hypot(random, systematic)))
+
+
+def judge_stretch(stretch: Stretch | None, grid: WorkingGrid) -> tuple[Finding, ...]:
+    """Judge whether the contacts are round with the stated size of the pixels.
+
+    Parameters
+    ----------
+    stretch : Stretch or None
+        As measured on the grid; nothing is judged without it.
+    grid : WorkingGrid
+        With the stated size of a pixel along x and y.
+    """
+    if stretch is None:
+        return ()
+    x, y = grid.pixel_mm
+    ratio = float(np.exp(stretch.log_ratio))
+    remedy = tr(
+        "The contacts are {ratio:.3f} \N{PLUS-MINUS SIGN} {sd:.3f} times as high as wide: "
+        "state mm_per_px = [{x:.5g}, {y:.5g}]"
+    )
+    return (
+        judge(
+            "contact_stretch_percent",
+            tr("Contacts higher or wider than round"),
+            100.0 * abs(stretch.log_ratio),
+            "%",
+            warn=DOUBTFUL_SIGMAS * 100.0 * stretch.sd,
+            remedy=remedy.format(ratio=ratio, sd=ratio * stretch.sd, x=x, y=y / ratio),
+        ),
+    )
