@@ -50,6 +50,7 @@ def test_images_are_reconstructed_measured_and_timed(
     assert main(["reconstruct", str(calibration), str(image), "-o", str(out), "--uncertainty"]) == 0
     with np.load(out / f"{image.stem}.npz") as arrays:
         assert {"depth_mm", "normals", "x_mm", "y_mm", "flags", "pitch_mm"} <= set(arrays)
+        assert (arrays["depth_sd_mm"] > 0.0).all()
         assert arrays["depth_mm"].shape == (arrays["y_mm"].size, arrays["x_mm"].size)
     measured = tmp_path / "ball.json"
     command = ["measure", str(calibration), str(image), "--shape", "ball"]
