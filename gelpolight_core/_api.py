@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.any_session import calibrate_any
+from gelpolight_core.calibration.project import calibrate as calibrate_session
+from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.export.raster import read_npz
@@ -19,7 +20,7 @@ from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
@@ -80,7 +81,7 @@ def simulate(
 
 def calibrate(
     session: AnyPath, *, model: str | None = None, progress: Progress | None = None
-) -> AnyCalibration:
+) -> Calibration:
     """Calibrate a sensor from its session folder.
 
     Parameters
@@ -96,7 +97,7 @@ def calibrate(
 
     Returns
     -------
-    Calibration or InPlaceCalibration
+    Calibration
         Its `quality` holds the quality figures of each stage, `verdict` the worst of them.
 
     Raises
@@ -112,7 +113,8 @@ def calibrate(
     'paper'
     """
     found = read_session(Path(session))
-    return calibrate_any(found, model=model, progress=progress).calibration
+    recipe = recipe_of(found, model)
+    return calibrate_session(found, recipe, progress=progress).calibration
 
 
 def read_image(path: AnyPath) -> NDArray[Any]:

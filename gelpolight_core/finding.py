@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -225,9 +225,14 @@ class QualityTable:
         return [figure.as_row() for figure in self.figures]
 
 
+def joined_tables(tables: Iterable[QualityTable]) -> QualityTable:
+    """Return one table with the figures of several."""
+    return QualityTable(tuple(figure for table in tables for figure in table.figures))
+
+
 def worst_verdict(quality: Mapping[str, QualityTable]) -> Verdict:
     """Return the worst verdict of a calibration's stages."""
-    return QualityTable(tuple(f for table in quality.values() for f in table.figures)).verdict
+    return joined_tables(quality.values()).verdict
 
 
 def failure(quality: Mapping[str, QualityTable]) -> str:

@@ -4,26 +4,41 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
 from gelpolight_core.finding import QualityTable, Verdict, failure, worst_verdict
+from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.masks import saturated
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.refraction import LayerStack, build_stack
-from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.optics.refraction import LayerStack, build_stack, membrane_to_camera
+from gelpolight_core.optics.resampling import (
+    MembraneGrid,
+    ResamplingTable,
+    build_resampling_table,
+    visible_grid,
+)
+from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.session.session import SensorData
+from gelpolight_core.session.session import SENSOR_RANGES, SensorData
+from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 MODELS = ("paper", "full")
+MOST_CROSSTALK = 100.0
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +154,8 @@ class FullModel:
         ``two-lobe`` or ``one-dimensional``: the form of `membrane`.
     scale_sd : ScaleSd or None
         Uncertainty of the lengths; None in calibrations by programs that did not estimate it.
+    older_reach_mm : float or None
+        Reach of the interreflection as earlier programs described it. Only the identity uses it.
     """
 
     led_positions_mm: Array
@@ -153,18 +170,105 @@ class FullModel:
     membrane_held_out: tuple[float, float] = (0.0, 0.0)
     membrane_kept: str = MEMBRANES[0]
     scale_sd: ScaleSd | None = None
+    older_reach_mm: float | None = None
+
+    def check(self) -> None:
+        """Refuse impossible values.
+
+        Raises
+        ------
+        ValueError
+            With the first of them.
+        """
+        self.membrane.check()
+        figures = [self.misfit, *self.held_out, *self.membrane_held_out, *self.membrane_sd.values()]
+        if self.scale_sd is not None:
+            figures += [self.scale_sd.depth, self.scale_sd.lateral, self.scale_sd.balls]
+        if min(figures) < 0.0 or self.decay_mm <= 0.0:
+            raise ValueError("the figures of the joint refinement are impossible")
+        if self.kept not in ("refined", "mirror") or self.membrane_kept not in MEMBRANES:
+            raise ValueError("the choice of the joint refinement is unknown")
+
+    @property
+    def membrane_text(self) -> str:
+        """The membrane in the identity."""
+        if self.older_reach_mm is None:
+            return repr(self.membrane)
+        m = self.membrane
+        return (
+            f"Membrane(exponent={m.exponent!r}, gloss={m.gloss!r}, roughness={m.roughness!r}, "
+            f"bounce={m.interreflection!r}, bounce_reach_mm={self.older_reach_mm!r}, "
+            f"diffuse={m.diffuse!r})"
+        )
+
+
+class ImageSize(Protocol):
+    """Size of the camera's images in pixels."""
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+
+    @property
+    def height(self) -> int:
+        """Rows."""
+
+
+class SensorModel(Protocol):
+    """The calibrated data of a kind of sensor, and what every user of a calibration asks of it."""
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the sensor."""
+
+    @property
+    def camera(self) -> ImageSize:
+        """The camera, or at least the size of its images."""
+
+    @property
+    def noise(self) -> Array:
+        """Standard deviation (3,) of a pixel of a single image at median brightness."""
+
+    @property
+    def response(self) -> CameraResponse | None:
+        """Of the camera; None where it is linear."""
+
+    @property
+    def table(self) -> ResamplingTable:
+        """The camera pixel of each node of the membrane grid."""
+
+    @property
+    def bad_pixels(self) -> BadPixels:
+        """Dead and hot pixels of the camera."""
+
+    @property
+    def background(self) -> Map:
+        """The untouched membrane as the camera sees it, linear light on the grid."""
+
+    def with_background(self, present: Map) -> SensorModel:
+        """Return the data with another image of the untouched membrane, on the grid."""
+
+    def on_grid(self, rgb: Map) -> Map:
+        """Return a camera image (height, width, 3) on the grid (rows, columns, 3)."""
+
+    def digest(self, model: str) -> bytes:
+        """Return a hash that changes with any number that a reconstruction uses."""
+
+    def check(self) -> None:
+        """Refuse impossible values; raises ValueError."""
+
+    def to_pixels(self, points_mm: Array) -> Array:
+        """Return the camera pixels (N, 2) that see points (N, 2) of the undeformed membrane."""
 
 
 @dataclass(frozen=True)
-class Calibration:
-    """All calibrated data of one sensor.
+class OpenSensor:
+    """Optics, lights and membrane of a sensor that can be opened.
 
     Attributes
     ----------
     sensor : SensorData
         Data stated by the maker.
-    model : str
-        The model it was made for: ``paper`` or ``full``.
     camera, plane
         Lens and top surface.
     led_positions_mm : (3, 3)
@@ -179,10 +283,6 @@ class Calibration:
         G and R (Eq. 6, 7).
     noise : (3,)
         Standard deviation of a pixel of a single image at median brightness, per channel.
-    quality : mapping
-        Quality table of every stage, in order.
-    provenance : Provenance
-        Origin of the calibration.
     full : FullModel or None
         Data of the full model; None if the calibration was made for the paper's model only.
     response : CameraResponse or None
@@ -194,16 +294,13 @@ class Calibration:
         Standard deviation of the blur of lens and pixel on the top surface, in raw pixels; None in
         calibrations by programs that did not measure it.
 
-    Examples
-    --------
-    >>> import gelpolight_core as gp
-    >>> calibration = gp.read_calibration("sensor.gplcal")
-    >>> calibration.led_positions_mm.shape
-    (3, 3)
+    Raises
+    ------
+    ValueError
+        If a value is impossible, or the maps do not fit the optics.
     """
 
     sensor: SensorData
-    model: str
     camera: Camera
     plane: TopPlane
     led_positions_mm: Array
@@ -213,12 +310,15 @@ class Calibration:
     factors: Map
     reflectance: ReflectanceTable
     noise: Array
-    quality: Mapping[str, QualityTable]
-    provenance: Provenance
     full: FullModel | None = None
     response: CameraResponse | None = None
     bad: BadPixels | None = None
     lens_blur_px: float | None = None
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the sensor."""
+        return self.sensor.serial
 
     @cached_property
     def bad_pixels(self) -> BadPixels:
@@ -241,12 +341,45 @@ class Calibration:
         )
 
     @cached_property
-    def identity(self) -> str:
-        """A short name that changes with any number that a reconstruction uses.
+    def background(self) -> Map:
+        """The untouched membrane as the camera sees it, linear light on the grid; 0: not known."""
+        if self.full is None:
+            return np.asarray(self.factors * self._even_membrane, np.float32)
+        mixed = np.minimum(self.full.background @ self.crosstalk.T, 1.0)
+        return np.asarray(np.where(self.table.valid[..., None], mixed, 0.0), np.float32)
 
-        Operator and time are not included: the same images give the same name.
+    @property
+    def _even_membrane(self) -> Array:
+        """Image of a uniform flat membrane (I_t of Eq. 9), (rows, columns, 3)."""
+        cosines = flat_cosines(self.table, self.led_positions_mm)
+        response = [self.reflectance.response(k, cosines[..., k]) for k in range(3)]
+        return np.asarray(self.radiance * np.stack(response, axis=-1))
+
+    def with_background(self, present: Map) -> OpenSensor:
+        """Return the data with another image of the untouched membrane, on the grid.
+
+        The reflectance factors (Eq. 9) follow from it; they are 0 where they are unknown.
         """
-        digest = hashlib.sha256(repr((self.sensor, self.model, self.camera, self.plane)).encode())
+        theory = self._even_membrane
+        factors = np.zeros(present.shape, np.float32)
+        np.divide(present, theory, out=factors, where=theory > 0.0, casting="same_kind")
+        known = (factors > LEAST_FACTOR).all(axis=2) & np.isfinite(factors).all(axis=2)
+        # The same limit as for the white board: dim areas are left out.
+        light = self.radiance * flat_cosines(self.table, self.led_positions_mm)
+        known &= ~saturated(present).any(axis=2) & (light > LEAST_LIGHT).all(axis=2)
+        factors[~known] = 0.0
+        full = self.full
+        if full is not None:
+            full = replace(full, background=unmix(present, self.crosstalk))
+        return replace(self, factors=factors, full=full)
+
+    def on_grid(self, rgb: Map) -> Map:
+        """Return a camera image (height, width, 3) on the grid (rows, columns, 3)."""
+        return self.table.apply(rgb)
+
+    def digest(self, model: str) -> bytes:
+        """Return a hash that changes with any number that a reconstruction uses."""
+        hashed = hashlib.sha256(repr((self.sensor, model, self.camera, self.plane)).encode())
         arrays = [
             self.led_positions_mm,
             self.led_covariance_mm2,
@@ -260,17 +393,183 @@ class Calibration:
         ]
         if self.full is not None:
             full = self.full
-            digest.update(repr((full.membrane, full.kept, full.decay_mm, full.misfit)).encode())
+            figures = repr((full.kept, full.decay_mm, full.misfit))
+            hashed.update(f"({full.membrane_text}, {figures[1:]}".encode())
             arrays += [full.led_positions_mm, full.led_sd_mm, full.background]
         if self.response is not None:
             arrays.append(self.response.curves)
         if self.bad is not None:
             arrays.append(self.bad.pixels)
         if self.lens_blur_px is not None:
-            digest.update(repr(self.lens_blur_px).encode())
+            hashed.update(repr(self.lens_blur_px).encode())
         for array in arrays:
-            digest.update(np.ascontiguousarray(array).tobytes())
-        return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"
+            hashed.update(np.ascontiguousarray(array).tobytes())
+        return hashed.digest()
+
+    def check(self) -> None:
+        """Refuse impossible values, and maps that do not fit the optics.
+
+        Raises
+        ------
+        ValueError
+            With the first of them.
+        """
+        camera, grid = self.camera, self._grid
+        lengths = camera.width, camera.height, camera.fx, camera.fy, self.plane.distance_mm
+        if min(lengths) <= 0 or camera.width * camera.height > MAX_PIXELS:
+            raise ValueError("camera or plane have impossible values")
+        if abs(float(np.linalg.norm(self.plane.normal_camera)) - 1.0) > ROUNDING:
+            raise ValueError("the normal of the plane does not have length 1")
+        for name, (low, high) in SENSOR_RANGES.items():
+            if not low <= getattr(self.sensor, name) <= high:
+                raise ValueError(f"{name} has the invalid value {getattr(self.sensor, name)}")
+        if self.lens_blur_px is not None and not 0.0 < self.lens_blur_px < min(lengths[:2]):
+            raise ValueError(f"the blur of the lens is {self.lens_blur_px} pixels")
+        if self.bad is not None and (self.bad.width, self.bad.height) != lengths[:2]:
+            raise ValueError("the bad pixels are of another image size")
+        self.reflectance.check()
+        shapes: list[tuple[NDArray[Any], tuple[int, ...]]] = [
+            (self.led_positions_mm, (3, 3)),
+            (self.led_covariance_mm2, (3, 3, 3)),
+            (self.crosstalk, (3, 3)),
+            (self.noise, (3,)),
+            (self.radiance, (*grid.shape, 3)),
+            (self.factors, (*grid.shape, 3)),
+        ]
+        if self.full is not None:
+            self.full.check()
+            shapes += [
+                (self.full.led_positions_mm, (3, 3)),
+                (self.full.led_sd_mm, (3, 3)),
+                (self.full.background, (*grid.shape, 3)),
+            ]
+            # Removing crosstalk leaves noise around zero where the background is dark.
+            if float(self.full.background.min()) < -float(self.full.background.max()):
+                raise ValueError("the background has impossible values")
+        if any(array.shape != shape for array, shape in shapes):
+            raise ValueError("an array does not fit the optics")
+        if not np.linalg.cond(self.crosstalk) < MOST_CROSSTALK:
+            raise ValueError("the crosstalk matrix cannot be inverted")
+        if min(float(self.radiance.min()), float(self.factors.min())) < 0.0:
+            raise ValueError("radiance or factors are negative")
+
+    @property
+    def _grid(self) -> MembraneGrid:
+        diameter_mm = self.sensor.working_diameter_mm
+        return visible_grid(self.camera, self.plane, self.stack, diameter_mm=diameter_mm)
+
+    def to_pixels(self, points_mm: Array) -> Array:
+        """Return the camera pixels (N, 2) that see points (N, 2) of the undeformed membrane."""
+        directions = membrane_to_camera(np.asarray(points_mm, float), self.plane, self.stack)
+        return np.asarray(self.camera.project(directions))
+
+
+K = TypeVar("K")
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """All calibrated data of one sensor.
+
+    Attributes
+    ----------
+    model : str
+        The model that it was made for: ``paper``, ``full`` or ``in-place``.
+    data : SensorModel
+        What was calibrated: an :class:`OpenSensor`, or the in-place model of a closed sensor.
+    quality : mapping
+        Quality table of every stage, in order.
+    provenance : Provenance
+        Origin of the calibration.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> calibration = gp.read_calibration("sensor.gplcal")
+    >>> calibration.model
+    'full'
+    >>> calibration.table.grid.pitch_mm < 0.2
+    True
+    """
+
+    model: str
+    data: SensorModel
+    quality: Mapping[str, QualityTable]
+    provenance: Provenance
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the sensor."""
+        return self.data.serial
+
+    @property
+    def camera(self) -> ImageSize:
+        """The camera, or at least the size of its images."""
+        return self.data.camera
+
+    @property
+    def noise(self) -> Array:
+        """Standard deviation (3,) of a pixel of a single image at median brightness."""
+        return self.data.noise
+
+    @property
+    def response(self) -> CameraResponse | None:
+        """Of the camera; None where it is linear."""
+        return self.data.response
+
+    @property
+    def table(self) -> ResamplingTable:
+        """The camera pixel of each node of the membrane grid."""
+        return self.data.table
+
+    @property
+    def bad_pixels(self) -> BadPixels:
+        """Dead and hot pixels of the camera."""
+        return self.data.bad_pixels
+
+    @property
+    def open_sensor(self) -> OpenSensor:
+        """Optics, lights and membrane.
+
+        Raises
+        ------
+        InputError
+            If they are unknown, because the calibration was made in place.
+        """
+        return self.data_of(OpenSensor)
+
+    def data_of(self, kind: type[K]) -> K:
+        """Return the data for work that needs this kind of them.
+
+        Raises
+        ------
+        InputError
+            If the calibration is of another kind of sensor.
+        """
+        if not isinstance(self.data, kind):
+            raise InputError(
+                tr("The calibration is of another kind of sensor (model {model})").format(
+                    model=self.model
+                ),
+                where=self.identity,
+                advice=tr("Use a calibration that knows the optics and lights of the sensor")
+                if kind is OpenSensor
+                else tr("Use a calibration made in place"),
+            )
+        return self.data
+
+    def changed(self, **values: Any) -> Calibration:
+        """Return a calibration with other values of its data; this one stays as it is."""
+        data: Any = self.data
+        return replace(self, data=replace(data, **values))
+
+    @cached_property
+    def identity(self) -> str:
+        """A short name that changes with any number that a reconstruction uses.
+
+        Operator and time are not included: the same images give the same name.
+        """
+        return f"{self.serial}-{self.data.digest(self.model).hex()[:12]}"
 
     @property
     def verdict(self) -> Verdict:

@@ -23,9 +23,8 @@ os.environ["LANGUAGE"] = "en"
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gelpolight_core.calibration.pipeline import CalibrationRun
-    from gelpolight_core.calibration.project import CalibrationProject
-    from gelpolight_core.calibration.results import StageResults
+    from gelpolight_core.calibration.project import Project, Run
+    from gelpolight_core.calibration.recipe import Results
     from gelpolight_core.sensor_calibration import Calibration
 
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
@@ -151,21 +150,20 @@ def _files_of(folder: Path) -> list[tuple[str, int, int]]:
 
 
 @pytest.fixture(scope="session")
-def rendered_optics(shared_data: Path, made_once: MadeOnce) -> Callable[[str], StageResults]:
+def rendered_optics(shared_data: Path, made_once: MadeOnce) -> Callable[[str], Results]:
     """Return a function that gives a rendered session's results up to its top surface."""
-    from gelpolight_core.calibration.inputs import Stage
-    from gelpolight_core.calibration.results import StageResults
-    from gelpolight_core.calibration.stages import run_stage
+    from gelpolight_core.calibration.recipe import Results
+    from gelpolight_core.calibration.recipes import FULL
     from gelpolight_core.session.session import read_session
 
-    def found(sensor: str) -> StageResults:
-        def make(_folder: Path) -> StageResults:
-            session, results = read_session(shared_data / sensor), StageResults()
-            for stage in (Stage.RESPONSE, Stage.LENS, Stage.TOP_POSE):
-                results = run_stage(stage, session, results)
+    def found(sensor: str) -> Results:
+        def make(_folder: Path) -> Results:
+            session, results = read_session(shared_data / sensor), Results()
+            for stage in FULL.stages[:3]:
+                results = FULL.run(stage, session, results)
             return results
 
-        return cast("StageResults", made_once(f"optics-{sensor}", make))
+        return cast("Results", made_once(f"optics-{sensor}", make))
 
     return found
 
@@ -191,33 +189,33 @@ def _simulated(made_once: MadeOnce, name: str, *, balls: int, scale: float) -> P
 
 
 @pytest.fixture(scope="session")
-def virtual_results(virtual_session: Path, made_once: MadeOnce) -> StageResults:
+def virtual_results(virtual_session: Path, made_once: MadeOnce) -> Results:
     """Return the results of every stage on the virtual session; not to be changed."""
-    from gelpolight_core.calibration.pipeline import stages_of
-    from gelpolight_core.calibration.results import StageResults
-    from gelpolight_core.calibration.stages import run_stage
+    from gelpolight_core.calibration.recipe import Results
+    from gelpolight_core.calibration.recipes import FULL
     from gelpolight_core.session.session import read_session
 
-    def make(_folder: Path) -> StageResults:
-        session, results = read_session(virtual_session), StageResults()
-        for stage in stages_of("full"):
-            results = run_stage(stage, session, results)
+    def make(_folder: Path) -> Results:
+        session, results = read_session(virtual_session), Results()
+        for stage in FULL.stages:
+            results = FULL.run(stage, session, results)
         return results
 
     return made_once("virtual-results", make)
 
 
 @pytest.fixture(scope="session")
-def virtual_run(virtual_session: Path, virtual_results: StageResults) -> CalibrationRun:
+def virtual_run(virtual_session: Path, virtual_results: Results) -> Run:
     """Return the full model's run on the virtual session; not to be changed."""
-    from gelpolight_core.calibration.pipeline import assemble
+    from gelpolight_core.calibration.project import assemble
+    from gelpolight_core.calibration.recipes import FULL
     from gelpolight_core.session.session import read_session
 
-    return assemble(read_session(virtual_session), virtual_results)
+    return assemble(FULL, read_session(virtual_session), virtual_results)
 
 
 @pytest.fixture(scope="session")
-def virtual_calibration(virtual_run: CalibrationRun) -> Calibration:
+def virtual_calibration(virtual_run: Run) -> Calibration:
     """Return the full model's calibration of the virtual session; not to be changed."""
     return virtual_run.calibration
 
@@ -237,43 +235,41 @@ def small_session_of_ten_balls(made_once: MadeOnce) -> Path:
 @pytest.fixture(scope="session")
 def small_calibration(small_session: Path, made_once: MadeOnce) -> Calibration:
     """Return what the command line makes of the small session; not to be changed."""
-    from gelpolight_core.calibration.pipeline import calibrate_session
+    from gelpolight_core.calibration.project import calibrate
     from gelpolight_core.session.session import read_session
 
     return made_once(
-        "small-calibration", lambda _: calibrate_session(read_session(small_session)).calibration
+        "small-calibration", lambda _: calibrate(read_session(small_session)).calibration
     )
 
 
 @pytest.fixture(scope="session")
-def small_project(small_session: Path, made_once: MadeOnce) -> CalibrationProject:
+def small_project(small_session: Path, made_once: MadeOnce) -> Project:
     """Return a project on the small session, computed stage by stage; not to be changed."""
-    from gelpolight_core.calibration.project import CalibrationProject
+    from gelpolight_core.calibration.project import Project
 
     def make(folder: Path) -> Any:
         shutil.copytree(small_session, folder / "session")
-        project = CalibrationProject(folder / "session")
+        project = Project(folder / "session")
         while project.stale():
             project.compute(project.stale()[0])
         return folder / "session", project._results, dict(project._outcomes)
 
     folder, results, outcomes = made_once("small-project", make)
-    project = CalibrationProject(folder)
+    project = Project(folder)
     project._results, project._outcomes = results, outcomes
     return project
 
 
 @pytest.fixture
-def computed_project(
-    small_project: CalibrationProject, tmp_path: Path
-) -> Callable[[], CalibrationProject]:
+def computed_project(small_project: Project, tmp_path: Path) -> Callable[[], Project]:
     """Return a function that opens a computed project on a folder of its own."""
-    from gelpolight_core.calibration.project import CalibrationProject
+    from gelpolight_core.calibration.project import Project
 
-    def make() -> CalibrationProject:
+    def make() -> Project:
         folder = tmp_path / "workspace" / "sensors" / "virtual-1" / "sessions" / "session"
         shutil.copytree(small_project.session.folder, folder)
-        copied = CalibrationProject(folder)
+        copied = Project(folder)
         copied._results, copied._outcomes = small_project._results, dict(small_project._outcomes)
         return copied
 

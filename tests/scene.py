@@ -15,7 +15,7 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.reflectance.table import cosine_table
-from gelpolight_core.sensor_calibration import Calibration, Provenance, sensor_stack
+from gelpolight_core.sensor_calibration import Calibration, OpenSensor, Provenance, sensor_stack
 from gelpolight_core.session.session import SensorData
 
 CAMERA = Camera(320, 240, 345.0, 345.0, 161.3, 118.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
@@ -44,9 +44,8 @@ def calibration() -> Calibration:
     grid_table = table()
     _, radiance = flat_light(grid_table.grid.points_mm())
     shown = np.where(grid_table.valid[..., None], radiance, 0.0).astype(np.float32)
-    return Calibration(
+    data = OpenSensor(
         sensor=SENSOR,
-        model="paper",
         camera=CAMERA,
         plane=PLANE,
         led_positions_mm=LEDS,
@@ -56,9 +55,10 @@ def calibration() -> Calibration:
         factors=np.where(shown > 0, 1.0, 0.0).astype(np.float32),
         reflectance=cosine_table(),
         noise=np.full(3, 0.002),
-        quality={"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))},
-        provenance=Provenance("2026-01-02T03:04:05+00:00", "someone", "0.1.0", "s", {"a": "b"}),
     )
+    quality = {"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))}
+    made = Provenance("2026-01-02T03:04:05+00:00", "someone", "0.1.0", "s", {"a": "b"})
+    return Calibration("paper", data, quality, made)
 
 
 def failed(cal: Calibration) -> Calibration:
@@ -80,7 +80,9 @@ def raw_image(slopes: np.ndarray, cal: Calibration) -> np.ndarray:
     from gelpolight_core.optics.refraction import camera_to_membrane
 
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width].astype(float)
-    points, _ = camera_to_membrane(CAMERA.directions(np.stack([u, v], axis=-1)), PLANE, cal.stack)
+    points, _ = camera_to_membrane(
+        CAMERA.directions(np.stack([u, v], axis=-1)), PLANE, cal.data.stack
+    )
     _, radiance = flat_light(points)
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
     light, _ = light_directions(LEDS, at_top)

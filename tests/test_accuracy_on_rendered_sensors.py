@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, stages_of
-from gelpolight_core.calibration.results import StageResults
-from gelpolight_core.calibration.stages import run_stage
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.project import Run, assemble
+from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -33,43 +33,44 @@ class Sensor:
 
     folder: Path
     truth: dict  # type: ignore[type-arg]
-    run: CalibrationRun
+    run: Run
 
 
 @pytest.fixture(scope="module", params=["sensor-A", "sensor-B"])
 def sensor(
     request: pytest.FixtureRequest,
     shared_data: Path,
-    rendered_optics: Callable[[str], StageResults],
+    rendered_optics: Callable[[str], Results],
 ) -> Sensor:
     """Calibrate a rendered session from its images alone."""
     folder = shared_data / request.param
     truth = json.loads((folder / "truth.json").read_text())
     session, results = read_session(folder), rendered_optics(request.param)
-    stages = stages_of("full")
-    for stage in stages[stages.index(Stage.TOP_POSE) + 1 :]:
-        results = run_stage(stage, session, results)
-    return Sensor(folder, truth, assemble(session, results))
+    for stage in FULL.stages[3:]:
+        results = FULL.run(stage, session, results)
+    return Sensor(folder, truth, assemble(FULL, session, results))
 
 
 def test_lens_plane_lights_and_balls_are_where_they_are(sensor: Sensor) -> None:
     c, truth = sensor.run.calibration, sensor.truth
     assert c.camera.fx == pytest.approx(truth["camera"]["fx"], rel=1e-3)
-    assert c.plane.distance_mm == pytest.approx(truth["top_plane"]["offset_mm"], rel=1e-3)
+    assert c.data.plane.distance_mm == pytest.approx(truth["top_plane"]["offset_mm"], rel=1e-3)
     normal = np.array(truth["top_plane"]["normal_camera"])
-    cosine = normal @ c.plane.normal_camera / np.linalg.norm(normal)
+    cosine = normal @ c.data.plane.normal_camera / np.linalg.norm(normal)
     assert np.degrees(np.arccos(min(cosine, 1.0))) < 0.05
     leds = np.array([truth["leds"][k]["camera_mm"] for k in "RGB"])
-    error = c.plane.to_sensor(c.plane.to_camera(c.led_positions_mm)) - c.plane.to_sensor(leds)
+    error = c.data.plane.to_sensor(
+        c.data.plane.to_camera(c.data.led_positions_mm)
+    ) - c.data.plane.to_sensor(leds)
     assert np.hypot(error[:, 0], error[:, 1]).max() < 0.15
     assert np.linalg.norm(error, axis=1).max() < 0.35
-    assert c.full is not None
-    refined = np.linalg.norm(c.plane.to_camera(c.full.led_positions_mm) - leds, axis=1)
+    assert c.data.full is not None
+    refined = np.linalg.norm(c.data.plane.to_camera(c.data.full.led_positions_mm) - leds, axis=1)
     assert refined.max() < 0.15
     centres = {b["file"]: b["centre_sensor_xy_mm"] for b in truth["balls"]}
     away = [
         np.hypot(*np.subtract(p.pose.centre_mm, centres[Path(p.name).name]))
-        for p in sensor.run.reflectance.presses
+        for p in sensor.run.results[REFLECTANCE].table.presses
     ]
     print(f"\n{sensor.folder.name}: balls {np.median(away):.4f} / {max(away):.4f} mm, ", end="")
     print(f"LEDs refined {refined.max():.3f} mm")

@@ -24,13 +24,13 @@ from gelpolight_core.set_up import judge_set_up, judge_set_up_by_pose
 def test_unusual_numbers_are_named(
     small_calibration: Calibration, changes: dict[str, float], keys: list[str]
 ) -> None:
-    sensor = replace(small_calibration.sensor, **changes)
+    sensor = replace(small_calibration.data.sensor, **changes)
 
     assert [finding.key for finding in judge_set_up(sensor)] == keys
 
 
 def test_the_measured_pose_contradicts_wrong_numbers(small_calibration: Calibration) -> None:
-    c = small_calibration
+    c = small_calibration.data
     low = np.array(c.led_positions_mm)
     low[:, :2] *= 10.0 / 12.0
     low[:, 2] = -5.0

@@ -9,11 +9,12 @@ from app.calibrate.detection import Detection, Detector, judged, or_refusal
 from app.calibrate.image_step import ImageStep
 from app.calibrate.light_checks import KnownImage, enlarged, marked, refuse_grey
 from app.calibrate.maps import Panel, three_maps
-from app.calibrate.marks import working_circle
-from app.calibrate.step_data import Step
+from app.calibrate.marks import table_of, working_circle
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.open_sensor import BACKGROUND
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.translation import tr
@@ -54,10 +55,8 @@ def detect_background(
 class BackgroundStep(ImageStep):
     """Checks that the membrane is well lit and untouched."""
 
-    step = Step(
-        "background",
-        tr("Background"),
-        (Stage.BACKGROUND,),
+    step = step_of(
+        BACKGROUND,
         tr(
             "The membrane is in place, and nothing touches it. Switch automatic exposure and white "
             "balance off, and do not change the exposure or the light afterwards."
@@ -70,15 +69,16 @@ class BackgroundStep(ImageStep):
     def detector(self, name: str) -> Detector:
         """Return the check of the bare membrane."""
         project = self.model.project
-        known = KnownImage(project.session.found(FOLDERS[Stage.RADIANCE]))
-        return partial(_check, table=getattr(project.results, "table", None), known=known)
+        known = KnownImage(project.session.found("whiteboard"))
+        return partial(_check, table=table_of(project.results), known=known)
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the reflectance factor of each LED."""
         results = self.model.project.results
-        found, table = (getattr(results, name, None) for name in ("factors", "table"))
-        if found is None or table is None:
+        made, table = results.get(REFLECTANCE), table_of(results)
+        if made is None or table is None:
             return ()
+        found = made.factors
         return three_maps(found.factors, found.usable, table.grid, tr("Reflectance factor"))
 
 

@@ -26,7 +26,7 @@ from app.calibrate.detection import (
 from app.calibrate.image_step import WAITING, ImageStep, Judgement
 from app.calibrate.marks import ball_contour, ball_handle, working_circle
 from app.calibrate.step import Parts
-from app.calibrate.step_data import Step
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
@@ -34,9 +34,10 @@ from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
-from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
+from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS, TOP_POSE
+from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.resampling import ResamplingTable, seen_at
 from gelpolight_core.reflectance.press import BallPress, find_ball
@@ -237,10 +238,8 @@ class BallsStep(ImageStep):
         self.radius.box.valueChanged.connect(lambda _: self._on_radius(self.radius.radius_mm))
         self.panel.add_extra(self.radius, self.radius.box)
 
-    step = Step(
-        "balls",
-        tr("Ball presses"),
-        (Stage.BALLS,),
+    step = step_of(
+        BALLS,
         tr(
             "Press a ball of known diameter into the membrane. Vary the position over the "
             "whole field, as the ring in the image suggests, and the depth. Enter the ball "
@@ -259,7 +258,11 @@ class BallsStep(ImageStep):
             return too_early
         radius_mm = self.radius.radius_mm
         if not name:
-            done = [press.pose.centre_mm for press in project.results.presses]
+            done = (
+                [press.pose.centre_mm for press in project.results[BALLS].presses]
+                if project.results.get(BALLS)
+                else []
+            )
             return partial(
                 detect_ball,
                 setting=setting,
@@ -372,7 +375,7 @@ class BallsStep(ImageStep):
         act = partial(project.place_ball, name)
         before = project.session.decisions.balls.get(name)
         text = tr("Move the contact in {name}").format(name=name)
-        self.model.correct(text, partial(act, circle), partial(act, before), Stage.BALLS)
+        self.model.correct(text, partial(act, circle), partial(act, before), "balls")
 
     def set_radius(self, name: str, radius_mm: float) -> None:
         """Set the ball radius of one image; can be undone."""
@@ -381,32 +384,30 @@ class BallsStep(ImageStep):
         before = project.session.ball_radii_mm.get(name)
         if radius_mm != before:
             text = tr("Diameter of {name}: {d:g} mm").format(name=name, d=2.0 * radius_mm)
-            self.model.correct(text, partial(act, radius_mm), partial(act, before), Stage.BALLS)
+            self.model.correct(text, partial(act, radius_mm), partial(act, before), "balls")
 
 
-def setting_of(results: StageResults) -> BallSetting | None:
+def setting_of(results: Results) -> BallSetting | None:
     """Return the results that the detection of a ball needs; None if one is missing."""
-    if (
-        results.table is None
-        or results.lights is None
-        or results.crosstalk is None
-        or results.background is None
-        or results.lens is None
-    ):
+    lens, top, lights = results.get(LENS), results.get(TOP_POSE), results.get(LIGHTS)
+    bare = results.get(BACKGROUND)
+    if lens is None or top is None or lights is None or bare is None:
         return None
-    crosstalk, camera = results.crosstalk.matrix, results.lens.camera
+    crosstalk, camera = lights.crosstalk.matrix, lens.camera
     return BallSetting(
-        results.table,
-        results.lights.led_positions_mm,
+        top.table,
+        lights.leds.led_positions_mm,
         crosstalk,
-        unmix(results.background, crosstalk),
+        unmix(bare.light, crosstalk),
         (camera.width, camera.height),
     )
 
 
-def judge_ball(name: str, project: CalibrationProject) -> Judgement:
+def judge_ball(name: str, project: Project) -> Judgement:
     """Return how a ball press was judged."""
-    ball = next((ball for ball in project.results.balls if ball.file == name), None)
+    balls = project.results.get(BALLS)
+    seen = () if balls is None else balls.seen
+    ball = next((ball for ball in seen if ball.file == name), None)
     if ball is None:
         return WAITING
     if ball.fault is not None:
@@ -422,10 +423,10 @@ def judge_ball(name: str, project: CalibrationProject) -> Judgement:
     return Judgement(quality.verdict.value, advice, note, 100.0 * ball.press.shading_misfit)
 
 
-def _disagreement(press: BallPress, project: CalibrationProject) -> str:
+def _disagreement(press: BallPress, project: Project) -> str:
     """Return why a press disagrees with the others, if it was compared with its present radius."""
-    compared = project.results.reflectance
-    for agreement in () if compared is None else compared.agreements:
+    compared = project.results.get(REFLECTANCE)
+    for agreement in () if compared is None else compared.table.agreements:
         same = agreement.stated_radius_mm == press.pose.radius_mm
         if agreement.name == press.name and same and agreement.fault:
             return f"{agreement.fault}."

@@ -24,18 +24,18 @@ from app.calibrate.detection import (
 from app.calibrate.image_step import WAITING, Judgement
 from app.calibrate.maps import Panel
 from app.calibrate.states import is_done
-from app.calibrate.step_data import Step
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.view2d.map_view import extent_of
+from gelpolight_core.calibration.in_place import BALLS, SCALE
 from gelpolight_core.calibration.in_place_session import (
     ENOUGH_BALLS,
     SETTLED,
-    InPlaceRun,
+    Slopes,
     expected_gain,
     stated_grid,
 )
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import linear_image
@@ -173,7 +173,7 @@ class Progress:
         return text + " " + more.format(g=100.0 * self.gain)
 
 
-def progress_of(run: InPlaceRun) -> Progress:
+def progress_of(run: Slopes) -> Progress:
     """Return the progress of an in-place calibration."""
     result, gain = run.result, expected_gain(run.result)
     errors = [press.held_out.normal_deg for press in result.presses]
@@ -186,7 +186,7 @@ def progress_of(run: InPlaceRun) -> Progress:
     )
 
 
-def residual_panel(run: InPlaceRun) -> Panel:
+def residual_panel(run: Slopes) -> Panel:
     """Return the presses on the background, coloured by their residuals."""
     grid, progress = run.result.model.grid, progress_of(run)
     background = run.result.model.background
@@ -226,10 +226,8 @@ ASKED = ("next_ball_gain_percent", "balls_used")
 class ClosedBallsStep(BallsStep):
     """Asks for presses until more do not help."""
 
-    step = Step(
-        "balls",
-        tr("Ball presses"),
-        (Stage.BALLS,),
+    step = step_of(
+        BALLS,
         tr(
             "Press a ball of known diameter into the membrane, at a different place for each "
             "image. Its slopes must be as steep as what you want to measure. The ring in the "
@@ -244,15 +242,16 @@ class ClosedBallsStep(BallsStep):
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball beside the background."""
         session = self.model.project.session
-        files = session.found(FOLDERS[Stage.BACKGROUND])
+        files = session.found("background")
         if not files:
             return too_early
         run, stated = self._run(), session.in_place
         if stated.mm_per_px is None:
-            measured = self.model.project.results.scale
-            if measured is None:
+            scale = self.model.project.results.get(SCALE)
+            if scale is None:
                 return too_early
-            stated = replace(stated, mm_per_px=(measured.mm_per_px, measured.mm_per_px))
+            measured = scale.measured.mm_per_px
+            stated = replace(stated, mm_per_px=(measured, measured))
         detect = partial(
             detect_closed_ball,
             untouched=Untouched(files[-1], stated, session.response),
@@ -263,21 +262,21 @@ class ClosedBallsStep(BallsStep):
         if run is None:
             return detect
         pixels, next_mm = run.result.model.grid.to_pixels, progress_of(run).next_mm
-        earlier = pixels(np.array([(x, y) for _name, x, y, *_ in run.calibration.balls]))
+        earlier = pixels(np.array([(x, y) for _name, x, y, *_ in run.balls]))
         there = () if next_mm is None else pixels(np.array([next_mm]))
         return partial(detect, marks=press_marks(earlier, there))
 
-    def _run(self) -> InPlaceRun | None:
+    def _run(self) -> Slopes | None:
         """Return the calibration of the present presses."""
-        state = self.model.statuses[Stage.BALLS].state
+        state = self.model.statuses["balls"].state
         stale = state in (StageState.EMPTY, StageState.WAITING, StageState.FAIL)
-        return None if stale else self.model.project.results.run
+        return None if stale else self.model.project.results.get(BALLS)
 
     @property
     def progress(self) -> Progress | None:
         """Accuracy from the present presses; None without an up-to-date calibration."""
         run = self._run()
-        present = self.model.statuses[Stage.BALLS].state is not StageState.STALE
+        present = self.model.statuses["balls"].state is not StageState.STALE
         return progress_of(run) if run is not None and present else None
 
     def judge(self, path: Path) -> Judgement:
@@ -310,7 +309,7 @@ class ClosedBallsStep(BallsStep):
         """Show the state, and the benefit of one more press."""
         progress = self.progress
         if progress is not None:
-            figures = self.model.statuses[Stage.BALLS].quality.figures
+            figures = self.model.statuses["balls"].quality.figures
             others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
             sentence = " ".join((progress.sentence(), *(f"{advice}." for advice in others)))
         super().show_state(state, sentence)
@@ -323,5 +322,4 @@ class ClosedBallsStep(BallsStep):
     def depends_on(self) -> tuple[Any, ...]:
         """Return the radius, the scale and the background."""
         session = self.model.project.session
-        background = session.found(FOLDERS[Stage.BACKGROUND])
-        return (*super().depends_on(), session.in_place, background)
+        return (*super().depends_on(), session.in_place, session.found("background"))

@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.calibrate.setup_values import new_session
-from gelpolight_core.calibration.closed_project import ClosedProject
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.missing import CLOSED_STAGES, missing_stages
 from gelpolight_core.session.session import (
@@ -26,7 +25,7 @@ def closed_offer(folder: Path) -> Session | None:
     None if it has no background and ball presses, if nothing of an open sensor is missing, or if
     its description is damaged or already that of a closed sensor.
     """
-    missing, path = missing_stages(folder, ()), folder / "session.toml"
+    missing, path = missing_stages(folder), folder / "session.toml"
     if not missing or any(stage in missing for stage in CLOSED_STAGES):
         return None
     offer = replace(new_session(optics=False), folder=folder)
@@ -48,7 +47,7 @@ def closed_offer(folder: Path) -> Session | None:
     )
 
 
-def copy_images(offer: Session, project: ClosedProject) -> None:
+def copy_images(offer: Session, project: Project) -> None:
     """Copy background and ball presses of an offer, with their radii, into a new session.
 
     Raises
@@ -56,9 +55,9 @@ def copy_images(offer: Session, project: ClosedProject) -> None:
     InputError
         If an image cannot be used.
     """
-    project.import_files(Stage.BACKGROUND, offer.found("background"))
+    project.import_files("background", offer.found("background"))
     by_radius: dict[float, list[Path]] = {}
     for path in offer.found("balls"):
         by_radius.setdefault(offer.ball_radius_mm(path.name), []).append(path)
     for radius_mm, files in by_radius.items():
-        project.import_files(Stage.BALLS, files, radius_mm=radius_mm)
+        project.import_files("balls", files, radius_mm=radius_mm)

@@ -13,14 +13,16 @@ from app.calibrate.detection import Detection, Detector, read_raw
 from app.calibrate.film_strip import Capture
 from app.calibrate.states import OPEN
 from app.calibrate.step import Parts, StepPresenter, no_camera
+from app.calibrate.step_data import step_of
+from app.live.image_checks import Rgb
 from app.live.live_detection import Seen
 from app.live.overlay import Overlay
 from app.services.jobs import Job
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.session.images import SessionImages
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 # After an automatic capture the technician has this long to arrange the next view.
@@ -91,7 +93,7 @@ class ImageStep(StepPresenter):
     # What is shown
 
     @property
-    def stage(self) -> Stage:
+    def stage(self) -> str:
         """The stage of the images."""
         return self.step.stages[0]
 
@@ -293,8 +295,33 @@ class ImageStep(StepPresenter):
         self.model.import_files(self.stage, files, radius_mm=self.radius_mm)
 
 
+def plain_step(stage: Stage[Any]) -> type[ImageStep]:
+    """Return the step of a stage without a panel of its own: it captures, imports and excludes."""
+
+    class PlainStep(ImageStep):
+        """Captures the images of the stage."""
+
+        step = step_of(
+            stage,
+            stage.task or tr("Capture the images of this stage."),
+            "complete",
+            frames=16 if stage.one_image else 4,
+            wanted=1,
+        )
+
+        def detector(self, name: str) -> Detector:
+            """Return what accepts every image: the stage judges it."""
+            return _accept
+
+    return PlainStep
+
+
+def _accept(_rgb: Rgb) -> Detection:
+    return Detection(Overlay(), tr("The image can be captured."), True)
+
+
 def captures_of(
-    session: SessionImages, folder: str, judge: Callable[[Path], Judgement]
+    session: Session, folder: str, judge: Callable[[Path], Judgement]
 ) -> tuple[Capture, ...]:
     """Return all captures of a stage with their states, including the excluded ones.
 

@@ -17,11 +17,11 @@ from app.calibrate.detection import Detection, Detector, as_image, or_refusal
 from app.calibrate.image_step import WAITING, ImageStep, Judgement
 from app.calibrate.marks import board_corners, board_outline
 from app.calibrate.step import Parts
-from app.calibrate.step_data import Step
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Line, Marker, Overlay
 from app.services.jobs import Job
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.open_sensor import LENS
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, judge
 from gelpolight_core.image.linear import LinearImage
@@ -260,10 +260,8 @@ class LensStep(ImageStep):
         self._views: dict[str, LensView] = {}
         self.model.captured.connect(self._on_captured)
 
-    step = Step(
-        "lens",
-        tr("Lens"),
-        (Stage.LENS,),
+    step = step_of(
+        LENS,
         tr(
             "Use the camera alone. Hold the checkerboard in front of it. Tilt it by 15 to 40 "
             "degrees in a new direction for each image, until its corners have covered the "
@@ -281,7 +279,7 @@ class LensStep(ImageStep):
     def views(self) -> dict[str, LensView]:
         """Return what was found in each analysed view, by image name."""
         project = self.model.project
-        fault, lens = project.fault(Stage.LENS), project.results.lens
+        fault, lens = project.fault("lens"), project.results.get(LENS)
         views = () if lens is None else lens.views
         if isinstance(fault, LensRefusal):
             views = fault.views  # the reasons survive a refusal
@@ -311,7 +309,7 @@ class LensStep(ImageStep):
         return tr("Corner error, px")
 
     def _on_captured(self, stage: str, _name: str) -> None:
-        if stage == Stage.LENS:
+        if stage == "lens":
             self._find_boards()
 
     def _find_boards(self) -> None:

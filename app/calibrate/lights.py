@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from app.calibrate.detection import Detection, Detector, as_image, judged, or_refusal
 from app.calibrate.image_step import ImageStep
 from app.calibrate.marks import LED_ROLES, mirror_positions_px, spot_markers, spot_mask
-from app.calibrate.step_data import Step
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Job
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
 from gelpolight_core.finding import judge
 from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
 from gelpolight_core.session.decisions import Point
@@ -85,10 +85,8 @@ HANDLE = "mirror."
 class LightsStep(ImageStep):
     """Finds the spots; the user can drag each to its place."""
 
-    step = Step(
-        "lights",
-        tr("Lights"),
-        (Stage.LIGHTS,),
+    step = step_of(
+        LIGHTS,
         tr(
             "Replace the board with the mirror. Switch all three LEDs on and darken the room. "
             "Shorten the exposure until the three spots are small and not saturated."
@@ -104,10 +102,10 @@ class LightsStep(ImageStep):
         if name and session.decisions.spots_px:
             return partial(placed_spots, session=session)
         expected = None
-        if results.lens and results.top_pose and results.lights:
-            expected = mirror_positions_px(
-                results.lens.camera, results.top_pose.plane, results.lights.led_positions_mm
-            )
+        lens, top, lights = (results.get(s) for s in (LENS, TOP_POSE, LIGHTS))
+        if lens and top and lights:
+            plane, leds_mm = top.pose.plane, lights.leds.led_positions_mm
+            expected = mirror_positions_px(lens.camera, plane, leds_mm)
         return partial(detect_mirror, expected_px=expected, editable=bool(name))
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
@@ -130,4 +128,4 @@ class LightsStep(ImageStep):
         act = partial(project.place_spot, led)
         before = project.session.decisions.spots_px.get(led)
         text = tr("Move the mirror spot")
-        self.model.correct(text, partial(act, position), partial(act, before), Stage.LIGHTS)
+        self.model.correct(text, partial(act, position), partial(act, before), "lights")

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.live.overlay import Circle, Line, Marker, Mask, Role
+from gelpolight_core.calibration.open_sensor import TOP_POSE
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.channels import channel_name
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.optics.camera import Camera
@@ -117,3 +119,9 @@ def ball_handle(press: BallPress, table: ResamplingTable) -> Circle | None:
         return None
     radius = float(np.mean(np.linalg.norm(edge - middle[0], axis=1)))
     return Circle(float(middle[0, 0]), float(middle[0, 1]), radius, "good", handle="ball")
+
+
+def table_of(results: Results) -> ResamplingTable | None:
+    """Return the table from image to membrane; None if the top surface is not known."""
+    top = results.get(TOP_POSE)
+    return None if top is None else top.table

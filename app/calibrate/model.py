@@ -15,9 +15,7 @@ from app.context.context import AppContext
 from app.live.live_detection import LiveDetection
 from app.live.session import LiveSession
 from app.services.jobs import Job, Jobs
-from gelpolight_core.calibration.closed_project import ClosedProject
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -93,7 +91,7 @@ class WizardModel(QObject):
         The computations, and the short jobs that run next to them.
     shown : str
         Name of the shown capture; empty for the live image.
-    statuses : dict of Stage to StageStatus
+    statuses : dict of str to StageStatus
         Status of every stage, as of the last :meth:`update`.
     states : dict of str to (state, message)
         State of every step by its key, as the list of steps shows it.
@@ -105,7 +103,7 @@ class WizardModel(QObject):
     shown_changed()
         Another capture, or the live image, is shown.
     captured(str, str)
-        Stage and name of a new image.
+        Key of the stage and name of a new image.
     photographed(str)
         Stage of a new image from the camera; not sent for imported images.
     progressed(str, float)
@@ -127,9 +125,7 @@ class WizardModel(QObject):
     capture_aborted = Signal(str)
     saved_as = Signal(str)
 
-    def __init__(
-        self, project: CalibrationProject | ClosedProject, *, context: AppContext, parent: QObject
-    ) -> None:
+    def __init__(self, project: Project, *, context: AppContext, parent: QObject) -> None:
         super().__init__(parent)
         self.project = project
         self.undo = QUndoStack(self)
@@ -146,7 +142,7 @@ class WizardModel(QObject):
         self.shown = ""
         self._saved = self._saved_inputs = ""
         self.states: dict[str, StepState] = {}
-        self._running: Stage | None = None
+        self._running: str | None = None
         self.update()
 
     @property
@@ -179,7 +175,7 @@ class WizardModel(QObject):
         self.shown = name
         self.shown_changed.emit()
 
-    def capture(self, stage: Stage, *, frames: int, radius_mm: float | None = None) -> None:
+    def capture(self, stage: str, *, frames: int, radius_mm: float | None = None) -> None:
         """Capture an image for a stage, averaged over frames; for a ball, with its radius.
 
         The image is on disk when :attr:`captured` is sent.
@@ -199,7 +195,7 @@ class WizardModel(QObject):
         self.live.capture(frames, keep, self.refused.emit, aborted=self.capture_aborted.emit)
 
     def import_files(
-        self, stage: Stage, files: Sequence[Path], *, radius_mm: float | None = None
+        self, stage: str, files: Sequence[Path], *, radius_mm: float | None = None
     ) -> None:
         """Copy image files into a stage: all of them, or none if one is not valid."""
 
@@ -209,7 +205,7 @@ class WizardModel(QObject):
         saved = partial(self._on_saved, stage)
         self.short_jobs.submit(Job(tr("Importing images"), work, saved, must=True))
 
-    def _on_saved(self, stage: Stage, names: tuple[str, ...], *, by_camera: bool = False) -> None:
+    def _on_saved(self, stage: str, names: tuple[str, ...], *, by_camera: bool = False) -> None:
         text = tr("Import {n} images").format(n=len(names))
         if len(names) == 1:
             text = tr("Add {name}").format(name=names[0])
@@ -218,14 +214,14 @@ class WizardModel(QObject):
         self.undo.push(self._command(text, restore, revert, stage, is_done=True))
         self.changed.emit()
         for name in names:
-            self.captured.emit(stage.value, name)
+            self.captured.emit(stage, name)
         if by_camera:
-            self.photographed.emit(stage.value)
+            self.photographed.emit(stage)
         self.compute(stage)
 
     # Manual corrections
 
-    def exclude(self, stage: Stage, name: str, excluded: bool) -> None:
+    def exclude(self, stage: str, name: str, excluded: bool) -> None:
         """Exclude an image, or include it again; can be undone."""
         text = tr("Exclude {name}") if excluded else tr("Include {name}")
         act = partial(self.project.exclude, stage, name)
@@ -237,7 +233,7 @@ class WizardModel(QObject):
         text: str,
         act: Callable[[], None],
         revert: Callable[[], None],
-        stage: Stage | None,
+        stage: str | None,
     ) -> None:
         """Run a command that can be undone, then compute the stage that it affects.
 
@@ -247,8 +243,8 @@ class WizardModel(QObject):
             Text in the history.
         act, revert : callable
             Written to disk before they return; raise InputError on failure.
-        stage : Stage or None
-            Stage to compute afterwards, with all stages that it depends on; None: all stages.
+        stage : str or None
+            Key of the stage to compute afterwards, with all that it depends on; None: all stages.
         """
         self.undo.push(self._command(text, act, revert, stage))
 
@@ -257,7 +253,7 @@ class WizardModel(QObject):
         text: str,
         act: Callable[[], None],
         revert: Callable[[], None],
-        stage: Stage | None,
+        stage: str | None,
         *,
         is_done: bool = False,
     ) -> Correction:
@@ -284,11 +280,11 @@ class WizardModel(QObject):
     # Background work
 
     @property
-    def running(self) -> Stage | None:
+    def running(self) -> str | None:
         """The stage that is being computed."""
         return self._running
 
-    def compute(self, upto: Stage | None = None) -> None:
+    def compute(self, upto: str | None = None) -> None:
         """Compute the outdated stages, up to one stage or all of them."""
 
         def work(progress: Callable[[float], None]) -> None:

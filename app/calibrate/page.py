@@ -22,8 +22,7 @@ from app.widgets.naming import named
 from app.widgets.question import ask
 from app.workspace.sessions import unfinished
 from app.workspace.workspace import folder_name
-from gelpolight_core.calibration.closed_project import ClosedProject, open_project
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
@@ -91,7 +90,7 @@ class CalibratePage(QWidget):
         """Open a session folder; if this fails, show the reason on the start view."""
         folder = path.parent if path.name == "session.toml" else path
         try:
-            project = open_project(folder)
+            project = Project(folder)
         except InputError as error:
             self._leave_session()
             self._offer = closed_offer(folder)
@@ -188,7 +187,7 @@ class CalibratePage(QWidget):
         folder = self.context.workspace.sessions_folder(stated.serial) / folder_name(name)
         try:
             create_session(replace(stated, folder=folder, ball_radii_mm={}))
-            project = open_project(folder)
+            project = Project(folder)
             if stated.in_place is not None and stated.folder != Path():
                 copy_images(stated, project)
         except InputError as error:
@@ -196,7 +195,7 @@ class CalibratePage(QWidget):
             return
         self._show_wizard(project)
 
-    def _show_wizard(self, project: CalibrationProject | ClosedProject, *, step: str = "") -> None:
+    def _show_wizard(self, project: Project, *, step: str = "") -> None:
         self._close_wizard()
         self.start.show_problem("")
         self.wizard = Wizard(project, context=self.context)

@@ -12,11 +12,11 @@ from app.calibrate.detection import Detection, Detector, judged, or_refusal, sha
 from app.calibrate.image_step import ImageStep
 from app.calibrate.light_checks import KnownImage, enlarged, marked, refuse_grey
 from app.calibrate.maps import Panel, three_maps
-from app.calibrate.marks import working_circle
-from app.calibrate.step_data import Step
+from app.calibrate.marks import table_of, working_circle
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.open_sensor import RADIANCE
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.bare_membrane import (
     CHANGE,
@@ -115,10 +115,8 @@ def _refuse_membrane(small: Float, background: Float, area: Mask2) -> None:
 class RadianceStep(ImageStep):
     """Checks the light on the white board."""
 
-    step = Step(
-        "radiance",
-        tr("Light intensity"),
-        (Stage.RADIANCE,),
+    step = step_of(
+        RADIANCE,
         tr(
             "Insert the elastomer without the membrane. Press the white board onto it without "
             "air bubbles. Set the exposure so that nothing is saturated, and do not change it "
@@ -132,13 +130,13 @@ class RadianceStep(ImageStep):
     def detector(self, name: str) -> Detector:
         """Return the check of the light."""
         project = self.model.project
-        known = KnownImage(project.session.found(FOLDERS[Stage.BACKGROUND]))
-        return partial(_check, table=project.results.table, known=known)
+        known = KnownImage(project.session.found("background"))
+        return partial(_check, table=table_of(project.results), known=known)
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the light intensity of each LED."""
         results = self.model.project.results
-        found, table = results.radiance, results.table
+        found, table = results.get(RADIANCE), table_of(results)
         if found is None or table is None:
             return ()
         text = tr("Light intensity in percent of full scale")

@@ -18,7 +18,8 @@ from app.calibrate.maps import Panel
 from app.calibrate.step import StepPresenter
 from app.calibrate.step_data import Step
 from app.view2d.map_view import Extent
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.ball_stage import BALLS
+from gelpolight_core.calibration.open_sensor import TOP_POSE
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
@@ -119,12 +120,13 @@ class RefractionStep(StepPresenter):
     step = Step(
         "refraction",
         tr("Refraction"),
-        (Stage.BALLS,),
+        ("balls",),
         tr(
             "Compare a press near the edge of the field before and after the correction. The "
             "ellipse of the contact must have become a circle."
         ),
         "ball",
+        folder=BALLS.folder,
     )
 
     def captures(self) -> tuple[Capture, ...]:
@@ -161,11 +163,12 @@ class RefractionStep(StepPresenter):
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the press before and after the correction; nothing without results."""
         results, folder = self.model.project.results, self.model.project.session.folder
-        found = {ball.file: ball.press for ball in results.balls if ball.press is not None}
-        if not found or results.table is None:
+        balls, top = results.get(BALLS), results.get(TOP_POSE)
+        if balls is None or top is None or not balls.presses:
             return ()
+        found = {ball.file: ball.press for ball in balls.seen if ball.press is not None}
         name = self.model.shown
         if name not in found:
             name = max(found, key=lambda n: sum(c * c for c in found[n].pose.centre_mm))
         raw = read_raw(folder / self.step.folder / name)
-        return refraction_panels(raw, found[name], results.table)
+        return refraction_panels(raw, found[name], top.table)

@@ -37,8 +37,7 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from app.workspace.report import stated_validation
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
-from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.session.missing import OPEN_STAGES
@@ -61,7 +60,7 @@ class ResultView(QWidget):
     def __init__(self, steps: Sequence[Step]) -> None:
         super().__init__()
         named(self, "result", tr("Calibration"))
-        self._rows: dict[Stage, _StageRow] = {}
+        self._rows: dict[str, _StageRow] = {}
         self._name = ""
         self.headline = named(PlainLabel(wrap=True), "result.headline", tr("Verdict"))
         make_bold(self.headline, size=1.2)
@@ -95,7 +94,7 @@ class ResultView(QWidget):
     def show_states(
         self,
         states: Mapping[str, tuple[str, str]],
-        statuses: Mapping[Stage, StageStatus],
+        statuses: Mapping[str, StageStatus],
         *,
         busy: bool,
         saved: str = "",
@@ -166,13 +165,13 @@ class ResultView(QWidget):
         # The report waits for the stages by itself.
         self.report.setEnabled(self.save.isEnabled() or bool(busy and saved))
 
-    def _missing_sentence(self, statuses: Mapping[Stage, StageStatus]) -> str:
+    def _missing_sentence(self, statuses: Mapping[str, StageStatus]) -> str:
         """Return the incomplete stages, and which of them need the sensor open."""
         text = tr("Incomplete stages: {n}. Complete them from top to bottom.")
         closed = [
             row.step.title
             for stage, row in self._rows.items()
-            if FOLDERS.get(stage) in OPEN_STAGES and statuses[stage].state is StageState.EMPTY
+            if row.step.folder in OPEN_STAGES and statuses[stage].state is StageState.EMPTY
         ]
         if closed:
             text += " " + tr(
@@ -250,7 +249,7 @@ class Saving(QObject):
 
         def work(_progress: object) -> tuple[Path, str]:
             calibration = project.finish().calibration
-            name = f"{calibration.sensor.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
+            name = f"{calibration.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
             path = workspace.keep_calibration(calibration, name)
             if not calibration.fault:
                 workspace.use(path)
@@ -289,17 +288,17 @@ class Saving(QObject):
         """Write the report of the session in its present state."""
         project, workspace = self._model.project, self._context.workspace
 
-        def work(_progress: object) -> CalibrationRun:
+        def work(_progress: object) -> Run:
             from gelpolight_core.report.build import run_report  # slow to import
             from gelpolight_core.report.file import write_report
 
             run = project.finish()
             saved = workspace.entry_of(run.calibration.identity)
             validation = None if saved is None else stated_validation(saved)
-            write_report(run_report(run, project.session, validation=validation), path)
+            write_report(run_report(run, validation=validation), path)
             return run
 
-        def done(_run: CalibrationRun) -> None:
+        def done(_run: Run) -> None:
             self._view.show_saved(tr("Report saved as {path}").format(path=path))
 
         self._submit(tr("Writing the report"), work, done)
@@ -317,7 +316,7 @@ class ResultStep(StepPresenter):
     step = Step(
         "result",
         tr("Calibration"),
-        (Stage.JOINT,),
+        ("joint",),
         tr("Check all figures together, then save the calibration."),
         "complete",
     )

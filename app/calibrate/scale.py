@@ -10,11 +10,11 @@ import numpy as np
 from app.calibrate.detection import Detection, Detector, or_refusal, refuse_size, too_early
 from app.calibrate.image_step import ImageStep
 from app.calibrate.light_checks import KnownImage, refuse_grey
-from app.calibrate.step_data import Step
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
+from gelpolight_core.calibration.in_place import SCALE
 from gelpolight_core.calibration.in_place_session import stated_grid
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.scale import find_pins, find_punch
@@ -64,10 +64,8 @@ def detect_scale(
 class ScaleStep(ImageStep):
     """Measures the size of a pixel on images of a pressed pin grid or flat punch."""
 
-    step = Step(
-        "scale",
-        tr("Scale"),
-        (Stage.SCALE,),
+    step = step_of(
+        SCALE,
         tr(
             "Press the pin grid or the flat punch whose size is stated in the set-up straight into "
             "the membrane, at a different place for each image. The size of a pixel is measured "
@@ -81,7 +79,7 @@ class ScaleStep(ImageStep):
     def detector(self, name: str) -> Detector:
         """Return the detection of the pressed object beside the background."""
         session = self.model.project.session
-        files = session.found(FOLDERS[Stage.BACKGROUND])
+        files = session.found("background")
         if not files:
             return too_early
         known = KnownImage(files)
@@ -92,7 +90,7 @@ class ScaleStep(ImageStep):
     def depends_on(self) -> tuple[Any, ...]:
         """Return the size of the pressed object, and the background."""
         session = self.model.project.session
-        return session.in_place, session.found(FOLDERS[Stage.BACKGROUND])
+        return session.in_place, session.found("background")
 
 
 def _detect(

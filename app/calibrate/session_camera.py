@@ -14,16 +14,9 @@ from app.context.source_button import show_settings_of_source
 from app.sources.camera.applying import is_locked
 from app.widgets.question import Question
 from app.widgets.question import ask as question
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
-
-LIT = (Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
-"""Stages whose brightness values are compared: the camera must not change between them.
-
-The mirror spots are not compared with other stages and need a shorter exposure.
-"""
 
 
 class SetupCamera(QObject):
@@ -106,7 +99,7 @@ class SessionCamera(QObject):
         """
         session, now = self._model.project.session, self._present()
         stored = session.camera_settings
-        if not any(session.found(folder) for folder in FOLDERS.values()):
+        if not self._model.project.recipe.files(session):
             return ""
         serial = self._model.live.serial
         if (now is None or stored is None) and serial not in ("", session.serial):
@@ -159,8 +152,9 @@ class SessionCamera(QObject):
             return
         if camera is not None:
             now = camera.settings_now()
-        lit = sum(len(session.found(FOLDERS[s])) for s in LIT)
-        first = lit == 0 or (lit == 1 and stage in {s.value for s in LIT})
+        compared = {s.key: s.folder for s in self._model.project.recipe.stages if s.lit}
+        lit = sum(len(session.found(folder)) for folder in compared.values())
+        first = lit == 0 or (lit == 1 and stage in compared)
         if session.camera_settings is None or first:
             self._note(now)
 

@@ -11,7 +11,6 @@ from app.calibrate.setup_form import SetupForm
 from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
-from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
@@ -28,7 +27,7 @@ class SetupStep(StepPresenter):
     step = Step(
         "setup",
         tr("Set-up"),
-        (Stage.RESPONSE,),
+        ("response",),
         tr(
             "Enter what you know about the sensor, its housing and its parts. Every length "
             "here scales the result."

@@ -9,7 +9,6 @@ from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
 
 from app.calibrate.step_data import Step
 from app.theme import theme
-from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.translation import tr
 
@@ -108,7 +107,7 @@ def _paint(painter: QPainter, state: str, colour: QColor, back: QColor) -> None:
 
 
 def step_state(
-    step: Step, statuses: Mapping[Stage, StageStatus], running: Stage | None, *, count: int
+    step: Step, statuses: Mapping[str, StageStatus], running: str | None, *, count: int
 ) -> StepState:
     """Return state and message of a step: those of its worst stage.
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.recipe import Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +18,8 @@ class Step:
         Short name, used in settings and scripts.
     title : str
         Text in the step list.
-    stages : tuple of Stage
-        The stages that make up the step; the first one has the images.
+    stages : tuple of str
+        Keys of the stages that make up the step; the first one has the images.
     task : str
         Instruction for the technician, in one to three sentences.
     assembly : str
@@ -29,28 +30,48 @@ class Step:
         Recommended number of captures; 0 if the step captures none.
     least : int
         Smallest number of captures from which the stage can be computed.
+    folder : str
+        Folder of its images; empty if it has none.
+    one_image : bool
+        Whether a new image replaces the former one.
     """
 
     key: str
     title: str
-    stages: tuple[Stage, ...]
+    stages: tuple[str, ...]
     task: str
     assembly: str
     frames: int = 1
     wanted: int = 0
     least: int = 1
 
+    folder: str = ""
+    one_image: bool = False
+
     @property
-    def stage(self) -> Stage | None:
-        """The stage to which this step's images belong."""
-        return self.stages[0] if self.stages and self.stages[0] in FOLDERS else None
+    def stage(self) -> str | None:
+        """Key of the stage to which this step's images belong."""
+        return self.stages[0] if self.folder else None
 
     @property
     def captures(self) -> bool:
         """Whether images are captured in this step."""
-        return self.stage is not None and self.wanted > 0
+        return bool(self.folder) and self.wanted > 0
 
-    @property
-    def folder(self) -> str:
-        """The folder of its images; empty if it has none."""
-        return FOLDERS[self.stage] if self.stage is not None else ""
+
+def step_of(
+    stage: Stage[Any], task: str, assembly: str, *, frames: int = 1, wanted: int = 0, least: int = 1
+) -> Step:
+    """Return the step of a stage; arguments as in :class:`Step`."""
+    return Step(
+        stage.key,
+        stage.title,
+        (stage.key,),
+        task,
+        assembly,
+        frames,
+        wanted,
+        least,
+        stage.folder,
+        stage.one_image,
+    )

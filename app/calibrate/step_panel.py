@@ -29,7 +29,6 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from gelpolight_core.finding import QualityTable
-from gelpolight_core.session.session import ONE_IMAGE_STAGES
 from gelpolight_core.translation import tr
 
 WIDTH = 372
@@ -178,7 +177,7 @@ class StepPanel(QWidget):
         if wanted > 1:
             text = tr("&Capture  ({n} of {m})").format(n=count, m=max(wanted, count))
         elif count:
-            alone = self._step is not None and self._step.folder in ONE_IMAGE_STAGES
+            alone = self._step is not None and self._step.one_image
             text = tr("&Capture again") if alone else tr("&Capture another")
         self.capture.setText(text)
 

@@ -1,13 +1,16 @@
-"""The steps of the wizard in their order. A new step is a folder and one line here."""
+"""The steps of the wizard: the stages of a recipe, each with its panel."""
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import replace
+from itertools import chain
+from typing import Any
 
 from app.calibrate.background import BackgroundStep
 from app.calibrate.balls import BallsStep
 from app.calibrate.closed_balls import ClosedBallsStep
+from app.calibrate.image_step import plain_step
 from app.calibrate.lens import LensStep
 from app.calibrate.lights import LightsStep
 from app.calibrate.radiance import RadianceStep
@@ -20,46 +23,47 @@ from app.calibrate.step import StepPresenter
 from app.calibrate.step_data import Step
 from app.calibrate.top_pose import TopPoseStep
 from app.calibrate.validation import ValidationStep
-from gelpolight_core.calibration.closed_project import ClosedProject
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration import ball_stage, in_place, open_sensor
+from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipe import Stage
+from gelpolight_core.calibration.recipes import FULL
 
 Route = tuple[type[StepPresenter], ...]
 
-OPEN_ROUTE: Route = (
-    SetupStep,
-    LensStep,
-    TopPoseStep,
-    LightsStep,
-    RadianceStep,
-    BackgroundStep,
-    BallsStep,
-    RefractionStep,
-    ReflectanceStep,
-    ResultStep,
-    ValidationStep,
-)
-"""For a sensor that can be opened."""
-
-CLOSED_ROUTE: Route = (
-    SetupStep,
-    BackgroundStep,
-    ScaleStep,
-    ClosedBallsStep,
-    ResultStep,
-    ValidationStep,
-)
-"""For a sensor whose membrane is bonded: calibrated in place."""
+FIRST: Route = (SetupStep,)
+LAST: Route = (ResultStep, ValidationStep)
+"""Steps before and after those of the stages."""
+PANELS: Mapping[Stage[Any], Route] = {
+    open_sensor.LENS: (LensStep,),
+    open_sensor.TOP_POSE: (TopPoseStep,),
+    open_sensor.LIGHTS: (LightsStep,),
+    open_sensor.RADIANCE: (RadianceStep,),
+    open_sensor.BACKGROUND: (BackgroundStep,),
+    ball_stage.BALLS: (BallsStep, RefractionStep),
+    ball_stage.REFLECTANCE: (ReflectanceStep,),
+    in_place.BACKGROUND: (BackgroundStep,),
+    in_place.SCALE: (ScaleStep,),
+    in_place.BALLS: (ClosedBallsStep,),
+}
+"""The steps of a stage; another stage with images has one that only captures them."""
 
 
-def route_of(project: CalibrationProject | ClosedProject) -> Route:
-    """Return the route of a session, without steps for images that it does not need."""
-    route = CLOSED_ROUTE if isinstance(project, ClosedProject) else OPEN_ROUTE
-    having = (None, *project.statuses())
-    return tuple(step for step in route if step.describe().stage in having)
+def route_of(project: Project) -> Route:
+    """Return the route of a session: what is known, the stages of its recipe, and the result."""
+    return _route(project.recipe.of(project.session))
 
 
-def steps_of(route: Route, having: Container[Stage] | None = None) -> tuple[Step, ...]:
+def full_route() -> Route:
+    """Return all steps of a sensor that can be opened."""
+    return _route(FULL.stages)
+
+
+def _route(stages: Iterable[Stage[Any]]) -> Route:
+    made = [PANELS.get(stage, (plain_step(stage),) if stage.folder else ()) for stage in stages]
+    return (*FIRST, *chain.from_iterable(made), *LAST)
+
+
+def steps_of(route: Route, having: Container[str] | None = None) -> tuple[Step, ...]:
     """Return the data of the steps of a route, with those of their stages that a session has."""
     steps = (presenter.describe() for presenter in route)
     if having is None:

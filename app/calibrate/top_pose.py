@@ -9,11 +9,11 @@ from app.calibrate.detection import Detection, Detector, as_image, judged, or_re
 from app.calibrate.image_step import WAITING, ImageStep, Judgement
 from app.calibrate.lens import glance
 from app.calibrate.marks import board_corners, board_outline, foot_point
-from app.calibrate.step_data import Step
+from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Overlay
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.open_sensor import LENS, TOP_POSE
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.pose import estimate_top_pose
@@ -61,10 +61,8 @@ def detect_top_pose(
 class TopPoseStep(ImageStep):
     """Finds the board with the lens of the step before."""
 
-    step = Step(
-        "top_pose",
-        tr("Top surface"),
-        (Stage.TOP_POSE,),
+    step = step_of(
+        TOP_POSE,
         tr(
             "Mount the housing without the elastomer. Lay the small checkerboard flat on the "
             "top opening, pattern facing down."
@@ -77,7 +75,7 @@ class TopPoseStep(ImageStep):
     def detector(self, name: str) -> Detector:
         """Return the detection of the board, once the lens is known."""
         project = self.model.project
-        lens = project.results.lens
+        lens = project.results.get(LENS)
         if lens is None:
             return too_early
         board = project.session.top_pose
@@ -88,11 +86,12 @@ class TopPoseStep(ImageStep):
         return judge_top_view(path.name, self.model.project, self.model.statuses[self.stage])
 
 
-def judge_top_view(name: str, project: CalibrationProject, status: StageStatus) -> Judgement:
+def judge_top_view(name: str, project: Project, status: StageStatus) -> Judgement:
     """Return how a view of the top surface was judged."""
     if status.state in (StageState.STALE, StageState.WAITING, StageState.EMPTY):
         return WAITING
-    found = project.results.top_pose
+    top = project.results.get(TOP_POSE)
+    found = None if top is None else top.pose
     for view in () if found is None or not status.quality.figures else found.views:
         if view.name == name and not view.used:
             return Judgement("fail", view.reason, tr("not used"))

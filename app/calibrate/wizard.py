@@ -26,8 +26,7 @@ from app.context.context import AppContext
 from app.widgets.actions import make_action
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
-from gelpolight_core.calibration.closed_project import ClosedProject
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -38,7 +37,7 @@ class Wizard(QMainWindow):
 
     Parameters
     ----------
-    project : CalibrationProject or ClosedProject
+    project : Project
         The session.
     context : AppContext
         Context of the application.
@@ -54,7 +53,7 @@ class Wizard(QMainWindow):
     left = Signal()
     renewed = Signal(str)
 
-    def __init__(self, project: CalibrationProject | ClosedProject, *, context: AppContext) -> None:
+    def __init__(self, project: Project, *, context: AppContext) -> None:
         super().__init__()
         self.setWindowFlags(Qt.WindowType.Widget)
         named(self, "wizard", tr("Calibration wizard"))
@@ -208,7 +207,7 @@ class Wizard(QMainWindow):
     # Steps
 
     @property
-    def project(self) -> CalibrationProject | ClosedProject:
+    def project(self) -> Project:
         """The session's project."""
         return self.model.project
 

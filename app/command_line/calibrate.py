@@ -12,12 +12,14 @@ from app.command_line.common import check_outputs, quality_lines, stage_progress
 from app.command_line.reconstructing import add_model, report_failure
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
-from gelpolight_core.calibration.any_session import calibrate_any
+from gelpolight_core.calibration import in_place
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.in_place_session import InPlaceRun
-from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.calibration.open_sensor import LIGHTS, RESPONSE
+from gelpolight_core.calibration.project import Run, calibrate
+from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.io.atomic import write_json
-from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN
+from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN, ClosedSensor
 from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
@@ -35,15 +37,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
     session = read_session(options.session)
+    recipe = recipe_of(session, options.model)
     check_outputs([options.output, options.json], session_files(session))
     with stage_progress() as progress:
-        result = calibrate_any(session, model=options.model, progress=progress)
+        result = calibrate(session, recipe, progress=progress)
     write_calibration(result.calibration, options.output)
-    if isinstance(result, InPlaceRun):
+    if recipe.closed:
         content, lines = in_place_as_json(result), in_place_lines(result)
     else:
         content = run_as_json(result)
-        lines = [tr("camera response: {what}").format(what=result.response.summary)]
+        lines = [tr("camera response: {what}").format(what=result.results[RESPONSE].summary)]
     if options.json:
         write_json(options.json, content)
     say("\n".join([*lines, *quality_lines(result.calibration.quality)]))
@@ -58,8 +61,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def in_place_lines(result: InPlaceRun) -> list[str]:
+def in_place_lines(run: Run) -> list[str]:
     """Return the chosen model, its unknown quantities, and the presses that were left out."""
+    result = run.results[in_place.BALLS]
     lines = [
         tr("model: in-place (closed sensor: background and balls only)"),
         tr("not known: {what}").format(what=", ".join(UNKNOWN)),
@@ -75,14 +79,15 @@ def in_place_lines(result: InPlaceRun) -> list[str]:
     return lines
 
 
-def in_place_as_json(result: InPlaceRun) -> dict[str, Any]:
+def in_place_as_json(run: Run) -> dict[str, Any]:
     """Return a closed sensor's results as plain values, lengths in mm."""
-    c, found = result.calibration, result.result
+    c, found = run.calibration, run.results[in_place.BALLS].result
+    balls = c.data_of(ClosedSensor).balls
     return {
         "id": c.identity,
         "model": c.model,
         "verdict": c.verdict.value,
-        "mm_per_px": c.in_place.grid.mm_per_px,
+        "mm_per_px": found.model.grid.mm_per_px,
         "unknown": list(UNKNOWN),
         "steepest_slope": found.model.steepest,
         "balls": [
@@ -95,7 +100,7 @@ def in_place_as_json(result: InPlaceRun) -> dict[str, Any]:
                 "held_out_cap_ratio": finite(press.held_out.cap_ratio),
                 "held_out_diameter_ratio": finite(press.held_out.diameter_ratio),
             }
-            for (name, x, y, contact, radius), press in zip(c.balls, found.presses, strict=True)
+            for (name, x, y, contact, radius), press in zip(balls, found.presses, strict=True)
         ],
         "left_out": {name: str(fault) for name, fault in found.refused.items()},
         "error_by_balls": [list(point) for point in found.learning],
@@ -109,16 +114,18 @@ def finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def run_as_json(result: CalibrationRun) -> dict[str, Any]:
+def run_as_json(result: Run) -> dict[str, Any]:
     """Return the results of every stage as plain values, lengths in mm, sensor frame."""
-    c = result.calibration
-    camera = c.camera
+    calibration, results = result.calibration, result.results
+    c = calibration.open_sensor
+    camera, response, lights = c.camera, results[RESPONSE], results[LIGHTS]
+    reflectance = results[REFLECTANCE].table
     return {
-        "id": c.identity,
-        "model": c.model,
-        "verdict": c.verdict.value,
+        "id": calibration.identity,
+        "model": calibration.model,
+        "verdict": calibration.verdict.value,
         "response": {
-            "source": result.response.source,
+            "source": response.source,
             "linear": c.response is None,
             "light_of_even_values": None if c.response is None else c.response.curves.tolist(),
         },
@@ -133,12 +140,12 @@ def run_as_json(result: CalibrationRun) -> dict[str, Any]:
             "normal_camera": list(c.plane.normal_camera),
             "distance_mm": c.plane.distance_mm,
         },
-        "mirror_spots_px": result.lights.spots.centres_px.tolist(),
+        "mirror_spots_px": lights.leds.spots.centres_px.tolist(),
         "led_positions_mm": c.led_positions_mm.tolist(),
         "led_positions_camera_mm": c.plane.to_camera(c.led_positions_mm).tolist(),
         "led_sd_mm": np.sqrt(np.diagonal(c.led_covariance_mm2, axis1=1, axis2=2)).tolist(),
         "crosstalk": c.crosstalk.tolist(),
-        "crosstalk_source": result.crosstalk.source,
+        "crosstalk_source": lights.crosstalk.source,
         "balls": [
             {
                 "file": Path(press.name).name,
@@ -148,7 +155,7 @@ def run_as_json(result: CalibrationRun) -> dict[str, Any]:
                 "contact_radius_mm": press.contact_radius_mm,
                 "centre_sd_mm": press.centre_sd_mm,
             }
-            for press in result.reflectance.presses
+            for press in reflectance.presses
         ],
         "reflectance": [
             {
@@ -157,7 +164,7 @@ def run_as_json(result: CalibrationRun) -> dict[str, Any]:
                 "coverage": fit.coverage.tolist(),
                 "scatter": fit.spread,
             }
-            for fit in result.reflectance.fits
+            for fit in reflectance.fits
         ],
-        "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
+        "quality": {stage: table.as_rows() for stage, table in calibration.quality.items()},
     }

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from app.command_line.common import quality_lines
 from app.command_line.terminal import harmless, say
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN, InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
+from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN, ClosedSensor
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.report.labels import label
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.translation import tr
 
 
@@ -63,7 +66,6 @@ def _print_calibration(path: Path) -> None:
     """Print provenance, geometry and quality table."""
     c = read_calibration(path)
     p, grid = c.provenance, c.table.grid
-    closed = isinstance(c, InPlaceCalibration)
     channels = tr("{part} ({channels}) {made} {operator}")
     response = tr("linear")
     if c.response is not None:
@@ -71,9 +73,9 @@ def _print_calibration(path: Path) -> None:
         response = text.format(x=100.0 * c.response.departure)
     rows = [
         (tr("calibration"), c.identity),
-        (tr("sensor"), c.sensor.serial),
+        (tr("sensor"), c.serial),
         (tr("elastomer"), p.elastomer or tr("not stated")),
-        (tr("model"), tr("{model} (closed sensor)").format(model=c.model) if closed else c.model),
+        (tr("model"), c.model),
         (tr("verdict"), c.verdict.value),
         *([(tr("used although it failed"), p.accepted)] if p.accepted else []),
         (tr("created"), f"{p.created} {p.operator}".strip()),
@@ -82,7 +84,7 @@ def _print_calibration(path: Path) -> None:
         (tr("image"), f"{c.camera.width}x{c.camera.height} px"),
         (tr("camera response"), response),
         (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
-        *(_in_place_rows(c) if isinstance(c, InPlaceCalibration) else _open_rows(c)),
+        *ROWS[c.model](c),
         *(
             (
                 tr("edited by hand"),
@@ -100,8 +102,9 @@ def _print_calibration(path: Path) -> None:
     say("\n".join(quality_lines(c.quality)))
 
 
-def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
+def _in_place_rows(calibration: Calibration) -> list[tuple[str, str]]:
     """Return the scale and the balls of a closed sensor's calibration."""
+    c = calibration.data_of(ClosedSensor)
     model = c.in_place
     return [
         (
@@ -120,8 +123,9 @@ def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
     ]
 
 
-def _open_rows(c: Calibration) -> list[tuple[str, str]]:
+def _open_rows(calibration: Calibration) -> list[tuple[str, str]]:
     """Return the geometry and the membrane of an open sensor's calibration."""
+    c = calibration.open_sensor
     rows = [
         (tr("focal length"), f"{c.camera.fx:.2f}, {c.camera.fy:.2f} px"),
         (tr("principal point"), f"{c.camera.cx:.2f}, {c.camera.cy:.2f} px"),
@@ -131,7 +135,7 @@ def _open_rows(c: Calibration) -> list[tuple[str, str]]:
     names = tr("red LED"), tr("green LED"), tr("blue LED")
     for name, led in zip(names, c.led_positions_mm, strict=True):
         rows.append((name, "({:.3f}, {:.3f}, {:.3f}) mm".format(*led)))
-    visible_mm = Reconstructor(c, model=c.model).visible_depth_mm
+    visible_mm = Reconstructor(calibration).visible_depth_mm
     if visible_mm is not None:
         rows.append((tr("Smallest visible depth"), f"{1e3 * visible_mm:.0f} um"))
     if c.full is not None:
@@ -147,3 +151,8 @@ def _open_rows(c: Calibration) -> list[tuple[str, str]]:
         )
         rows.append((tr("membrane"), shown))
     return rows
+
+
+ROWS: Mapping[str, Callable[[Calibration], list[tuple[str, str]]]] = MappingProxyType(
+    {**dict.fromkeys(MODELS, _open_rows), IN_PLACE: _in_place_rows}
+)

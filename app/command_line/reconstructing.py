@@ -14,10 +14,9 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import FORMATS
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
-from gelpolight_core.sensor_calibration import MODELS
+from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
@@ -98,7 +97,7 @@ def load_reconstructor(
     return Reconstructor(calibration, model=model, effort=effort)
 
 
-def report_failure(calibration: AnyCalibration, path: Path) -> None:
+def report_failure(calibration: Calibration, path: Path) -> None:
     """Warn of a calibration that failed."""
     if calibration.fault:
         text = tr("{path}: FAIL: {fault}. Everything measured with it is doubtful.")

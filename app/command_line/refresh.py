@@ -9,10 +9,13 @@ from pathlib import Path
 from app.command_line.common import check_outputs, quality_lines
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.in_place_session import repaired, with_background
+from gelpolight_core.calibration.in_place import in_place_towards
+from gelpolight_core.calibration.in_place_session import with_background
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.user import user_name
-from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import average, read_image, require_colour
 from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
@@ -42,12 +45,7 @@ def run(options: argparse.Namespace) -> int:
     """Write the refreshed calibration and print its quality."""
     check_outputs([options.output], [options.calibration, *(options.background or [])])
     calibration = read_calibration(options.calibration)
-    if not isinstance(calibration, InPlaceCalibration):
-        raise InputError(
-            tr("the calibration is of an open sensor"),
-            where=str(options.calibration),
-            advice=tr("Use gelpolight drift --zero, or calibrate again"),
-        )
+    calibration.data_of(ClosedSensor)
     new = _refreshed(calibration, options)
     write_calibration(new, options.output)
     say("\n".join(quality_lines(new.quality)))
@@ -59,16 +57,17 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _refreshed(calibration: InPlaceCalibration, options: argparse.Namespace) -> InPlaceCalibration:
+def _refreshed(calibration: Calibration, options: argparse.Namespace) -> Calibration:
     if options.session is not None:
         session = read_session(options.session)
-        if session.in_place is None:
+        recipe = in_place_towards(calibration.in_place.coefficients)
+        if not recipe.fits(session):
             raise InputError(
                 tr("the session is of an open sensor"),
                 where=str(options.session),
                 advice=tr("Name a session whose session.toml has a table [in_place]"),
             )
-        return repaired(calibration, session).calibration
+        return calibrate(session, recipe).calibration
     images = [read_image(path, response=calibration.response) for path in options.background]
     for path, image in zip(options.background, images, strict=True):
         require_colour(image, where=str(path))

@@ -11,19 +11,19 @@ from app.command_line.sessions import session_files
 from app.command_line.terminal import say
 from app.workspace.entries import read_entry
 from app.workspace.report import stated_validation
-from gelpolight_core.calibration.any_session import calibrate_any
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
 from gelpolight_core.measurement.protocol_run import presses_folder
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report, Validation
 from gelpolight_core.report.evaluation import validation_of
 from gelpolight_core.report.file import refuse_other_endings, write_report
-from gelpolight_core.sensor_calibration import MODELS
+from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
@@ -97,18 +97,17 @@ def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report
 
 def _of_session(options: argparse.Namespace, presses: Path | None) -> Report:
     session = read_session(options.source)
+    recipe = recipe_of(session, options.model)
     refuse_overwriting([options.output], session_files(session))
     refuse_unwritable(options.output)
     with stage_progress() as progress:
-        result = calibrate_any(session, model=options.model, progress=progress)
+        result = calibrate(session, recipe, progress=progress)
         validation = _validate(result.calibration, presses, progress)
         progress(tr("report"), 1.0)
-        return run_report(result, session, validation=validation)
+        return run_report(result, validation=validation)
 
 
-def _validate(
-    calibration: AnyCalibration, presses: Path | None, progress: Any
-) -> Validation | None:
+def _validate(calibration: Calibration, presses: Path | None, progress: Any) -> Validation | None:
     if presses is None:
         return None
     measure = press_measurement(Reconstructor(calibration))

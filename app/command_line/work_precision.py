@@ -7,8 +7,8 @@ from pathlib import Path
 
 from app.command_line.common import stage_progress
 from app.command_line.terminal import say
-from gelpolight_core.calibration.file import read_open_calibration
-from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.io.atomic import make_folder, refuse_unwritable
 from gelpolight_core.session.session import read_session
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     session = None if options.session is None else read_session(options.session)
     calibration = None
     if options.calibration is not None:
-        calibration = read_open_calibration(options.calibration)
+        calibration = read_calibration(options.calibration)
     make_folder(options.output)
     refuse_unwritable(options.output / "work-precision.csv")
     repeats = max(options.repeats, 1)
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
             )
         else:
             if calibration is None:
-                calibration = calibrate_session(session, progress=progress).calibration
+                calibration = calibrate(session, progress=progress).calibration
             points = measure_session(
                 session.folder, calibration, repeats=repeats, progress=progress
             )

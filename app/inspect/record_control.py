@@ -73,7 +73,7 @@ class RecordControl(QObject):
             return
         reconstructor = self._depth.reconstructor
         calibration = None if reconstructor is None else reconstructor.calibration
-        serial = "" if calibration is None else calibration.sensor.serial
+        serial = "" if calibration is None else calibration.serial
         header = header_for(
             stream.source,
             serial=serial,

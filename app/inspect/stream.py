@@ -127,7 +127,7 @@ class DepthStream(QObject):
         if heightmap.normals is None:
             return  # it was computed before the stream was started
         used = self._depth.live_reconstructor
-        serial = "" if used is None else used.calibration.sensor.serial
+        serial = "" if used is None else used.calibration.serial
         parts = pack(heightmap, frame=frame.number, time_s=frame.time_s, serial=serial)
         self._publisher.send(parts)
         self._sent = frame.number

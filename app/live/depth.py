@@ -165,7 +165,7 @@ class LiveDepth(QObject):
         info, chosen, used = self._context.source.info, self._chosen[0], None
         if chosen is not None:
             camera = chosen.calibration.camera
-            used = Known(chosen.calibration.sensor.serial, (camera.width, camera.height))
+            used = Known(chosen.calibration.serial, (camera.width, camera.height))
         other, camera_used = "", self._camera_used
         if info is not None and self._context.cameras.is_other(camera_used, info):
             other = tr(

@@ -56,7 +56,7 @@ def calibrate_virtual_sensor(
     path : Path
         The calibration.
     """
-    from gelpolight_core.calibration.pipeline import calibrate_session
+    from gelpolight_core.calibration.project import calibrate
     from gelpolight_core.session.session import read_session
     from gelpolight_core.simulation.session import simulate_session
 
@@ -71,7 +71,7 @@ def calibrate_virtual_sensor(
         )
         # The calibration stores the session's name.
         folder.rename(whole)
-        run = calibrate_session(
+        run = calibrate(
             read_session(whole),
             progress=lambda _stage, share: progress(IMAGES_SHARE + (1.0 - IMAGES_SHARE) * share),
         )

@@ -183,7 +183,7 @@ class Measuring:
 
 
 def _require_sensor(image: MeasuredImage, calibration: Calibration) -> None:
-    serial = calibration.sensor.serial
+    serial = calibration.serial
     if image.serial not in ("", serial):
         raise InputError(
             tr(

@@ -15,9 +15,8 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.steadiness import find_contact
-from gelpolight_core.optics.refraction import membrane_to_camera
 from gelpolight_core.reconstruction.background_shift import background_shift
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -25,23 +24,6 @@ Array = NDArray[np.float64]
 TOLERANCE_MM = 1.5
 """Allowed distance of an object from its position: the accuracy of placing by hand."""
 OUTLINE_POINTS = 72
-
-
-def to_image(points_mm: Array, calibration: AnyCalibration) -> Array:
-    """Return the pixels (u, v) that see points (N, 2) of the flat membrane, (N, 2).
-
-    Parameters
-    ----------
-    points_mm : (N, 2)
-        Points in the sensor frame.
-    calibration : Calibration or InPlaceCalibration
-        Its optics or scale.
-    """
-    if isinstance(calibration, InPlaceCalibration):
-        return calibration.in_place.grid.to_pixels(points_mm)
-    plane, stack = calibration.plane, calibration.stack
-    directions = membrane_to_camera(np.asarray(points_mm, np.float64), plane, stack)
-    return np.asarray(calibration.camera.project(directions))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +61,15 @@ class Target:
         return Overlay(markers=(marker,), lines=lines)
 
 
-def make_target(press: Press, calibration: AnyCalibration) -> Target:
+def make_target(press: Press, calibration: Calibration) -> Target:
     """Return a press in image coordinates, through the calibration of the sensor."""
     centre = np.array(press.position_mm)
-    one_mm = to_image(centre + np.array([[-0.5, 0.0], [0.5, 0.0]]), calibration)
-    u, v = to_image(centre[None], calibration)[0]
+    one_mm = calibration.data.to_pixels(centre + np.array([[-0.5, 0.0], [0.5, 0.0]]))
+    u, v = calibration.data.to_pixels(centre[None])[0]
     return Target(
         press,
-        to_image(centre + _face(press), calibration),
-        to_image(centre + _circle(TOLERANCE_MM), calibration),
+        calibration.data.to_pixels(centre + _face(press)),
+        calibration.data.to_pixels(centre + _circle(TOLERANCE_MM)),
         (float(u), float(v)),
         float(np.linalg.norm(one_mm[1] - one_mm[0])),
     )
@@ -184,7 +166,7 @@ def _circle(radius_mm: float) -> Array:
     return radius_mm * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def why_not_bare(rgb: NDArray[Any], calibration: AnyCalibration) -> str:
+def why_not_bare(rgb: NDArray[Any], calibration: Calibration) -> str:
     """Return why an image cannot be that of the bare membrane. Empty if it can.
 
     Parameters

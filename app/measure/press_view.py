@@ -243,7 +243,7 @@ class PressView(PressViewFrame):
             self.panel.truth.stated,
             heightmap,
             limits=self.context.settings.limits,
-            serial=best.calibration.sensor.serial,
+            serial=best.calibration.serial,
             operator=self.panel.operator.text().strip(),
             note=self.panel.note.text().strip(),
         )

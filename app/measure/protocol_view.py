@@ -117,7 +117,7 @@ class ProtocolView(QWidget):
         calibration = read_calibration(path)
         reach_mm = math.floor(100.0 * protocol_reach_mm(calibration)) / 100.0
         protocol = check_protocol(replace(wanted, reach_mm=reach_mm), where=tr("settings"))
-        serial = calibration.sensor.serial
+        serial = calibration.serial
         name = datetime.now().astimezone().strftime(NAME_FORMAT)
         folder = self.context.workspace.protocols_folder(serial) / name
         run = begin_run(folder, protocol, serial=serial, calibration=calibration.identity)

@@ -22,7 +22,7 @@ from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from app.workspace.entries import Entry, validation_lines
 from gelpolight_core.calibration.manifest import CalibrationSummary
-from gelpolight_core.calibration.titles import stage_title
+from gelpolight_core.calibration.recipes import stage_title
 from gelpolight_core.finding import Verdict, verdict_word
 from gelpolight_core.translation import tr
 

@@ -18,7 +18,7 @@ from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry, unfinished
-from gelpolight_core.calibration.titles import stage_title
+from gelpolight_core.calibration.recipes import stage_title
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import verdict_word
 from gelpolight_core.translation import tr

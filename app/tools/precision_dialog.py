@@ -20,7 +20,7 @@ from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
-from gelpolight_core.calibration.file import read_open_calibration
+from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.studies.work_precision import (
@@ -177,7 +177,7 @@ class PrecisionDialog(WorkDialog):
             def step(_what: str, share: float) -> None:
                 progress(share)
 
-            calibration = read_open_calibration(path)
+            calibration = read_calibration(path)
             if folder is not None:
                 points = measure_session(folder, calibration, progress=step)
             else:

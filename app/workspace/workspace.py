@@ -176,7 +176,7 @@ class Workspace:
         if calibration.fault:
             name += DRAFT
         while True:
-            path = self.calibration_path(calibration.sensor.serial, name)
+            path = self.calibration_path(calibration.serial, name)
             try:
                 write_calibration(calibration, path, new=True)
             except NameTakenError:

@@ -40,7 +40,7 @@ from gelpolight_core.reconstruction.near_light.structures import (
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
 from gelpolight_core.reflectance.surroundings import view_directions
-from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -62,13 +62,13 @@ TOP_MM = 0.3
 
 
 def ball_height_error(
-    calibration: Calibration, images: Sequence[Map], balls: Sequence[BallPose]
+    calibration: OpenSensor, images: Sequence[Map], balls: Sequence[BallPose]
 ) -> float:
     """Return the relative error (root mean square) of reconstructed ball presses.
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : OpenSensor
         With its full model.
     images : sequence of (height, width, 3) float32
         Raw images of ball presses, linear light.

@@ -48,7 +48,8 @@ def edited(
     InputError
         If a curve is not finite, does not span 0 to 1, or does not increase everywhere.
     """
-    old = calibration.reflectance
+    sensor = calibration.open_sensor
+    old = sensor.reflectance
     cosines, values = list(old.cosines), list(old.values)
     changed = []
     for channel, curve in sorted(curves.items()):
@@ -62,19 +63,20 @@ def edited(
     new = ReflectanceTable(
         (cosines[0], cosines[1], cosines[2]), (values[0], values[1], values[2]), old.coverage
     )
-    flat = flat_cosines(calibration.table, calibration.led_positions_mm)
-    factors = calibration.factors.copy()
+    flat = flat_cosines(sensor.table, sensor.led_positions_mm)
+    factors = sensor.factors.copy()
     for k in changed:
         known = factors[..., k] > 0.0
         there = flat[known, k]
         factors[known, k] *= old.response(k, there) / new.response(k, there)
-    full = calibration.full
+    full = sensor.full
     if full is not None:
         middle = flat[flat.shape[0] // 2, flat.shape[1] // 2]
         full = replace(full, membrane=edited_membrane(full.membrane, old, new, changed, middle))
     edit = HandEdit("reflectance", tuple(CHANNEL_KEYS[k] for k in changed), made, operator)
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
-    return replace(calibration, reflectance=new, factors=factors, full=full, provenance=provenance)
+    new_sensor = replace(sensor, reflectance=new, factors=factors, full=full)
+    return replace(calibration, data=new_sensor, provenance=provenance)
 
 
 def edited_membrane(

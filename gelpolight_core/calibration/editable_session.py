@@ -17,7 +17,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.image_checks import refuse_other_size, refuse_unfit
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.recipe import Recipe, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import read_image_file
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
@@ -33,7 +33,8 @@ from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.session.images import average_frames, write_image
-from gelpolight_core.session.session import ONE_IMAGE_STAGES, Session
+from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.translation import tr
 
 Frame = NDArray[Any]
 Write = Callable[[Path, Path], None]
@@ -54,22 +55,32 @@ class EditableSession:
     ----------
     folder : Path
         A session folder with ``session.toml``.
-    read : callable
-        Reads the folder.
+    recipe : Recipe
+        Its stages, which are named by their keys.
 
     Raises
     ------
     InputError
-        If the folder is not a session.
+        If the folder is not a session, or not one of the recipe.
     """
 
-    def __init__(self, folder: Path, read: Callable[[Path], Session]) -> None:
+    def __init__(self, folder: Path, recipe: Recipe) -> None:
+        self.recipe = recipe
         self._lock = threading.RLock()
-        self._read: Callable[[Path], Session] = read
         self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
-        self._session: Session = read(folder)
+        self._session = self._read(folder)
         self._replaced: dict[str, _Replaced] = {}
         self._dropped = 0  # counts removed images that a running computation may have used
+
+    def _read(self, folder: Path) -> Session:
+        session = read_session(folder)
+        if not self.recipe.fits(session):
+            raise InputError(
+                tr("The session is now of another kind of sensor"),
+                where=str(folder),
+                advice=tr("Open it again"),
+            )
+        return session
 
     @property
     def session(self) -> Session:
@@ -77,7 +88,7 @@ class EditableSession:
         return self._session
 
     def add_capture(
-        self, stage: Stage, frames: Sequence[Frame], *, radius_mm: float | None = None
+        self, key: str, frames: Sequence[Frame], *, radius_mm: float | None = None
     ) -> str:
         """Store frames of one view as one image, their average, and return its name.
 
@@ -86,7 +97,7 @@ class EditableSession:
 
         Parameters
         ----------
-        stage : Stage
+        key : str
             A stage with its own images.
         frames : sequence of (rows, columns, 3) uint8 or uint16
             RGB.
@@ -98,20 +109,20 @@ class EditableSession:
         InputError
             If it cannot be written, or its size differs from the session's images.
         """
-        refuse_other_size(self._session, (frames[0].shape[1], frames[0].shape[0]))
-        folder = FOLDERS[stage]
+        size = frames[0].shape[1], frames[0].shape[0]
+        refuse_other_size(self._session, self.recipe.folders(self._session), size)
         write = partial(_write, average_frames(frames))
-        (name,) = self._keep_all(folder, [(".png", write)], radius_mm)
+        (name,) = self._keep_all(self.recipe[key], [(".png", write)], radius_mm)
         return name
 
     def import_files(
-        self, stage: Stage, files: Sequence[Path], *, radius_mm: float | None = None
+        self, key: str, files: Sequence[Path], *, radius_mm: float | None = None
     ) -> tuple[str, ...]:
         """Copy image files into a stage and return their new names.
 
         Parameters
         ----------
-        stage : Stage
+        key : str
             A stage with its own images.
         files : sequence of Path
             PNG or TIFF.
@@ -123,62 +134,63 @@ class EditableSession:
         InputError
             If a file is not an image that fits into the session; then none is added.
         """
-        refuse_unfit(self._session, stage, files)
+        stage, folders = self.recipe[key], self.recipe.folders(self._session)
+        refuse_unfit(self._session, folders, files, colour=stage.colour)
         images = [(path.suffix.lower(), partial(_copy, path)) for path in files]
-        return self._keep_all(FOLDERS[stage], images, radius_mm)
+        return self._keep_all(stage, images, radius_mm)
 
-    def take_back(self, stage: Stage, names: Sequence[str]) -> None:
+    def take_back(self, key: str, names: Sequence[str]) -> None:
         """Undo adding images: exclude those that were added together.
 
         The images that they had replaced are used again. The files themselves stay.
 
         Parameters
         ----------
-        stage : Stage
+        key : str
             Their stage.
         names : sequence of str
             File names.
         """
         with self._lock:
-            files, former = self._files_and_replaced(stage, names)
+            files, former = self._files_and_replaced(key, names)
             now = self._session.decisions
             excluded = (now.excluded | files) - former.images
             spots = {**now.spots_px, **former.spots_px}
             self.decide(replace(now, excluded=excluded, spots_px=spots))
             self._dropped += 1
 
-    def take_again(self, stage: Stage, names: Sequence[str]) -> None:
+    def take_again(self, key: str, names: Sequence[str]) -> None:
         """Add images again after :meth:`take_back`.
 
         Parameters
         ----------
-        stage, names
+        key, names
             As for :meth:`take_back`.
         """
         with self._lock:
-            files, former = self._files_and_replaced(stage, names)
+            files, former = self._files_and_replaced(key, names)
             now = self._session.decisions
             excluded = (now.excluded - files) | former.images
             spots = {led: p for led, p in now.spots_px.items() if led not in former.spots_px}
             self.decide(replace(now, excluded=excluded, spots_px=spots))
 
-    def _files_and_replaced(self, stage: Stage, names: Sequence[str]) -> tuple[set[str], _Replaced]:
-        files = {f"{FOLDERS[stage]}/{name}" for name in names}
+    def _files_and_replaced(self, key: str, names: Sequence[str]) -> tuple[set[str], _Replaced]:
+        files = {f"{self.recipe[key].folder}/{name}" for name in names}
         return files, self._replaced.get(min(files), _Replaced())
 
     def _keep_all(
-        self, folder: str, images: Sequence[tuple[str, Write]], radius_mm: float | None
+        self, stage: Stage[Any], images: Sequence[tuple[str, Write]], radius_mm: float | None
     ) -> tuple[str, ...]:
         """Write images that belong together, all or none, and return their names."""
         names: list[str] = []
         with self._lock:
             try:
                 for suffix, write in images:
-                    names.append(self._keep(folder, suffix, radius_mm, write))
-                self._replace_views(folder, set(names))
+                    names.append(self._keep(stage, suffix, radius_mm, write))
+                self._replace_views(stage, set(names))
             except InputError:
                 with contextlib.suppress(OSError, InputError):  # the first refusal is reported
-                    self._drop(folder, names)
+                    self._drop(stage.folder, names)
                 raise
         return tuple(names)
 
@@ -193,7 +205,7 @@ class EditableSession:
 
     def _keep(
         self,
-        folder: str,
+        stage: Stage[Any],
         suffix: str,
         radius_mm: float | None,
         write: Write,
@@ -203,8 +215,9 @@ class EditableSession:
         Another program that captures into the same session may use that name at the same moment.
         """
         while True:
-            name = self._next_name(folder, suffix)
-            save = partial(write, self._session.folder, self._session.folder / folder / name)
+            name = self._next_name(stage, suffix)
+            folder = self._session.folder
+            save = partial(write, folder, folder / stage.folder / name)
             try:
                 self._keep_as(name, radius_mm, save)
             except NameTakenError:
@@ -232,12 +245,12 @@ class EditableSession:
             self._files.take(path)
             self._session = replace(self._session, decisions=decisions)
 
-    def exclude(self, stage: Stage, name: str, excluded: bool = True) -> None:
+    def exclude(self, key: str, name: str, excluded: bool = True) -> None:
         """Exclude an image, or include it again.
 
         Parameters
         ----------
-        stage : Stage
+        key : str
             Stage of the image.
         name : str
             Its file name.
@@ -245,9 +258,9 @@ class EditableSession:
             False includes the image again.
         """
         with self._lock:
-            key = f"{FOLDERS[stage]}/{name}"
+            image = f"{self.recipe[key].folder}/{name}"
             names = self._session.decisions.excluded
-            names = names | {key} if excluded else names - {key}
+            names = names | {image} if excluded else names - {image}
             self.decide(replace(self._session.decisions, excluded=names))
             self._dropped += excluded
 
@@ -368,14 +381,15 @@ class EditableSession:
                     write_description(self._session)
                 self._files.take(path)
 
-    def _next_name(self, folder: str, suffix: str = ".png") -> str:
-        files = [p.stem for p in self._session.captured(folder)]
+    def _next_name(self, stage: Stage[Any], suffix: str) -> str:
+        files = [p.stem for p in self._session.captured(stage.folder)]
         numbers: list[int] = [int(stem[-3:]) for stem in files if stem[-3:].isdigit()]
         number = max([*numbers, len(files)], default=0) + 1
-        return f"{_STEMS[folder]}_{number:03d}{suffix}"
+        return f"{stage.stem or stage.folder}_{number:03d}{suffix}"
 
-    def _replace_views(self, folder: str, names: set[str]) -> None:
-        if folder in ONE_IMAGE_STAGES:
+    def _replace_views(self, stage: Stage[Any], names: set[str]) -> None:
+        folder = stage.folder
+        if stage.one_image:
             former = {
                 f"{folder}/{path.name}"
                 for path in self._session.found(folder)
@@ -383,23 +397,12 @@ class EditableSession:
             }
             now = self._session.decisions
             # A spot was set in the image that is replaced.
-            spots = {} if folder == FOLDERS[Stage.LIGHTS] else now.spots_px
+            spots = {} if stage.key == "lights" else now.spots_px
             if former or spots != now.spots_px:
                 self.decide(replace(now, excluded=now.excluded | former, spots_px=spots))
                 gone = {k: v for k, v in now.spots_px.items() if k not in spots}
                 first = min(f"{folder}/{name}" for name in names)
                 self._replaced[first] = _Replaced(frozenset(former), gone)
-
-
-_STEMS = {
-    "checkerboard": "view",
-    "top_pose": "top",
-    "mirror": "mirror",
-    "whiteboard": "whiteboard",
-    "background": "background",
-    "scale": "scale",
-    "balls": "ball",
-}
 
 
 def _copy(source: Path, session: Path, target: Path) -> None:

@@ -5,27 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import require_size
 from gelpolight_core.session.file_hashes import file_hash, refuse_copies
-from gelpolight_core.session.images import SessionImages, read_image, require_colour
+from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
-COLOUR_STAGES = (Stage.LIGHTS, Stage.RADIANCE, Stage.BACKGROUND, Stage.SCALE, Stage.BALLS)
 
-
-def refuse_unfit(session: SessionImages, stage: Stage, files: Sequence[Path]) -> None:
-    """Refuse files that cannot be images of a stage of this session.
+def refuse_unfit(
+    session: Session, folders: Sequence[str], files: Sequence[Path], *, colour: bool
+) -> None:
+    """Refuse files that cannot be images of this session.
 
     Parameters
     ----------
-    session : SessionImages
+    session : Session
         The target session.
-    stage : Stage
-        The target stage.
+    folders : sequence of str
+        Folders of all its stages.
     files : sequence of Path
         Files in any folder.
+    colour : bool
+        Whether the target stage needs colours.
 
     Raises
     ------
@@ -33,17 +35,15 @@ def refuse_unfit(session: SessionImages, stage: Stage, files: Sequence[Path]) ->
         If a file is not an image, differs in size from the session's images, is grey where the LEDs
         are identified by colour, or is already in the session.
     """
-    size = image_size(session)
+    size = image_size(session, folders)
     for path in files:
         image = read_image(path)
         size = size or image.size
         require_size(image.size, size, where=str(path))
-        if stage in COLOUR_STAGES:
+        if colour:
             require_colour(image, where=str(path))
     refuse_copies(files)
-    known = {
-        file_hash(path): path for folder in FOLDERS.values() for path in session.captured(folder)
-    }
+    known = {file_hash(path): path for folder in folders for path in session.captured(folder)}
     for path in files:
         twin = known.get(file_hash(path))
         if twin is not None:
@@ -56,7 +56,7 @@ def refuse_unfit(session: SessionImages, stage: Stage, files: Sequence[Path]) ->
             )
 
 
-def refuse_other_size(session: SessionImages, size: tuple[int, int]) -> None:
+def refuse_other_size(session: Session, folders: Sequence[str], size: tuple[int, int]) -> None:
     """Refuse an image whose width and height differ from the session's images.
 
     Raises
@@ -64,14 +64,14 @@ def refuse_other_size(session: SessionImages, size: tuple[int, int]) -> None:
     InputError
         If there are images and their size is different.
     """
-    wanted = image_size(session)
+    wanted = image_size(session, folders)
     if wanted is not None:
         require_size(size, wanted, where=tr("camera"))
 
 
-def image_size(session: SessionImages) -> tuple[int, int] | None:
+def image_size(session: Session, folders: Sequence[str]) -> tuple[int, int] | None:
     """Return width and height of the session's images; None if there are none yet."""
-    for folder in FOLDERS.values():
+    for folder in folders:
         for path in session.found(folder):
             try:
                 return read_image(path).size

@@ -1,4 +1,4 @@
-"""Calibrate a closed sensor from its session folder."""
+"""What the stages of a closed sensor compute from the images of its session."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Finding, QualityTable, judge
+from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.in_place.ball import Ball
 from gelpolight_core.in_place.calibrate import (
@@ -24,17 +23,12 @@ from gelpolight_core.in_place.calibrate import (
 from gelpolight_core.in_place.roundness import judge_stretch
 from gelpolight_core.in_place.scale import MeasuredScale, scale_from_pins, scale_from_punch
 from gelpolight_core.io.reading import as_text
-from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor, InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import MODEL, ClosedSensor
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reflectance.contour import Circle
-from gelpolight_core.sensor_calibration import HandEdit
-from gelpolight_core.session.file_hashes import refuse_copies
-from gelpolight_core.session.images import require_colour
-from gelpolight_core.session.missing import CLOSED_STAGES
+from gelpolight_core.sensor_calibration import Calibration, HandEdit, Provenance
 from gelpolight_core.session.session import InPlace, Session
 from gelpolight_core.translation import tr
-
-Progress = Callable[[str, float], None]
 
 STATED_SCALE_SD = 0.01
 """Relative standard deviation of a scale that is stated without one."""
@@ -44,101 +38,121 @@ SETTLED = 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class InPlaceRun:
-    """A closed sensor's calibration with what it was made from.
+class Slopes:
+    """The slopes of a closed sensor's colours, from its ball presses.
 
     Attributes
     ----------
-    calibration : InPlaceCalibration
-        The calibration.
     result : InPlaceResult
-        Presses, ridge and figures.
-    scale : MeasuredScale or None
-        As measured on ``scale/``; None where it is stated.
+        Presses, model and ridge.
+    noise : (3,)
+        Standard deviation of a pixel of a single image, per channel.
+    scale_sd : float
+        Relative standard deviation of the scale.
     """
 
-    calibration: InPlaceCalibration
     result: InPlaceResult
-    scale: MeasuredScale | None = None
+    noise: NDArray[np.float64]
+    scale_sd: float
+
+    @property
+    def tables(self) -> dict[str, QualityTable]:
+        """The tables of figures by their keys."""
+        return judge_in_place(self.result, self.scale_sd)
+
+    @property
+    def quality(self) -> QualityTable:
+        """All figures."""
+        return joined_tables(self.tables.values())
+
+    @property
+    def balls(self) -> tuple[tuple[str, float, float, float, float], ...]:
+        """Name, x and y of the centre, contact radius and ball radius of each press, in mm."""
+        grid = self.result.model.grid
+        return tuple(_ball_entry(press.name, press.ball, grid) for press in self.result.presses)
 
 
-def calibrate_closed_session(
+def find_slopes(
     session: Session,
+    background: LinearImage,
+    scale: PixelScale | None = None,
     *,
     towards: NDArray[np.float64] | None = None,
-    progress: Progress | None = None,
-) -> InPlaceRun:
-    """Calibrate a closed sensor from its session folder.
+    progress: Callable[[float], None] = lambda _share: None,
+) -> Slopes:
+    """Find the slopes of a closed sensor's colours.
 
     Parameters
     ----------
     session : Session
-        Images and decisions of the user.
+        Ball presses, what is stated of the scale, and the decisions of the user.
+    background : LinearImage
+        The untouched membrane.
+    scale : PixelScale, optional
+        As measured; by default as stated.
     towards : (terms, 2), optional
         Coefficients of an earlier calibration that these presses are to correct.
     progress : callable, optional
-        Called with the stage name and the share done, 0..1.
+        Called with the share done, 0..1.
 
     Raises
     ------
     InputError
-        If background or balls are missing or cannot be used.
+        If the images cannot be used.
     """
-    progress = progress or (lambda _stage, _share: None)
-    _refuse_missing(session)
-    files = tuple(path for stage in stages_of(session) for path in session.files(stage))
-    refuse_copies(files)
-    progress(tr("background"), 0.0)
-    background = session.averaged("background")
     stated = session.in_place or InPlace()
     grid = stated_grid(stated, background.size)
-    membrane = replace(background, rgb=grid.cut(background.rgb))
-    require_colour(membrane, where=str(session.folder / "background"))
-    scale = None if stated.mm_per_px is not None else measured_scale(session, stated, background)
-    mm_per_px, scale_sd = _scale(stated, scale)
+    if scale is not None:
+        mm_per_px, scale_sd = scale.measured.mm_per_px, scale.relative_sd
+    else:
+        assert stated.mm_per_px is not None
+        mm_per_px, sd = stated.mm_per_px[0], stated.mm_per_px_sd
+        scale_sd = STATED_SCALE_SD if sd is None else sd / mm_per_px
     grid = replace(grid, mm_per_px=mm_per_px)
-    progress(tr("ball presses"), 0.05)
     presses, unreadable = _presses(session, background)
     result = calibrate_in_place(
-        background.rgb,
-        presses,
-        grid,
-        scale_sd=scale_sd,
-        towards=towards,
-        progress=lambda share: progress(tr("ball presses"), 0.05 + 0.95 * share),
+        background.rgb, presses, grid, scale_sd=scale_sd, towards=towards, progress=progress
     )
     result = replace(result, refused={**result.refused, **unreadable})
-    calibration = InPlaceCalibration(
-        sensor=ClosedSensor(session.serial),
-        in_place=result.model,
-        noise=_noise(membrane.rgb),
-        balls=tuple(_ball_entry(press.name, press.ball, grid) for press in result.presses),
-        quality=judge_in_place(result, scale_sd),
-        provenance=provenance_of(session, files),
+    return Slopes(result, _noise(grid.cut(background.rgb)), scale_sd)
+
+
+def in_place_calibration(
+    session: Session, slopes: Slopes, quality: dict[str, QualityTable], made: Provenance
+) -> Calibration:
+    """Return the calibration of a closed sensor."""
+    data = ClosedSensor(
+        session.serial,
+        in_place=slopes.result.model,
+        noise=slopes.noise,
+        balls=slopes.balls,
         response=session.response,
     )
-    progress(tr("done"), 1.0)
-    return InPlaceRun(calibration, result, scale)
+    return Calibration(MODEL, data, quality, made)
 
 
-def stages_of(session: Session) -> tuple[str, ...]:
-    """Return the folders of the images that a calibration uses."""
-    measured = session.in_place is not None and session.in_place.mm_per_px is None
-    return (*CLOSED_STAGES, "scale") if measured else CLOSED_STAGES
+@dataclass(frozen=True, slots=True)
+class PixelScale:
+    """The size of a pixel on the membrane, from images of a pressed object.
 
+    Attributes
+    ----------
+    measured : MeasuredScale
+        With its standard deviation.
+    """
 
-def _refuse_missing(session: Session) -> None:
-    """Refuse a session that lacks images, with all stages that do."""
-    missing = [stage for stage in stages_of(session) if not session.found(stage)]
-    if missing:
-        raise InputError(
-            tr("the session has no images of: {stages}").format(stages=", ".join(missing)),
-            where=str(session.folder),
-            advice=tr(
-                "Capture the untouched membrane as background, and {n} or more presses of a ball "
-                "of known radius at different places"
-            ).format(n=ENOUGH_BALLS),
-        )
+    measured: MeasuredScale
+
+    @property
+    def quality(self) -> QualityTable:
+        """The scale and its uncertainty."""
+        more = tr("Add images of the pressed object, at other places")
+        return judge_scale(self.measured.mm_per_px, self.relative_sd, more)
+
+    @property
+    def relative_sd(self) -> float:
+        """Relative standard deviation."""
+        return self.measured.sd_mm_per_px / self.measured.mm_per_px
 
 
 def stated_grid(stated: InPlace, size: tuple[int, int]) -> WorkingGrid:
@@ -160,15 +174,13 @@ def stated_grid(stated: InPlace, size: tuple[int, int]) -> WorkingGrid:
     return WorkingGrid(ImageSize(*size), x, y / x, stated.region_px)
 
 
-def measured_scale(session: Session, stated: InPlace, background: LinearImage) -> MeasuredScale:
+def measured_scale(session: Session, background: LinearImage) -> PixelScale:
     """Return the scale by the images of ``scale/``.
 
     Parameters
     ----------
     session : Session
-        Its images.
-    stated : InPlace
-        The size of the pressed object.
+        Its images, and the size of the pressed object.
     background : LinearImage
         The untouched membrane.
 
@@ -177,34 +189,24 @@ def measured_scale(session: Session, stated: InPlace, background: LinearImage) -
     InputError
         If an image does not show the object.
     """
+    stated = session.in_place or InPlace()
+    pressed, grid = stated.pressed_scale, stated_grid(stated, background.size)
     images = session.images("scale")
-    grid = stated_grid(stated, background.size)
     rgb, bare = [grid.cut(image.rgb) for image in images], grid.cut(background.rgb)
-    where, pressed = str(session.folder / "scale"), stated.pressed_scale
+    where = str(session.folder / "scale")
     require_size(images[0].size, background.size, where=where)
     if pressed.pin_spacing_mm is not None:
-        return scale_from_pins(
+        found = scale_from_pins(
             rgb,
             bare,
             spacing_mm=pressed.pin_spacing_mm,
             where=where,
         )
-    assert pressed.punch_diameter_mm is not None
-    return scale_from_punch(
-        rgb,
-        bare,
-        diameter_mm=pressed.punch_diameter_mm,
-        where=where,
-    )
-
-
-def _scale(stated: InPlace, measured: MeasuredScale | None) -> tuple[float, float]:
-    """Return the scale and its relative standard deviation."""
-    if measured is not None:
-        return measured.mm_per_px, measured.sd_mm_per_px / measured.mm_per_px
-    assert stated.mm_per_px is not None
-    mm_per_px, sd = stated.mm_per_px[0], stated.mm_per_px_sd
-    return mm_per_px, STATED_SCALE_SD if sd is None else sd / mm_per_px
+    else:
+        assert pressed.punch_diameter_mm is not None
+        diameter_mm = pressed.punch_diameter_mm
+        found = scale_from_punch(rgb, bare, diameter_mm=diameter_mm, where=where)
+    return PixelScale(found)
 
 
 def _presses(
@@ -375,15 +377,15 @@ def expected_gain(result: InPlaceResult) -> float | None:
 
 
 def with_background(
-    calibration: InPlaceCalibration, background: LinearImage, *, operator: str, made: str
-) -> InPlaceCalibration:
+    calibration: Calibration, background: LinearImage, *, operator: str, made: str
+) -> Calibration:
     """Return the calibration with another gel's background; slopes stay as they are.
 
     Its quality warns that no press of the new gel has been seen.
 
     Parameters
     ----------
-    calibration : InPlaceCalibration
+    calibration : Calibration
         Of the sensor with the gel before.
     background : LinearImage
         The new gel, untouched.
@@ -397,8 +399,8 @@ def with_background(
     """
     camera = calibration.camera
     require_size(background.size, (camera.width, camera.height), where=background.name)
-    model = calibration.in_place
-    changed = replace(model, background=model.grid.reduce(background.rgb))
+    data = calibration.data
+    changed = data.with_background(data.on_grid(background.rgb))
     edit = HandEdit("background", CHANNEL_KEYS, made, operator)
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
     unseen = judge(
@@ -410,22 +412,4 @@ def with_background(
         remedy=tr("Press a ball at three or more places and repair the calibration with them"),
     )
     quality = {**calibration.quality, "gel": QualityTable((unseen,))}
-    return replace(calibration, in_place=changed, quality=quality, provenance=provenance)
-
-
-def repaired(calibration: InPlaceCalibration, session: Session) -> InPlaceRun:
-    """Return a calibration from the presses of a session, regularised towards an earlier one.
-
-    Parameters
-    ----------
-    calibration : InPlaceCalibration
-        Of the sensor with the gel before.
-    session : Session
-        Background and presses of the present gel, three or more.
-
-    Raises
-    ------
-    InputError
-        As :func:`~gelpolight_core.calibration.in_place_session.calibrate_closed_session`.
-    """
-    return calibrate_closed_session(session, towards=calibration.in_place.coefficients)
+    return replace(calibration, data=changed, quality=quality, provenance=provenance)

@@ -33,16 +33,18 @@ from gelpolight_core.translation import english, tr
 
 FORMAT = "gelpolight-calibration"
 # Version 1 has no membrane curves, standard deviations, manual edits or camera response.
-# Version 3 adds closed sensors; version 4 stores texts with templates and values.
-VERSION = 4
+# Version 3 adds closed sensors; version 4 stores texts with templates and values. Version 5 is laid
+# out as the dataclasses are, and its identity must follow from its numbers.
+VERSION = 5
+FIRST_NESTED = 5
+"""From this version on, a file is laid out as the dataclasses are."""
 MANIFEST = "manifest.json"
-REMARKS = ("elastomer", "accepted")
-"""Beside the provenance, because older programs refuse unknown keys there."""
 REMARK_LENGTH = 200
 MANIFEST_LIMIT = 4_000_000
 MOST_ARRAYS = 64
 MOST_DIMENSIONS = 4
 HEAD_LIMIT = 4096
+KINDS = ("<f4", "<f8", "<i4")
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +105,7 @@ def read_summary(path: Path) -> CalibrationSummary:
     """
     with opened(path) as archive:
         manifest = read_manifest(archive, path)
-        for part in ("in_place" if "in_place" in manifest else "plane", "grid"):
-            manifest[part]
+        manifest["grid"]
         check_arrays(manifest["arrays"], archive)
         return _summarise(manifest)
 
@@ -129,19 +130,15 @@ def refuse_damaged_arrays(path: Path) -> None:
 
 
 def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
-    provenance, camera = manifest["provenance"], manifest["camera"]
-    texts = {
-        "identity": manifest["identity"],
-        "serial": manifest["sensor"]["serial"],
-        "model": manifest["model"],
-        **{k: provenance[k] for k in ("created", "operator", "program_version", "session")},
-        "inputs": provenance.get("inputs", ""),
-        "camera": provenance.get("camera_settings", {}).get("identity", ""),
-        **{key: manifest.get(key, "") for key in REMARKS},
-    }
+    made = manifest["provenance"]
+    texts = {key: manifest[key] for key in ("identity", "serial", "model")}
+    texts |= {key: made[key] for key in ("created", "operator", "program_version", "session")}
+    texts |= {key: made.get(key, "") for key in ("inputs", "elastomer", "accepted")}
+    texts["camera"] = made.get("camera_settings", {}).get("identity", "")
+    width, height = manifest["image_size"]
     return CalibrationSummary(
         **{key: written_text(text) for key, text in texts.items()},
-        image_size=(int(camera["width"]), int(camera["height"])),
+        image_size=(int(width), int(height)),
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
     )
 
@@ -154,7 +151,21 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     stated = read_member(archive, f"{MANIFEST}.sha256", 64)
     if hashlib.sha256(text).hexdigest().encode() != stated:
         raise ValueError("the manifest's checksum is wrong")
-    return manifest
+    return _with_head(manifest)
+
+
+def _with_head(manifest: dict[str, Any]) -> dict[str, Any]:
+    """Return the manifest of any version with the entries of today that need no array."""
+    if manifest["version"] >= FIRST_NESTED:
+        return manifest
+    camera = manifest["camera"]
+    remarks = {key: manifest[key] for key in ("elastomer", "accepted") if key in manifest}
+    return {
+        **manifest,
+        "serial": manifest["sensor"]["serial"],
+        "image_size": [camera["width"], camera["height"]],
+        "provenance": {**manifest["provenance"], **remarks},
+    }
 
 
 def quality_rows(table: QualityTable) -> list[dict[str, Any]]:
@@ -203,7 +214,7 @@ def declared_bytes(name: str, entry: dict[str, Any]) -> int:
     shape, kind = entry["shape"], entry["kind"]
     if not isinstance(shape, list) or not 1 <= len(shape) <= MOST_DIMENSIONS:
         raise ValueError(f"{brief(name)} has no shape")
-    if not all(type(n) is int and 1 <= n <= 10**9 for n in shape) or kind not in ("<f4", "<f8"):
+    if not all(type(n) is int and 1 <= n <= 10**9 for n in shape) or kind not in KINDS:
         raise ValueError(f"{brief(name)} has the invalid type {brief(kind)} {brief(shape)}")
     return math.prod(shape) * int(kind[-1])
 

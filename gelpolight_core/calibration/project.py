@@ -7,91 +7,208 @@ decides, one that computes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from gelpolight_core.calibration.inputs import (
-    FOLDERS,
-    NEEDS,
-    Stage,
-    StageInputs,
-    all_inputs,
-    inputs_of,
-)
-from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, source_files, stages_of
-from gelpolight_core.calibration.results import StageResults
-from gelpolight_core.calibration.staged_project import Outcome, StagedProject
-from gelpolight_core.calibration.stages import run_stage
-from gelpolight_core.calibration.status import StageState, StageStatus, judged
+from gelpolight_core.calibration.editable_session import EditableSession
+from gelpolight_core.calibration.provenance import provenance_of
+from gelpolight_core.calibration.recipe import Progress, Recipe, Results, Stage, StageInputs
+from gelpolight_core.calibration.recipes import recipe_of
+from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import QualityTable
-from gelpolight_core.sensor_calibration import MODELS
-from gelpolight_core.session.file_hashes import refuse_copies
-from gelpolight_core.session.session import read_session
+from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
+from gelpolight_core.session.missing import refuse_missing_stages
+from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from gelpolight_core.sensor_calibration import Calibration
 
 
 class Cancelled(Exception):
     """Raised in a computation that the user has stopped."""
 
 
-class CalibrationProject(StagedProject[StageResults]):
-    """One session folder with its results.
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A calibration with what it was made from, as shown by the wizard and the report.
+
+    Attributes
+    ----------
+    calibration : Calibration
+        What was made.
+    session : Session
+        Its images, as they were used.
+    results : Results
+        The result of every stage.
+    """
+
+    calibration: Calibration
+    session: Session
+    results: Results
+
+
+def calibrate(
+    session: Session,
+    recipe: Recipe | None = None,
+    *,
+    progress: Callable[[str, float], None] | None = None,
+) -> Run:
+    """Calibrate a sensor from its session folder, all stages in order.
+
+    Parameters
+    ----------
+    session : Session
+        Captured images and the user's decisions.
+    recipe : Recipe, optional
+        The stages; by default those of the session's kind of sensor.
+    progress : callable, optional
+        Called with the title of the stage and the share done, 0..1.
+
+    Raises
+    ------
+    InputError
+        If a stage is missing or cannot be used; the message names the file.
+    """
+    recipe, show = recipe or recipe_of(session), progress or (lambda _title, _share: None)
+    refuse_missing_stages(session.folder, recipe.missing(session))
+    refuse_copies(recipe.files(session))
+    results, inputs, begin = Results(), recipe.inputs(session), 0.0
+    whole = sum(stage.share for stage in recipe.of(session))
+    for stage in recipe.of(session):
+
+        def within(done: float, stage: Stage[Any] = stage, begin: float = begin) -> None:
+            show(stage.title, begin + stage.share / whole * done)
+
+        within(0.0)
+        results = recipe.run(stage, session, results, inputs=inputs, progress=within)
+        stage.require(results)
+        begin += stage.share / whole
+    show(tr("done"), 1.0)
+    return assemble(recipe, session, results, inputs)
+
+
+def assemble(
+    recipe: Recipe,
+    session: Session,
+    results: Results,
+    inputs: Mapping[str, StageInputs] | None = None,
+) -> Run:
+    """Combine the results of all stages.
+
+    Parameters
+    ----------
+    recipe, session
+        The stages, and what they were computed from.
+    results : Results
+        Of every stage.
+    inputs : mapping, optional
+        Inputs of every stage, by its key; by default the present ones.
+
+    Raises
+    ------
+    InputError
+        If a stage was not run.
+    """
+    tables = {
+        table.key: table.of(results[stage])
+        for stage in recipe.of(session)
+        for table in stage.all_tables
+    }
+    quality = {key: table for key, table in tables.items() if table.figures}
+    text = recipe.all_inputs(session, inputs or recipe.inputs(session))
+    made = provenance_of(session, recipe.files(session), inputs=text)
+    return Run(recipe.finish(session, results, quality, made), session, results)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a stage ended when it was last computed.
+
+    Attributes
+    ----------
+    inputs : StageInputs
+        What it was computed from.
+    fault : InputError or None
+        Why it failed.
+    """
+
+    inputs: StageInputs
+    fault: InputError | None
+
+
+class Project(EditableSession):
+    """One session folder with the results of its recipe's stages, which are named by their keys.
 
     Parameters
     ----------
     folder : Path
         A session folder with ``session.toml``.
+    recipe : Recipe, optional
+        The stages; by default those of the session's kind of sensor.
 
     Raises
     ------
     InputError
-        If the folder is not a session.
+        If the folder is not a session, or not one of the recipe.
     """
 
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder, read_session, StageResults())
+    def __init__(self, folder: Path, recipe: Recipe | None = None) -> None:
+        super().__init__(folder, recipe or recipe_of(read_session(folder)))
+        self._hashes = CachedHashes()
+        self._results = Results()
+        self._outcomes: dict[str, Outcome] = {}
+
+    @property
+    def results(self) -> Results:
+        """The newest result of every stage, even if out of date."""
+        return self._results
 
     @property
     def all_inputs(self) -> str:
         """A text that changes with any input of the calibration."""
         with self._lock:
-            return all_inputs(self._session, self._hashes)
+            return self.recipe.all_inputs(self._session, self._inputs())
 
-    def statuses(self) -> dict[Stage, StageStatus]:
-        """Return the present status of every stage."""
+    def fault(self, key: str) -> InputError | None:
+        """Return why a stage failed when it was last computed; None if it did not."""
+        outcome = self._outcomes.get(key)
+        return None if outcome is None else outcome.fault
+
+    def statuses(self) -> dict[str, StageStatus]:
+        """Return the present status of every stage, by its key."""
         with self._lock:
-            inputs = inputs_of(self._session, self._hashes)
-            return {stage: self._status(stage, inputs) for stage in inputs}
+            inputs = self._inputs()
+            return {s.key: self._status(s, inputs[s.key]) for s in self.recipe.of(self._session)}
 
-    def stale(self, *, upto: Stage | None = None, model: str = MODELS[-1]) -> tuple[Stage, ...]:
-        """Return the stages that can and need to be computed, in order.
+    def stale(self, *, upto: str | None = None) -> tuple[str, ...]:
+        """Return the keys of the stages that can and need to be computed, in order.
 
         Parameters
         ----------
-        upto : Stage, optional
+        upto : str, optional
             Only this stage and what it builds on.
-        model : str, optional
-            The model to calibrate for.
         """
         with self._lock:
-            inputs = inputs_of(self._session, self._hashes)
-        ready: set[Stage] = set()
+            inputs, stages = self._inputs(), self.recipe.of(self._session)
+        ready: set[str] = set()
         found = []
-        wanted = set(stages_of(model)) if upto is None else _closure(upto)
-        for stage in stages_of(model):
-            if stage not in wanted or not all(need in ready for need in NEEDS[stage]):
+        for stage in stages:
+            key, wanted = stage.key, upto is None or stage.key in self.recipe.needed(upto)
+            empty = stage.folder and not inputs[key].images
+            waits = any(n.key in inputs and n.key not in ready for n in stage.needs)
+            if not wanted or empty or waits:
                 continue
-            if stage in FOLDERS and not inputs[stage].images:
+            current = self._is_current(key, inputs[key])
+            if current and self.fault(key) is not None:
                 continue
-            current = self._is_current(stage, inputs[stage])
-            if current and self.fault(stage) is not None:
-                continue
-            ready.add(stage)
+            ready.add(key)
             if not current:
-                found.append(stage)
+                found.append(key)
         return tuple(found)
 
-    def compute(self, stage: Stage, progress: Callable[[float], None] | None = None) -> StageStatus:
+    def compute(self, key: str, progress: Progress = lambda _share: None) -> StageStatus:
         """Run one stage on the present images and decisions, and store its result.
 
         A stage that cannot be completed stores its error as its status. A stage whose earlier
@@ -99,65 +216,84 @@ class CalibrationProject(StagedProject[StageResults]):
 
         Parameters
         ----------
-        stage : Stage
+        key : str
             The stage.
         progress : callable, optional
             Called with the share done; it may raise :class:`Cancelled`, which leaves everything
             unchanged.
         """
+        stage = self.recipe[key]
         with self._lock:
             session, results, dropped = self._session, self._results, self._dropped
-            inputs = inputs_of(session, self._hashes)
-            for earlier in NEEDS[stage]:
-                if earlier in self._outcomes and not self._is_current(earlier, inputs[earlier]):
-                    return self._status(stage, inputs)
+            inputs = self._inputs()
+            for need in stage.needs:
+                found = inputs.get(need.key)
+                if found and need.key in self._outcomes and not self._is_current(need.key, found):
+                    return self._status(stage, inputs[key])
         fault = None
         try:
-            results = run_stage(stage, session, results, progress=progress)
+            results = self.recipe.run(stage, session, results, inputs=inputs, progress=progress)
+            stage.require(results)
         except InputError as error:
             fault = error
         with self._lock:
-            self._store(stage, Outcome(inputs[stage], fault), results, dropped)
-            return self._status(stage, inputs_of(self._session, self._hashes))
+            # An image that was added and removed meanwhile may be in the result, but in no input.
+            if self._dropped == dropped:
+                self._results = results
+                self._outcomes[key] = Outcome(inputs[key], fault)
+            return self._status(stage, self._inputs()[key])
 
-    def finish(self, *, model: str = MODELS[-1]) -> CalibrationRun:
+    def finish(self, recipe: Recipe | None = None) -> Run:
         """Return the calibration.
+
+        Parameters
+        ----------
+        recipe : Recipe, optional
+            With some of the project's stages; by default all of them.
 
         Raises
         ------
         InputError
             If a stage is missing, out of date or failed.
         """
+        recipe = recipe or self.recipe
         with self._lock:
-            for stage, status in self.statuses().items():
-                if stage not in stages_of(model):
-                    continue
-                if status.state in (StageState.EMPTY, StageState.WAITING, StageState.STALE):
-                    raise self._no_result(stage)
-                fault = self.fault(stage)
-                if fault is not None:
-                    raise fault
             session, results = self._session, self._results
-        refuse_copies(source_files(session))
-        return assemble(session, results, model=model)
+            inputs = recipe.inputs(session, self._hashes)
+            for key, found in inputs.items():
+                if not self._is_current(key, found):
+                    raise InputError(
+                        tr("The stage {stage} has no up-to-date result").format(stage=key),
+                        where=str(session.folder),
+                        advice=tr("Complete the stages that are not done yet"),
+                    )
+                if (fault := self.fault(key)) is not None:
+                    raise fault
+        refuse_copies(recipe.files(session))
+        return assemble(recipe, session, results, inputs)
 
-    def _status(self, stage: Stage, inputs: Mapping[Stage, StageInputs]) -> StageStatus:
-        nothing = QualityTable()
-        if stage in FOLDERS and not inputs[stage].images:
-            return StageStatus(stage, StageState.EMPTY, tr("No images captured yet"), nothing)
-        if stage not in self._outcomes:
-            missing = [need for need in NEEDS[stage] if need not in self._outcomes]
-            sentence = tr("Not computed yet")
-            if missing:
-                sentence = tr("Waiting for an earlier stage")
-            empty = stage not in FOLDERS and missing
-            state = StageState.EMPTY if empty else StageState.WAITING
-            return StageStatus(stage, state, sentence, nothing)
-        return self._unfinished(stage, inputs[stage]) or judged(stage, self._results)
+    def _inputs(self) -> dict[str, StageInputs]:
+        return self.recipe.inputs(self._session, self._hashes)
 
+    def _is_current(self, key: str, inputs: StageInputs) -> bool:
+        outcome = self._outcomes.get(key)
+        return outcome is not None and outcome.inputs == inputs
 
-def _closure(stage: Stage) -> set[Stage]:
-    found = {stage}
-    for need in NEEDS[stage]:
-        found |= _closure(need)
-    return found
+    def _status(self, stage: Stage[Any], inputs: StageInputs) -> StageStatus:
+        outcome = self._outcomes.get(stage.key)
+        if stage.folder and not inputs.images:
+            return StageStatus(StageState.EMPTY, tr("No images captured yet"))
+        if outcome is None:
+            needs = [need.key for need in stage.needs if need.used(self._session)]
+            waits = any(key not in self._outcomes for key in needs)
+            state = StageState.EMPTY if waits and not stage.folder else StageState.WAITING
+            text = tr("Waiting for an earlier stage") if waits else tr("Not computed yet")
+            return StageStatus(state, text)
+        if outcome.inputs != inputs:
+            changes = inputs.changes_since(outcome.inputs)
+            return StageStatus(
+                StageState.STALE, tr("Out of date: {changes}").format(changes=changes)
+            )
+        if outcome.fault is not None:
+            return StageStatus(StageState.FAIL, str(outcome.fault))
+        return judged_by(self._results[stage].quality)

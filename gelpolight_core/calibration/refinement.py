@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import CoarseView, gather_ball_pixels
+from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.board_reflectance import BesideBoard
 from gelpolight_core.calibration.depth_scale import (
     ball_height_error,
@@ -15,20 +17,32 @@ from gelpolight_core.calibration.depth_scale import (
     lateral_scale_sd,
 )
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
-from gelpolight_core.calibration.results import StageResults, need
+from gelpolight_core.calibration.open_sensor import (
+    BACKGROUND,
+    LENS,
+    LIGHTS,
+    RADIANCE,
+    RESPONSE,
+    TOP_POSE,
+)
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.saturated_background import beyond_saturation
+from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import reflects_light
+from gelpolight_core.reflectance.agreement import LEAST_PRESSES
 from gelpolight_core.reflectance.gathered_light import Slab
+from gelpolight_core.reflectance.membrane import MEMBRANES
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import (
-    Calibration,
     FullModel,
-    Provenance,
+    OpenSensor,
     ScaleSd,
     sensor_stack,
 )
 from gelpolight_core.session.session import Session
+from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS
+from gelpolight_core.translation import pattern, tr
 
 CHECKED_BALLS = 4
 GATHERED_SD = 0.005
@@ -37,71 +51,95 @@ near windows change, besides the reflectance."""
 LEAST_CONTACT_PX = 24.0
 """Median radius of the contacts from which on they show the balls' radii: within 0.5 % at 22 pixels
 and more, but 8 % off at 18."""
+MOST_HEIGHT_ERROR = 4.0
+"""Percent of height from which on a calibration fails: half of the error of the paper's method."""
+RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 3.0, MOST_HEIGHT_ERROR / HEIGHT_BY_RADIUS
+"""Of all ball radii; the larger one makes heights wrong by `MOST_HEIGHT_ERROR`."""
 
 
-def refine(session: Session, results: StageResults) -> StageResults:
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """The refinement, and what it makes of the earlier results.
+
+    Attributes
+    ----------
+    refined : JointResult
+        LEDs, membrane and balls that fit all presses together.
+    full : FullModel
+        With the background filled in where it is saturated, and the uncertainty of lengths.
+    factors : (rows, columns, 3) float32
+        Reflectance factors, filled in likewise.
+    """
+
+    refined: JointResult
+    full: FullModel
+    factors: NDArray[np.float32]
+
+    @property
+    def quality(self) -> QualityTable:
+        """Figures of the refinement and its model."""
+        return judge_joint(self.refined, self.full)
+
+
+def refine(session: Session, results: Results) -> Joint:
     """Refine LEDs and membrane, and estimate the uncertainty of lengths.
 
     Parameters
     ----------
     session : Session
         Its ball images are reconstructed to check the result.
-    results : StageResults
-        Results of all earlier stages.
+    results : Results
+        Of all earlier stages.
 
     Raises
     ------
     InputError
         If an earlier stage was not run.
     """
-    table, lights = need(results.table, "balls"), need(results.lights, "balls")
-    bare, factors = need(results.background, "balls"), need(results.factors, "balls")
-    crosstalk = need(results.crosstalk, "balls").matrix
-    background = unmix(bare, crosstalk)
-    noise = press_noise(results.presses)
+    top, lights, balls = results[TOP_POSE], results[LIGHTS], results[BALLS]
+    bare, factors = results[BACKGROUND].light, results[REFLECTANCE].factors
+    table, crosstalk = top.table, lights.crosstalk.matrix
+    background, leds_mm = unmix(bare, crosstalk), lights.leds.led_positions_mm
+    noise = press_noise(balls.presses)
     view = CoarseView.of(table, reflects_light(table.valid, background))
     pixels = [
         gather_ball_pixels(
             press, unmix(image, crosstalk), background, table, view, factors.usable, noise
         )
-        for press, image in zip(results.presses, results.images, strict=True)
+        for press, image in zip(balls.presses, balls.images, strict=True)
     ]
-    slab = Slab.of(sensor_stack(session.sensor, need(results.top_pose, "balls").plane))
-    leds = lights.led_positions_mm
-    radiance = need(results.radiance, "balls").radiance
-    board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds)
-    contacts_px = [press.indentation.contact_radius_px for press in results.presses]
+    slab = Slab.of(sensor_stack(session.sensor, top.pose.plane))
+    radiance = results[RADIANCE].radiance
+    board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds_mm)
+    contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
     joint = refine_jointly(
-        results.presses, pixels, leds, slab, background, board=board, check_radii=large
+        balls.presses, pixels, leds_mm, slab, background, board=board, check_radii=large
     )
     full = joint.full
     if full.kept == "mirror":
-        variance = np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)
+        variance = np.diagonal(lights.leds.led_covariance_mm2, axis1=1, axis2=2)
         full = replace(full, led_sd_mm=np.sqrt(variance))
     lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
-    full = replace(full, background=lit)
-    refined = replace(results, factors=replace(factors, factors=known), joint=joint, full=full)
-    scale = _scale_sd(session, refined, joint, full)
-    return replace(refined, full=replace(full, scale_sd=scale))
+    found = Joint(joint, replace(full, background=lit), known)
+    return replace(found, full=replace(found.full, scale_sd=_scale_sd(session, results, found)))
 
 
-def _scale_sd(
-    session: Session, results: StageResults, joint: JointResult, full: FullModel
-) -> ScaleSd:
+def _scale_sd(session: Session, results: Results, found: Joint) -> ScaleSd:
     """Estimate the uncertainty of lengths of the full model."""
-    calibration = bare_calibration(session, replace(results, full=full))
-    lens, pose = need(results.lens, "balls"), need(results.top_pose, "balls")
+    full, joint = found.full, found.refined
+    calibration = sensor_data(session, results, found)
+    lens, pose = results[LENS], results[TOP_POSE].pose
     covariance = joint.covariance.copy()
     if full.kept == "mirror":
         for k, own in enumerate(calibration.led_covariance_mm2):
             covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
-    files = [ball.file for ball in results.balls if ball.press is not None]
+    files = [ball.file for ball in results[BALLS].seen if ball.press is not None]
     # Evenly over the session, so that a single odd press does not decide.
     some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
     unexplained = ball_height_error(
         calibration,
-        [session.image(session.folder / "balls" / files[i]).rgb for i in some],
+        [session.image(session.folder / BALLS.folder / files[i]).rgb for i in some],
         [joint.balls[i] for i in some],
     )
     lateral = lateral_scale_sd(
@@ -113,46 +151,178 @@ def _scale_sd(
     return ScaleSd(together, lateral, unexplained)
 
 
-def bare_calibration(session: Session, results: StageResults) -> Calibration:
-    """Return what a reconstruction needs of the results, without figures and provenance.
+def press_noise(presses: Sequence[BallPress]) -> NDArray[np.float64]:
+    """Return the noise of press minus background, per channel, over all presses."""
+    return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
+
+
+def sensor_data(session: Session, results: Results, joint: Joint | None = None) -> OpenSensor:
+    """Return what a reconstruction needs of the results.
 
     Parameters
     ----------
     session : Session
         With the stated sensor data.
-    results : StageResults
-        Results of all stages; without the joint refinement the calibration is for the paper's
-        model.
+    results : Results
+        Results of the stages up to the reflectance.
+    joint : Joint, optional
+        Of the full model; without it the calibration is for the paper's model.
 
     Raises
     ------
     InputError
         If a stage was not run.
     """
-    where = str(session.folder)
-    lens, pose = need(results.lens, where), need(results.top_pose, where)
-    lights, radiance = need(results.lights, where), need(results.radiance, where)
-    return Calibration(
+    lens, pose, lights = results[LENS], results[TOP_POSE].pose, results[LIGHTS]
+    made, bad = results[REFLECTANCE], results[BACKGROUND].bad
+    return OpenSensor(
         sensor=session.sensor,
-        model="paper" if results.full is None else "full",
         camera=lens.camera,
         plane=pose.plane,
-        led_positions_mm=lights.led_positions_mm,
-        led_covariance_mm2=lights.led_covariance_mm2,
-        crosstalk=need(results.crosstalk, where).matrix,
-        radiance=radiance.radiance,
-        factors=need(results.factors, where).factors,
-        reflectance=need(results.reflectance, where).table,
-        noise=press_noise(results.presses),
-        quality={},
-        provenance=Provenance("", "", "", "", {}),
-        full=results.full,
-        response=need(results.response, where).response,
-        bad=results.bad if results.bad is not None and results.bad.pixels.size else None,
+        led_positions_mm=lights.leds.led_positions_mm,
+        led_covariance_mm2=lights.leds.led_covariance_mm2,
+        crosstalk=lights.crosstalk.matrix,
+        radiance=results[RADIANCE].radiance,
+        factors=made.factors.factors if joint is None else joint.factors,
+        reflectance=made.table.table,
+        noise=press_noise(results[BALLS].presses),
+        full=None if joint is None else joint.full,
+        response=results[RESPONSE].response,
+        bad=bad if bad.pixels.size else None,
         lens_blur_px=pose.blur_px,
     )
 
 
-def press_noise(presses: tuple[BallPress, ...]) -> NDArray[np.float64]:
-    """Return the noise of press minus background, per channel, over all presses."""
-    return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
+def judge_joint(joint: JointResult, full: FullModel) -> QualityTable:
+    """Judge the joint refinement and its model."""
+    return QualityTable(
+        (
+            judge(
+                "joint_misfit_percent",
+                tr("Unexplained signal of ball presses and drapes"),
+                100.0 * full.misfit,
+                "%",
+                warn=4.0,
+                fail=12.0,
+                remedy=tr("Check the ball radii, then repeat the worst presses"),
+            ),
+            judge(
+                "joint_led_sd_mm",
+                tr("LED position after refinement, standard deviation"),
+                float(np.linalg.norm(full.led_sd_mm, axis=1).max()),
+                "mm",
+                warn=0.2,
+                fail=1.0,
+                remedy=tr("Press more balls at more positions"),
+            ),
+            *judge_presses(joint),
+            *judge_radii(joint),
+            *_scale_figures(full),
+            *_membrane_figures(full),
+            judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
+            judge(
+                "interreflection",
+                tr("Interreflection of the membrane"),
+                full.membrane.interreflection,
+                warn=1.2,
+            ),
+            judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
+        )
+    )
+
+
+def judge_presses(joint: JointResult) -> tuple[Finding, ...]:
+    """Judge the ball press with the largest residual, compared with the others.
+
+    Parameters
+    ----------
+    joint : JointResult
+        Fewer than four presses say nothing of each other.
+    """
+    # A press without any usable pixel has no misfit.
+    misfits = joint.ball_misfits
+    if np.isfinite(misfits).sum() < LEAST_PRESSES:
+        return ()
+    worst = joint.ball_names[int(np.nanargmax(misfits))]
+    return (
+        judge(
+            "worst_press_ratio",
+            tr("Unexplained signal of the worst press over the usual ({name})").format(name=worst),
+            float(np.nanmax(misfits) / np.nanmedian(misfits)),
+            warn=1.5,
+            fail=2.0,
+            remedy=tr(
+                "Check the stated diameter of {name}; clean the membrane and repeat the press"
+            ).format(name=worst),
+        ),
+    )
+
+
+def judge_radii(joint: JointResult) -> tuple[Finding, ...]:
+    """Judge whether all stated ball radii have a common error, or contradict the other lengths."""
+    factor = joint.radius_factor
+    if factor is None:
+        return ()
+    off = 100.0 * (max(factor, 1.0 / factor) - 1.0)
+    seen = tr("In the images all balls look {p:.0f} % smaller than stated")
+    if factor > 1.0:
+        seen = tr("In the images all balls look {p:.0f} % larger than stated")
+    advice = tr(
+        "Measure the ball diameters and correct them. If they are right, measure the squares of"
+        " the board on the top surface, and check the layers"
+    )
+    return (
+        judge(
+            "common_radius_percent",
+            tr("All stated ball radii against the images"),
+            off,
+            "%",
+            warn=RADIUS_WARN_PERCENT,
+            fail=RADIUS_FAIL_PERCENT,
+            remedy=pattern("{seen}. {advice}", seen=seen.format(p=off), advice=advice),
+        ),
+    )
+
+
+def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
+    scale = full.scale_sd
+    if scale is None:
+        return ()
+    lengths = tr("Check the ball radii, the LED height and the refractive index")
+    stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
+    return (
+        judge(
+            "ball_height_error_percent",
+            tr("Height error of reconstructed ball presses"),
+            100.0 * scale.balls,
+            "%",
+            warn=2.0,
+            fail=MOST_HEIGHT_ERROR,
+            remedy=lengths,
+        ),
+        judge(
+            "depth_sd_percent",
+            tr("Height uncertainty from the calibration"),
+            100.0 * scale.depth,
+            "%",
+            warn=2.0,
+            fail=MOST_HEIGHT_ERROR,
+            # More balls reduce scatter, but not an error common to all heights.
+            remedy=lengths if stated_wrong else tr("Press more balls at more positions"),
+        ),
+    )
+
+
+def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
+    """Return the selected membrane and the ratio of errors; empty if no press was held out."""
+    two_lobe, one_dimensional = full.membrane_held_out
+    if two_lobe <= 0.0:
+        return ()
+    label = {
+        MEMBRANES[0]: tr("Held-out error ratio, one-dimensional over two-lobe (two-lobe kept)"),
+        MEMBRANES[1]: tr(
+            "Held-out error ratio, one-dimensional over two-lobe (one-dimensional kept)"
+        ),
+    }
+    ratio = one_dimensional / two_lobe
+    return (judge("membrane_held_out_ratio", label[full.membrane_kept], ratio),)

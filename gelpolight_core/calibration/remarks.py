@@ -44,6 +44,4 @@ def write_remark(path: Path, key: str, text: str) -> None:
     calibration = read_calibration(path)
     remark: dict[str, Any] = {key: text.strip()}
     stated = replace(calibration.provenance, **remark)
-    changed = replace(calibration, provenance=stated)
-    vars(changed)["identity"] = calibration.identity
-    write_calibration(changed, path)
+    write_calibration(replace(calibration, provenance=stated), path)

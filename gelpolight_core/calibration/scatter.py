@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.open_sensor import LIGHTS, RADIANCE
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.reflectance.stage import ball_scatter
 from gelpolight_core.session.images import read_image
-from gelpolight_core.session.session import Session
 
 Array = NDArray[np.float64]
 
@@ -38,28 +39,27 @@ class ReflectanceScatter:
     names: tuple[str, ...]
 
 
-def gather_scatter(run: CalibrationRun, session: Session) -> ReflectanceScatter:
+def gather_scatter(run: Run) -> ReflectanceScatter:
     """Gather the scatter of a run's ball presses, with the factors fed back (section V-E).
 
     Parameters
     ----------
-    run : CalibrationRun
-        Made from `session`.
-    session : Session
-        The session with the ball images.
+    run : Run
+        Of an open sensor.
 
     Raises
     ------
     InputError
         If a ball image can no longer be read.
     """
-    table, presses = run.calibration.table, run.reflectance.presses
-    leds, factors = run.lights.led_positions_mm, run.factors.factors
+    made, radiance = run.results[REFLECTANCE], run.results[RADIANCE]
+    table, presses, factors = run.calibration.table, made.table.presses, made.factors.factors
+    leds = run.results[LIGHTS].leds.led_positions_mm
     found = []
     for press in presses:
-        path = session.folder / press.name
+        path = run.session.folder / press.name
         image = table.apply(read_image(path, response=run.calibration.response).rgb)
-        found.append(ball_scatter([press], [image], table, leds, run.radiance, factors))
+        found.append(ball_scatter([press], [image], table, leds, radiance, factors))
     channels = list(zip(*found, strict=True))
     numbers = np.arange(len(presses))
     return ReflectanceScatter(

@@ -33,7 +33,7 @@ from gelpolight_core.health.judging import (
 from gelpolight_core.health.movement import FOLLOWED_PX, movement_px
 from gelpolight_core.health.samples import PARAMETERS, Samples, compare_samples, samples_of
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import OpenSensor
 
 Map = NDArray[np.float32]
 LEAST_UNTOUCHED = 0.12
@@ -59,11 +59,11 @@ class HealthCheck:
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : OpenSensor
         The sensor's.
     """
 
-    def __init__(self, calibration: Calibration) -> None:
+    def __init__(self, calibration: OpenSensor) -> None:
         self.calibration = calibration
         self.samples: Samples = samples_of(calibration)
         cells, runs = self.samples.count.size, self.samples.run_cell.size

@@ -15,10 +15,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.health.expected import raw_background
 from gelpolight_core.masks import SATURATED, lit
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import OpenSensor
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -95,9 +94,9 @@ class Samples:
     blur_strength: Array
 
 
-def samples_of(calibration: Calibration) -> Samples:
+def samples_of(calibration: OpenSensor) -> Samples:
     """Choose the samples of a calibrated sensor."""
-    base, table = raw_background(calibration), calibration.table
+    base, table = calibration.background, calibration.table
     inside = table.valid & lit(base) & (base < SATURATED).all(axis=2)
     reach = int(np.ceil(3.0 * SMOOTH_NODES)) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))

@@ -161,7 +161,8 @@ def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
     reach = min(change.shape) // 2  # of the rays from the centre, two for each pixel of length
     angle = np.pi * np.arange(2 * reach) / reach
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    found = Circle(*(float(c) for c in strong.mean(axis=0)[::-1]), 0.0)
+    y, x = strong.mean(axis=0).tolist()
+    found = Circle(x, y, 0.0)
     for _ in range(8):
         rays = cv2.warpPolar(
             change, (reach, 2 * reach), (found.x, found.y), reach, cv2.WARP_POLAR_LINEAR

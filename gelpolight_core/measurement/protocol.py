@@ -25,7 +25,7 @@ from gelpolight_core.io.reading import brief, parse_toml, read_file
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.press import LONGEST_MM, Press
 from gelpolight_core.measurement.result import Truth
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 
@@ -139,7 +139,7 @@ def room_mm(truth: Truth, reach_mm: float) -> float:
     return reach_mm - half - ROOM_MM
 
 
-def protocol_reach_mm(calibration: AnyCalibration) -> float:
+def protocol_reach_mm(calibration: Calibration) -> float:
     """Return the radius about the origin within which the whole membrane is visible."""
     table = calibration.table
     grid = table.grid

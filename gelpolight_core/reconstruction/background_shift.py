@@ -14,15 +14,10 @@ from scipy import ndimage
 
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError
-from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.health.expected import even_membrane, raw_background
 from gelpolight_core.health.texture_shift import texture_shift_px
-from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.masks import LEAST_LIGHT, lit, saturated
-from gelpolight_core.radiance import whiteboard
+from gelpolight_core.masks import LEAST_LIGHT, lit
 from gelpolight_core.reconstruction.height_map import COARSE
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
 from gelpolight_core.translation import tr
@@ -70,7 +65,7 @@ class BackgroundShift:
     quality: QualityTable
 
 
-def background_shift(frame: NDArray[Any], calibration: AnyCalibration) -> BackgroundShift:
+def background_shift(frame: NDArray[Any], calibration: Calibration) -> BackgroundShift:
     """Compare an image of the untouched sensor with the calibration's background.
 
     Parameters
@@ -86,10 +81,7 @@ def background_shift(frame: NDArray[Any], calibration: AnyCalibration) -> Backgr
         If the frame is not of the calibration's size, or not lit.
     """
     seen = _on_grid([frame], calibration)
-    if isinstance(calibration, InPlaceCalibration):
-        base = calibration.in_place.background
-    else:
-        base = raw_background(calibration)
+    base = calibration.data.background
     usable = np.asarray(lit(base) & np.isfinite(seen).all(axis=2))
     ratio = np.where(usable[..., None], seen / np.maximum(base, LEAST_LIGHT), 1.0)
     if not (usable.any() and float(np.median(ratio[usable])) > 0.05):
@@ -113,8 +105,8 @@ def background_shift(frame: NDArray[Any], calibration: AnyCalibration) -> Backgr
 
 
 def zeroed(
-    calibration: AnyCalibration, frames: Sequence[NDArray[Any]], *, operator: str, made: str
-) -> AnyCalibration:
+    calibration: Calibration, frames: Sequence[NDArray[Any]], *, operator: str, made: str
+) -> Calibration:
     """Return the calibration with its background replaced by the present one (tare).
 
     The full model compares a press with the background, which is replaced. The paper's model uses
@@ -150,30 +142,11 @@ def zeroed(
     present = _on_grid(frames, calibration)
     edit = HandEdit("background", CHANNEL_KEYS, made, operator)
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
-    if isinstance(calibration, InPlaceCalibration):
-        model = replace(calibration.in_place, background=present)
-        return replace(calibration, in_place=model, provenance=provenance)
-    factors = _factors(present, calibration)
-    full = calibration.full
-    if full is not None:
-        full = replace(full, background=unmix(present, calibration.crosstalk))
-    return replace(calibration, factors=factors, full=full, provenance=provenance)
+    data = calibration.data.with_background(present)
+    return replace(calibration, data=data, provenance=provenance)
 
 
-def _factors(present: Map, calibration: Calibration) -> Map:
-    """Return the reflectance factors (Eq. 9) of a background; 0 where they are unknown."""
-    theory = even_membrane(calibration)
-    factors = np.zeros(present.shape, np.float32)
-    np.divide(present, theory, out=factors, where=theory > 0.0, casting="same_kind")
-    known = (factors > LEAST_FACTOR).all(axis=2) & np.isfinite(factors).all(axis=2)
-    # The same limit as for the white board: dim areas are left out.
-    light = calibration.radiance * flat_cosines(calibration.table, calibration.led_positions_mm)
-    known &= ~saturated(present).any(axis=2) & (light > whiteboard.LEAST_LIGHT).all(axis=2)
-    factors[~known] = 0.0
-    return factors
-
-
-def _on_grid(frames: Sequence[NDArray[Any]], calibration: AnyCalibration) -> Map:
+def _on_grid(frames: Sequence[NDArray[Any]], calibration: Calibration) -> Map:
     """Return the average of frames in linear light on the membrane's grid."""
     camera, response = calibration.camera, calibration.response
     total = np.zeros((camera.height, camera.width, 3), np.float64)
@@ -188,9 +161,7 @@ def _on_grid(frames: Sequence[NDArray[Any]], calibration: AnyCalibration) -> Map
             )
         total += as_linear(linearised(frame, response))
     mean = (total / len(frames)).astype(np.float32)
-    if isinstance(calibration, InPlaceCalibration):
-        return calibration.in_place.grid.reduce(mean)
-    return calibration.table.apply(mean)
+    return calibration.data.on_grid(mean)
 
 
 def _coarse(ratio: Map, usable: Mask) -> tuple[Map, Mask]:

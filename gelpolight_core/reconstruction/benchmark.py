@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import Trace
 
@@ -113,12 +112,9 @@ def benchmark_frame(
 
 def _bytes_of(reconstructor: Reconstructor, frame: NDArray[Any]) -> int:
     """Return the bytes of a frame, of the maps that it needs, and of its depth."""
-    calibration = reconstructor.calibration
-    table = calibration.table
-    if isinstance(calibration, InPlaceCalibration):
-        known = calibration.in_place.background.nbytes
-    else:
-        known = table.u_px.nbytes + table.v_px.nbytes + calibration.radiance.nbytes
+    data = reconstructor.calibration.data
+    table = data.table
+    known = table.u_px.nbytes + table.v_px.nbytes + data.background.nbytes
     return frame.nbytes + known + table.u_px.nbytes
 
 

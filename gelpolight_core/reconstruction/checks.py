@@ -15,7 +15,7 @@ from gelpolight_core.lights.positions import (
 )
 from gelpolight_core.masks import usable
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -152,7 +152,7 @@ def paper_notes(
     return tuple(notes)
 
 
-def condition_notes(calibration: Calibration, leds_mm: NDArray[np.float64]) -> tuple[Finding, ...]:
+def condition_notes(calibration: OpenSensor, leds_mm: NDArray[np.float64]) -> tuple[Finding, ...]:
     """Return the note on light directions that are nearly coplanar somewhere, if they are."""
     table = calibration.table
     points = table.grid.points_mm()[table.valid]
@@ -226,7 +226,7 @@ def visible_depth_notes(visible_mm: float) -> tuple[Finding, ...]:
     return (_note("hidden_depth", text.format(um=1e3 * visible_mm)),)
 
 
-def refuse_coplanar_lights(calibration: Calibration, leds_mm: NDArray[np.float64]) -> None:
+def refuse_coplanar_lights(calibration: OpenSensor, leds_mm: NDArray[np.float64]) -> None:
     """Refuse lights whose directions at the middle of the sensor lie nearly in one plane.
 
     Raises
@@ -242,17 +242,17 @@ def refuse_coplanar_lights(calibration: Calibration, leds_mm: NDArray[np.float64
             tr(
                 "The three light directions lie nearly in one plane (condition number {c:.0f})"
             ).format(c=condition),
-            where=calibration.identity,
+            where=calibration.serial,
             advice=tr("Place the LEDs wider apart around the sensor's axis, and calibrate again"),
         )
 
 
-def refuse_dark_membrane(calibration: Calibration, light: Map) -> None:
+def refuse_dark_membrane(calibration: OpenSensor, light: Map) -> None:
     """Refuse a calibration with light on almost no part of the membrane.
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : OpenSensor
         The sensor's.
     light : (rows, columns, 3)
         Of the membrane, as the model uses it.
@@ -271,7 +271,7 @@ def refuse_dark_membrane(calibration: Calibration, light: Map) -> None:
             tr("only {share:.1f} % of the membrane is lit by all three LEDs").format(
                 share=100.0 * share
             ),
-            where=calibration.identity,
+            where=calibration.serial,
             advice=tr("Place the LEDs lower, or calibrate again with more light"),
         )
 
@@ -294,7 +294,7 @@ class NearBoundary(NamedTuple):
         return bool(deepest > max(HELD_DOWN_MM, HELD_DOWN_SHARE * float(depth_mm.max())))
 
 
-def nodes_near_boundary(calibration: Calibration) -> NearBoundary:
+def nodes_near_boundary(calibration: OpenSensor) -> NearBoundary:
     """Return the nodes next to the boundary of a calibration's field."""
     table = calibration.table
     grid = table.grid

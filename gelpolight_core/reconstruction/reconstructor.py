@@ -18,13 +18,13 @@ from gelpolight_core.health.finding import KEYS, Health
 from gelpolight_core.reconstruction.checks import accepted
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.reconstruction.in_place.solver import InPlaceSolver
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.paper.depth import PaperSolver
 from gelpolight_core.reconstruction.solver import Solver, Wanted
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
@@ -38,7 +38,7 @@ class Reconstructor:
 
     Parameters
     ----------
-    calibration : Calibration or InPlaceCalibration
+    calibration : Calibration
         Of the sensor that the images come from.
     model : str, optional
         ``paper``, ``full`` or ``in-place``; by default the one that the calibration was made for.
@@ -71,7 +71,7 @@ class Reconstructor:
 
     def __init__(
         self,
-        calibration: AnyCalibration,
+        calibration: Calibration,
         *,
         model: str | None = None,
         terms: Terms = ALL_TERMS,
@@ -96,12 +96,12 @@ class Reconstructor:
                 where=calibration.identity,
                 advice=tr("Leave --model out, or use a calibration for that model"),
             )
-        self._kind.refuse_unfit(calibration)
+        self._kind.refuse_unfit(calibration.data)
 
     @cached_property
     def solver(self) -> Solver:
         """The solver of the model."""
-        return self._kind(self.calibration, workers=self.workers)
+        return self._kind(self.calibration.data, workers=self.workers)
 
     @property
     def visible_depth_mm(self) -> float | None:

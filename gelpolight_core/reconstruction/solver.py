@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding
 from gelpolight_core.health.check import HealthCheck
-from gelpolight_core.health.expected import raw_background
 from gelpolight_core.health.finding import Health, LightGain
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reconstruction.checks import condition_notes
@@ -23,7 +22,7 @@ from gelpolight_core.reconstruction.near_light.contact import ContactFinder, con
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
-from gelpolight_core.sensor_calibration import MODELS, Calibration
+from gelpolight_core.sensor_calibration import MODELS, OpenSensor
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -184,7 +183,7 @@ class OpenSolver(ABC):
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : OpenSensor
         The sensor's.
     leds_mm : (3, 3)
         LED positions that the model uses.
@@ -198,7 +197,7 @@ class OpenSolver(ABC):
 
     def __init__(
         self,
-        calibration: Calibration,
+        calibration: OpenSensor,
         leds_mm: NDArray[np.float64],
         known: NDArray[np.bool_],
         workers: int,
@@ -215,7 +214,7 @@ class OpenSolver(ABC):
 
     @cached_property
     def _background(self) -> Map:
-        return raw_background(self.calibration)
+        return self.calibration.background
 
     def finder(self, linear: bool) -> ContactFinder:
         """Return what looks for contacts in raw images, or in those of linear light."""

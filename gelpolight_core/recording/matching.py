@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import require_size
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.recording.reader import Recording
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 
-def require_match(recording: Recording, calibration: AnyCalibration) -> None:
+def require_match(recording: Recording, calibration: Calibration) -> None:
     """Refuse a calibration of another sensor, or for another image size.
 
     A recording without a sensor name matches any calibration; which calibration of a sensor was in
@@ -19,7 +19,7 @@ def require_match(recording: Recording, calibration: AnyCalibration) -> None:
     ----------
     recording : Recording
         An open one.
-    calibration : Calibration or InPlaceCalibration
+    calibration : Calibration
         The calibration for its reconstruction.
 
     Raises
@@ -27,7 +27,7 @@ def require_match(recording: Recording, calibration: AnyCalibration) -> None:
     InputError
         If they do not belong together.
     """
-    recorded, calibrated = recording.header.serial, calibration.sensor.serial
+    recorded, calibrated = recording.header.serial, calibration.serial
     if recorded and recorded != calibrated:
         raise InputError(
             tr("The recording is of sensor {a}, but the calibration is of sensor {b}").format(

@@ -48,6 +48,25 @@ class Membrane:
     interreflection: float = 0.0
     diffuse: tuple[tuple[float, ...], ...] = ()
 
+    def check(self) -> None:
+        """Refuse values that no membrane has.
+
+        Raises
+        ------
+        ValueError
+            With the first of them.
+        """
+        lobes = self.exponent > 0.0 and 0.0 <= self.gloss < 1.0 and 0.0 < self.roughness <= 1.0
+        if not lobes or self.interreflection < 0.0:
+            raise ValueError("the membrane has impossible values")
+        if self.diffuse:
+            if [len(curve) for curve in self.diffuse] != [CURVE_NODES] * 3:
+                raise ValueError("the membrane curves have another length")
+            if self.curves.min() < 0.0 or (np.diff(self.curves, axis=1) < 0.0).any():
+                raise ValueError("the membrane curves are not monotone")
+            if not (self.curves[:, -1] > 0.0).all():
+                raise ValueError("the membrane curves are dark")
+
     @property
     def curves(self) -> Array:
         """The diffuse curves, (3, `CURVE_NODES`); (3, 0) if the power of the cosine is used."""

@@ -35,6 +35,22 @@ class ReflectanceTable:
     values: tuple[Array, Array, Array]
     coverage: Array
 
+    def check(self) -> None:
+        """Refuse columns that do not rise or do not fit together.
+
+        Raises
+        ------
+        ValueError
+            With the first fault.
+        """
+        for cosines, values in zip(self.cosines, self.values, strict=True):
+            if cosines.ndim != 1 or cosines.size < 2 or cosines.shape != values.shape:
+                raise ValueError("the columns of the reflectance table differ in length")
+            if not ((np.diff(cosines) > 0.0).all() and (np.diff(values) > 0.0).all()):
+                raise ValueError("the reflectance table is not monotone")
+        if self.coverage.shape != (3, 2):
+            raise ValueError("the coverage of the reflectance table is impossible")
+
     def response(self, channel: int, cosine: Array) -> Array:
         """Return G(cos theta) of one channel (Eq. 6); clipped to cosines 0..1.
 

@@ -21,7 +21,7 @@ from gelpolight_core.optics.lens_views import LensView
 from gelpolight_core.optics.pose import TopPoseResult, TopPoseView
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
-from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.report.document import MARKS, Drawing
@@ -39,7 +39,7 @@ from gelpolight_core.report.drawing import (
     three_maps,
     tiles,
 )
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.translation import tr
 
 LEAST_CROP_PX = 6
@@ -202,16 +202,14 @@ def _paint_spot(axes: Axes, image: Map, spot: Spot, channel: int) -> None:
 
 
 @drawing(68.0, 110.0)
-def led_plan(
-    figure: Figure, calibration: Calibration, bright_points_mm: Array | None = None
-) -> str:
+def led_plan(figure: Figure, calibration: OpenSensor, bright_points_mm: Array | None = None) -> str:
     """Show the LEDs from above, with their uncertainty.
 
     Parameters
     ----------
     figure : Figure
         Empty.
-    calibration : Calibration
+    calibration : OpenSensor
         LEDs, covariance and the working area.
     bright_points_mm : (3, 2) or (3, 3), optional
         Points on the mirror that reflected each LED, if known.
@@ -249,14 +247,14 @@ def led_plan(
 
 
 @drawing(58.0)
-def radiance(figure: Figure, calibration: Calibration, result: RadianceResult | None = None) -> str:
+def radiance(figure: Figure, calibration: OpenSensor, result: RadianceResult | None = None) -> str:
     """Show the light intensity of each LED and, for a run, the filled areas.
 
     Parameters
     ----------
     figure : Figure
         Empty.
-    calibration : Calibration
+    calibration : OpenSensor
         With |L|.
     result : RadianceResult, optional
         The stage's own result.
@@ -275,7 +273,7 @@ def radiance(figure: Figure, calibration: Calibration, result: RadianceResult | 
 
 
 @drawing(58.0)
-def factors(figure: Figure, calibration: Calibration) -> str:
+def factors(figure: Figure, calibration: OpenSensor) -> str:
     """Show the reflectance factors of the bare membrane."""
     three_maps(figure, calibration.factors, calibration.table.grid, tr("factor"))
     return tr(
@@ -384,7 +382,7 @@ def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
 
 
 @drawing(90.0, 120.0)
-def contacts(figure: Figure, c: InPlaceCalibration) -> str:
+def contacts(figure: Figure, c: ClosedSensor) -> str:
     """Show the untouched membrane of a closed sensor with the contact of each press."""
     grid = c.in_place.grid
     axes = figure.subplots()
@@ -397,7 +395,7 @@ def contacts(figure: Figure, c: InPlaceCalibration) -> str:
 
 
 @drawing(52.0, 110.0)
-def slope_errors(figure: Figure, c: InPlaceCalibration) -> str:
+def slope_errors(figure: Figure, c: ClosedSensor) -> str:
     """Show the error of the slope of a closed sensor by the slope."""
     angles, sd = np.arctan(c.in_place.errors.slopes), c.in_place.errors.slope_sd
     # The error of an angle is that of its slope times cos^2.

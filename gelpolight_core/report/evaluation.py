@@ -22,7 +22,6 @@ from gelpolight_core.measurement.evaluation_report import (
     write_evaluation,
 )
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.report.document import (
     Facts,
     Listing,
@@ -35,6 +34,7 @@ from gelpolight_core.report.drawing import drawing
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.report.file import write_report
 from gelpolight_core.report.labels import label
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 EM_DASH = "\N{EM DASH}"
@@ -253,7 +253,7 @@ def write_evaluation_files(
     evaluation: Evaluation,
     folder: Path,
     *,
-    calibration: AnyCalibration | None = None,
+    calibration: Calibration | None = None,
     limits_percent: tuple[float, float] = PAPER_LIMITS,
 ) -> tuple[Path, ...]:
     """Write ``evaluation.txt``, ``.csv``, ``.json``, ``.png``, ``.pdf`` and a gauge CSV.

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
 import numpy as np
 
-from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
+from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.report.document import Facts
 from gelpolight_core.report.labels import label
-from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.sensor_calibration import MODELS, Calibration, FullModel, OpenSensor
 from gelpolight_core.session.camera_controls import settings_facts
-from gelpolight_core.session.session import SensorData
 from gelpolight_core.translation import tr
 
 
-def head_facts(c: AnyCalibration) -> Facts:
+def head_facts(c: Calibration) -> Facts:
     """Return sensor and provenance of a calibration."""
     p = c.provenance
     models = {"paper": tr("paper"), "full": tr("full"), "in-place": tr("in place, closed sensor")}
-    of_sensor = _closed_facts(c) if isinstance(c, InPlaceCalibration) else _sensor_facts(c.sensor)
     edits = tuple(
         (
             tr("Edited by hand"),
@@ -28,21 +31,22 @@ def head_facts(c: AnyCalibration) -> Facts:
     )
     accepted = ((tr("Used although it failed"), p.accepted),) if p.accepted else ()
     return (
-        (tr("Sensor"), c.sensor.serial),
+        (tr("Sensor"), c.serial),
         (tr("Calibration"), c.identity),
         (tr("Created"), f"{p.created.replace('T', ' ')}, {p.operator}".rstrip(", ")),
         (tr("Model"), models.get(c.model, c.model)),
         (tr("Session"), tr("{name} ({n} files)").format(name=p.session, n=len(p.sources))),
         (tr("Program"), f"GelPoLight Studio {p.program_version}"),
         (tr("Elastomer"), p.elastomer or tr("not stated")),
-        *of_sensor,
+        *SENSOR_FACTS[c.model](c.data),
         *edits,
         *accepted,
         *settings_facts(p.camera_settings),
     )
 
 
-def _sensor_facts(s: SensorData) -> Facts:
+def _open_facts(c: OpenSensor) -> Facts:
+    s = c.sensor
     elastomer = f"{s.elastomer_thickness_mm:g} mm, n {s.elastomer_refractive_index:g}"
     window = f"{s.window_thickness_mm:g} mm, n {s.window_refractive_index:g}"
     return (
@@ -53,7 +57,7 @@ def _sensor_facts(s: SensorData) -> Facts:
     )
 
 
-def _closed_facts(c: InPlaceCalibration) -> Facts:
+def _closed_facts(c: ClosedSensor) -> Facts:
     """Return the known and the unknown quantities of a closed sensor."""
     grid, errors = c.in_place.grid, c.in_place.errors
     error = tr("{share:.2g} % of it, and {floor:.2g} mm").format(
@@ -93,8 +97,12 @@ def stage_intro(key: str) -> str:
     return intros.get(key, "")
 
 
-def stage_facts(c: Calibration) -> dict[str, Facts]:
+def stage_facts(calibration: Calibration) -> dict[str, Facts]:
     """Return the results of each stage as labels and values."""
+    return STAGE_FACTS.get(calibration.model, lambda _data: {})(calibration.data)
+
+
+def _open_stage_facts(c: OpenSensor) -> dict[str, Facts]:
     camera, plane, grid = c.camera, c.plane, c.table.grid
     tilt_deg = np.degrees(np.arccos(min(plane.normal_camera[2], 1.0)))
     nodes = tr("{columns} \N{MULTIPLICATION SIGN} {rows} nodes, {pitch:.2f} \N{MICRO SIGN}m")
@@ -143,3 +151,11 @@ def _joint_facts(full: FullModel) -> Facts:
         (tr("Loss on held-out presses"), loss.format(before=before, after=after)),
     )
     return facts if compared else facts[:-1]
+
+
+SENSOR_FACTS: Mapping[str, Callable[[Any], Facts]] = MappingProxyType(
+    {**dict.fromkeys(MODELS, _open_facts), IN_PLACE: _closed_facts}
+)
+STAGE_FACTS: Mapping[str, Callable[[Any], dict[str, Facts]]] = MappingProxyType(
+    dict.fromkeys(MODELS, _open_stage_facts)
+)

@@ -14,7 +14,7 @@ from gelpolight_core.finding import verdict_word
 from gelpolight_core.in_place.calibrate import InPlaceResult
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.lens import LensResult
-from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.report.document import MARKS, Listing, listing
 from gelpolight_core.report.drawing import Array
@@ -134,7 +134,7 @@ def refined_presses(presses: Sequence[BallPress], joint: JointResult) -> Listing
     )
 
 
-def closed_presses(c: InPlaceCalibration, result: InPlaceResult) -> Listing:
+def closed_presses(c: ClosedSensor, result: InPlaceResult) -> Listing:
     """Return every press of a closed sensor, compared with the other presses."""
 
     def percent(ratio: float) -> str:

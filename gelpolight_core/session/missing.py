@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.decisions import read_decisions
 from gelpolight_core.session.images import SUFFIXES
 from gelpolight_core.translation import tr
 
@@ -36,11 +35,12 @@ def refuse_undescribed(content: Mapping[str, Any], folder: Path) -> None:
         parser, which names the key.
     """
     absent = [name for name in TABLES if name not in content]
-    if absent and missing_stages(folder):
-        raise _refusal(folder, missing_stages(folder), absent)
+    missing = missing_stages(folder)
+    if absent and missing:
+        raise _refusal(folder, missing, absent)
 
 
-def refuse_missing_stages(folder: Path, excluded: Collection[str] = ()) -> None:
+def refuse_missing_stages(folder: Path, missing: Collection[str]) -> None:
     """Refuse a session that lacks images of any stage, with all stages that are missing.
 
     Raises
@@ -48,20 +48,15 @@ def refuse_missing_stages(folder: Path, excluded: Collection[str] = ()) -> None:
     InputError
         If there are any.
     """
-    missing = missing_stages(folder, excluded)
     if missing:
         raise _refusal(folder, missing, ())
 
 
-def missing_stages(folder: Path, excluded: Collection[str] | None = None) -> tuple[str, ...]:
-    """Return the stages of an open sensor's calibration without an image that is to be used."""
-    left_out = read_decisions(folder).excluded if excluded is None else excluded
+def missing_stages(folder: Path) -> tuple[str, ...]:
+    """Return the stages of an open sensor's calibration without an image."""
 
     def has_images(stage: str) -> bool:
-        return any(
-            path.suffix.lower() in SUFFIXES and f"{stage}/{path.name}" not in left_out
-            for path in (folder / stage).glob("[!.]*")
-        )
+        return any(p.suffix.lower() in SUFFIXES for p in (folder / stage).glob("[!.]*"))
 
     return tuple(stage for stage in STAGES if not has_images(stage))
 

@@ -40,7 +40,6 @@ SENSOR_RANGES = {
 }
 _SENSOR_DEFAULTS = {"window_thickness_mm": 0.0, "window_refractive_index": 1.49}
 IN_PLACE = "in_place"
-ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
 SCALE_RANGE = (1e-4, 10.0)
 PUNCH_RANGE = (0.1, 100.0)
 

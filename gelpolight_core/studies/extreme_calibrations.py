@@ -39,12 +39,14 @@ def calibration_cases() -> list[Case]:
         "leds_above_membrane": _leds_above,
     }
     changed: dict[str, Change] = {
-        "curve_falling": lambda c: _with_curve(c, c.reflectance.values[0][::-1]),
-        "curve_of_nan": lambda c: _with_curve(c, np.nan * c.reflectance.values[0]),
-        "light_nan": lambda c: {"radiance": np.nan * c.radiance},
-        "light_negative": lambda c: {"radiance": -c.radiance},
-        "leds_nan": lambda c: {"led_positions_mm": np.nan * c.led_positions_mm},
-        "plane_behind_camera": lambda c: {"plane": TopPlane((0, 0, -1), c.plane.distance_mm)},
+        "curve_falling": lambda c: _with_curve(c, c.open_sensor.reflectance.values[0][::-1]),
+        "curve_of_nan": lambda c: _with_curve(c, np.nan * c.open_sensor.reflectance.values[0]),
+        "light_nan": lambda c: {"radiance": np.nan * c.open_sensor.radiance},
+        "light_negative": lambda c: {"radiance": -c.open_sensor.radiance},
+        "leds_nan": lambda c: {"led_positions_mm": np.nan * c.open_sensor.led_positions_mm},
+        "plane_behind_camera": lambda c: {
+            "plane": TopPlane((0, 0, -1), c.open_sensor.plane.distance_mm)
+        },
         "crosstalk_singular": lambda _: {"crosstalk": np.ones((3, 3))},
     }
     read = {name: partial(_read, change) for name, change in changed.items()}
@@ -58,8 +60,8 @@ def calibration_cases() -> list[Case]:
 
 def _standard() -> tuple[Calibration, FullModel]:
     calibration = standard_sensor().calibration
-    assert calibration.full is not None
-    return calibration, calibration.full
+    assert calibration.open_sensor.full is not None
+    return calibration, calibration.open_sensor.full
 
 
 def _with(calibration: Calibration, *, needs: tuple[Flag, ...] = ()) -> Seen:
@@ -73,21 +75,21 @@ def _hole(field: str) -> Seen:
     grid = calibration.table.grid
     x, y = np.meshgrid(grid.x_mm, grid.y_mm)
     known = (np.hypot(x + 6.0, y) >= 0.5)[..., None]
-    holed = {field: getattr(calibration, field) * known}
+    holed = {field: getattr(calibration.data, field) * known}
     full = replace(full, background=full.background * known)
-    return _with(replace(calibration, full=full, **holed), needs=(Flag.OUTSIDE,))
+    return _with(calibration.changed(full=full, **holed), needs=(Flag.OUTSIDE,))
 
 
 def _all_dark() -> Seen:
     calibration, _ = _standard()
-    return _with(replace(calibration, radiance=np.zeros_like(calibration.radiance)))
+    return _with(calibration.changed(radiance=np.zeros_like(calibration.open_sensor.radiance)))
 
 
 def _leds_above() -> Seen:
     calibration, full = _standard()
-    leds = calibration.led_positions_mm * np.array([1.0, 1.0, -1.0])
+    leds = calibration.open_sensor.led_positions_mm * np.array([1.0, 1.0, -1.0])
     full = replace(full, led_positions_mm=leds)
-    return _with(replace(calibration, led_positions_mm=leds, full=full))
+    return _with(calibration.changed(led_positions_mm=leds, full=full))
 
 
 def _read(change: Change) -> Seen:
@@ -95,13 +97,13 @@ def _read(change: Change) -> Seen:
     calibration, _ = _standard()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "changed.gplcal"
-        write_calibration(replace(calibration, **change(calibration)), path)
+        write_calibration(calibration.changed(**change(calibration)), path)
         read_calibration(path)
     return seen_once(False, "it was read without an error")
 
 
 def _with_curve(calibration: Calibration, values: NDArray[np.float64]) -> dict[str, Any]:
-    table = calibration.reflectance
+    table = calibration.open_sensor.reflectance
     three = ReflectanceTable(table.cosines, (values, values, values), table.coverage)
     return {"reflectance": three}
 
@@ -109,8 +111,8 @@ def _with_curve(calibration: Calibration, values: NDArray[np.float64]) -> dict[s
 def _beyond() -> Seen:
     """Take a table whose brightest value is below what the image shows."""
     calibration, _ = _standard()
-    low = _with_curve(calibration, 0.5 * calibration.reflectance.values[0])
-    found = Reconstructor(replace(calibration, model="paper", full=None, **low)).depth(
+    low = _with_curve(calibration, 0.5 * calibration.open_sensor.reflectance.values[0])
+    found = Reconstructor(replace(calibration.changed(full=None, **low), model="paper")).depth(
         standard_press().frame
     )
     share = float(flagged(found, Flag.EXTRAPOLATED).mean())

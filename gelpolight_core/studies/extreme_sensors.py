@@ -144,11 +144,9 @@ def _lens_cases() -> list[Case]:
 def _lens(design: SensorDesign) -> Seen:
     """Press a ball, and project every node to its pixel and back."""
     known = known_sensor(design)
-    calibration, table = known.calibration, known.calibration.table
+    sensor, table = known.calibration.open_sensor, known.calibration.table
     pixels = np.stack([table.u_px, table.v_px], axis=-1)[table.valid].astype(np.float64)
-    points, _ = camera_to_membrane(
-        calibration.camera.directions(pixels), calibration.plane, calibration.stack
-    )
+    points, _ = camera_to_membrane(sensor.camera.directions(pixels), sensor.plane, sensor.stack)
     worst_mm = float(np.hypot(*(points - table.grid.points_mm()[table.valid]).T).max())
     press = known.pressed(BALL, x_mm=BALL_AT_MM[0], y_mm=BALL_AT_MM[1])
     # A wide-angle lens has large pixels: 3 % of a pixel if that is more.

@@ -22,7 +22,13 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
-from gelpolight_core.sensor_calibration import Calibration, FullModel, Provenance, sensor_stack
+from gelpolight_core.sensor_calibration import (
+    Calibration,
+    FullModel,
+    OpenSensor,
+    Provenance,
+    sensor_stack,
+)
 from gelpolight_core.session.session import SensorData
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Indenter, press
@@ -134,9 +140,8 @@ def exact_calibration(
     shot, read = design.camera.shot_variance, design.camera.read_sd
     middle = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
     # Of an exact calibration: far below the noise of any camera.
-    return Calibration(
+    data = OpenSensor(
         sensor=stated,
-        model="full",
         camera=camera,
         plane=plane,
         led_positions_mm=leds,
@@ -146,8 +151,6 @@ def exact_calibration(
         factors=np.where(raw > 0.0, 1.0, 0.0).astype(np.float32),
         reflectance=cosine_table(),
         noise=np.sqrt(shot * middle + read**2),
-        quality={},
-        provenance=Provenance("", "", __version__, design.serial, {}),
         full=FullModel(
             led_positions_mm=leds,
             led_sd_mm=np.full((3, 3), 0.01),
@@ -159,6 +162,7 @@ def exact_calibration(
             kept="mirror",
         ),
     )
+    return Calibration("full", data, {}, Provenance("", "", __version__, design.serial, {}))
 
 
 def exact_membrane(design: SensorDesign) -> Membrane:

@@ -104,8 +104,8 @@ def rms_um(error_mm: NDArray[np.float64]) -> float:
 def condition_of(calibration: Calibration) -> float:
     """Return the largest condition number of the light directions on the visible membrane."""
     points = calibration.table.grid.points_mm()[calibration.table.valid][::97]
-    assert calibration.full is not None
-    return direction_condition(calibration.full.led_positions_mm, points)
+    assert calibration.open_sensor.full is not None
+    return direction_condition(calibration.open_sensor.full.led_positions_mm, points)
 
 
 def judged(
@@ -137,7 +137,7 @@ def judged(
         Of the compared area; by default the working circle without its edge.
     """
     calibration = known.calibration
-    radius = radius_mm or scored_radius_mm(calibration.sensor)
+    radius = radius_mm or scored_radius_mm(calibration.open_sensor.sensor)
     peak_mm = float(press.truth.depth_mm.max())
     maps = maps_of(calibration, press.frame if frame is None else frame)
     modes = []

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.figure import Figure
 
-from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.press import read_truth
@@ -142,7 +142,7 @@ def measure_virtual(
             made = calibration
             if made is None:
                 calibrating = partial(phase, 0.3, 0.6)
-                made = calibrate_session(read_session(folder), progress=calibrating).calibration
+                made = calibrate(read_session(folder), progress=calibrating).calibration
             measuring = partial(phase, 0.6, 1.0)
             points += measure_session(folder, made, repeats=repeats, progress=measuring)
     return tuple(points)
@@ -190,9 +190,9 @@ def measure_session(
     solvers = {
         name: Reconstructor(calibration, model=model, effort=effort)
         for name, (model, effort, _) in modes().items()
-        if model == "paper" or calibration.full is not None
+        if model == "paper" or calibration.open_sensor.full is not None
     }
-    radius_mm = scored_radius_mm(calibration.sensor)
+    radius_mm = scored_radius_mm(calibration.open_sensor.sensor)
     times_ms: dict[str, list[float]] = {name: [] for name in solvers}
     errors: dict[str, list[tuple[float, ...]]] = {name: [] for name in solvers}
     for number, row in enumerate(rows):
@@ -213,16 +213,16 @@ def measure_session(
         median, p95 = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
         means = np.abs(errors[name]).mean(axis=0).tolist()
         label, width = modes()[name][2], calibration.camera.width
-        sensor, pitch_mm = calibration.sensor.serial, calibration.table.grid.pitch_mm
+        sensor, pitch_mm = calibration.serial, calibration.table.grid.pitch_mm
         points.append(Point(sensor, name, label, width, pitch_mm, len(rows), median, p95, *means))
     return tuple(points)
 
 
 def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
-    if serial != calibration.sensor.serial:
+    if serial != calibration.serial:
         raise InputError(
             tr("The presses are of {one}, the calibration is of {other}").format(
-                one=serial, other=calibration.sensor.serial
+                one=serial, other=calibration.serial
             ),
             where=where,
             advice=tr(

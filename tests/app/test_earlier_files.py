@@ -12,9 +12,8 @@ from app.services.preferences import Limits
 from app.services.settings import Settings
 from app.workspace.indenters import read_indenters
 from app.workspace.workspace import Workspace
-from gelpolight_core.calibration.closed_project import open_project
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -150,18 +149,18 @@ def test_a_lab_keeps_its_indenters(workspace: Workspace) -> None:
 @pytest.mark.parametrize("workspace", [EARLIER], indirect=True)
 def test_an_unfinished_session_continues(workspace: Workspace) -> None:
     (entry,) = workspace.sessions()
-    statuses = open_project(entry.folder).statuses()
+    statuses = Project(entry.folder).statuses()
 
-    assert statuses[Stage.BALLS].state is not StageState.EMPTY
-    assert statuses[Stage.TOP_POSE].state is StageState.EMPTY
+    assert statuses["balls"].state is not StageState.EMPTY
+    assert statuses["top_pose"].state is StageState.EMPTY
     assert entry.serial == "small-1"
 
 
 @pytest.mark.parametrize("workspace", [NEWEST], indirect=True)
 def test_a_session_keeps_the_decisions_about_its_images(workspace: Workspace) -> None:
     sessions = workspace.folder / "sensors/small-1/sessions"
-    opened = open_project(sessions / "unfinished").session.decisions
-    closed = open_project(sessions / "closed").session
+    opened = Project(sessions / "unfinished").session.decisions
+    closed = Project(sessions / "closed").session
 
     assert opened.excluded == {"balls/ball_00.png", "checkerboard/view_03.png"}
     assert opened.spots_px == {1: (40.5, 60.25)}
@@ -172,7 +171,7 @@ def test_a_session_keeps_the_decisions_about_its_images(workspace: Workspace) ->
 
 @pytest.mark.parametrize("workspace", [CLOSED], indirect=True)
 def test_a_closed_session_has_its_scale_and_balls(workspace: Workspace) -> None:
-    project = open_project(workspace.folder / "sensors/small-1/sessions/closed")
+    project = Project(workspace.folder / "sensors/small-1/sessions/closed")
 
     assert len(project.session.found("balls")) == 3
     assert project.session.in_place.stated_scale == pytest.approx(0.165, abs=0.001)

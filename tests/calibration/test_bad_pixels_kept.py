@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,10 +10,11 @@ import numpy as np
 import pytest
 
 from gelpolight_core.bad_pixels import BadPixels
+from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.results import StageResults
-from gelpolight_core.calibration.stages import run_stage
+from gelpolight_core.calibration.open_sensor import BACKGROUND
+from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
@@ -36,22 +36,20 @@ def spoilt(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 
 
 def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
-    spoilt: Path, virtual_results: StageResults
+    spoilt: Path, virtual_results: Results
 ) -> None:
     session = read_session(spoilt)
-    results = run_stage(Stage.BACKGROUND, session, virtual_results)
-    assert results.bad is not None
-    assert {int(c) for c in results.bad.pixels[:, 1]} == {COLUMN}
-    assert len(results.bad.pixels) == results.bad.height
-    assert results.bare_membrane is not None
-    assert "bad_pixels_percent" in [f.key for f in results.bare_membrane.figures]
+    results = FULL.run(BACKGROUND, session, virtual_results)
+    found = results[BACKGROUND]
+    assert {int(c) for c in found.bad.pixels[:, 1]} == {COLUMN}
+    assert len(found.bad.pixels) == found.bad.height
+    assert "bad_pixels_percent" in [f.key for f in found.quality.figures]
     # The captures are those of another camera: the fingerprints of earlier stages differ.
-    good = virtual_results.background
-    assert good is not None and results.background is not None
+    good = virtual_results[BACKGROUND].light
     inside = good.min(axis=2) > 0.1
-    assert np.abs(results.background[inside] / good[inside] - 1.0).max() < 0.12
-    balls = run_stage(Stage.BALLS, session, results).balls
-    for ball, before in zip(balls, virtual_results.balls, strict=True):
+    assert np.abs(found.light[inside] / good[inside] - 1.0).max() < 0.12
+    balls = FULL.run(BALLS, session, results)[BALLS].seen
+    for ball, before in zip(balls, virtual_results[BALLS].seen, strict=True):
         assert (ball.press is None) == (before.press is None)
         if ball.image is not None and before.image is not None:
             off = np.abs(ball.image - before.image)[inside]
@@ -63,15 +61,15 @@ def test_the_map_is_kept_in_the_file_and_files_without_one_are_read(
 ) -> None:
     camera = small_calibration.camera
     bad = BadPixels(np.array([[3, 5], [3, 6]], np.int32), camera.height, camera.width)
-    kept = replace(small_calibration, bad=bad)
+    kept = small_calibration.changed(bad=bad)
     write_calibration(kept, tmp_path / "kept.gplcal")
     again = read_calibration(tmp_path / "kept.gplcal")
-    assert again.bad is not None
-    assert np.array_equal(again.bad.pixels, bad.pixels)
+    assert again.data.bad is not None
+    assert np.array_equal(again.data.bad.pixels, bad.pixels)
     assert again.identity == kept.identity != small_calibration.identity
     write_calibration(small_calibration, tmp_path / "without.gplcal")
     without = read_calibration(tmp_path / "without.gplcal")
-    assert without.bad is None
+    assert without.data.bad is None
     assert not without.bad_pixels.pixels.size
     assert without.identity == small_calibration.identity
 
@@ -80,6 +78,6 @@ def test_places_outside_the_image_are_a_damaged_file(
     small_calibration: Calibration, tmp_path: Path
 ) -> None:
     huge = BadPixels(np.array([[5000, 5]], np.int32), 6000, 6000)
-    write_calibration(replace(small_calibration, bad=huge), tmp_path / "bad.gplcal")
+    write_calibration(small_calibration.changed(bad=huge), tmp_path / "bad.gplcal")
     with pytest.raises(InputError, match="damaged"):
         read_calibration(tmp_path / "bad.gplcal")

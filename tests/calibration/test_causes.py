@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.causes import CAUSES, explained
 from gelpolight_core.session.session import read_session
 
@@ -32,6 +32,6 @@ def test_the_number_that_is_wrong_is_the_first_cause(
     text, count = re.subn(number, lambda m: f"{m[1]}{float(m[2]) * factor:.4f}", path.read_text())
     assert count
     path.write_text(text)
-    remedy, follow = explained(calibrate_session(read_session(folder)).calibration.quality)
+    remedy, follow = explained(calibrate(read_session(folder)).calibration.quality)
     assert remedy == next(known.remedy for known in CAUSES if known.key == cause)
     assert len(follow) > 1

@@ -9,7 +9,7 @@ import pytest
 from test_joint import BALLS, MIRROR, NO_MAP, SLAB, found_press, pixels_of, truth
 
 from gelpolight_core.calibration.joint import refine_jointly
-from gelpolight_core.calibration.pipeline import judge_radii
+from gelpolight_core.calibration.refinement import judge_radii
 from gelpolight_core.finding import Verdict
 
 

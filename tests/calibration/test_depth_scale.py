@@ -19,10 +19,10 @@ from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 def full_model(calibration: Calibration) -> FullModel:
     return FullModel(
-        calibration.led_positions_mm,
+        calibration.data.led_positions_mm,
         np.full((3, 3), 0.02),
         Membrane(1.0, 0.2, 0.5, 0.3),
-        calibration.radiance,
+        calibration.data.radiance,
         0.7,
         0.01,
         (0.0, 0.0),
@@ -110,7 +110,7 @@ def test_a_lone_press_is_known_no_better_than_its_own_pixels_say() -> None:
 
 
 def test_a_calibration_says_how_sure_its_heights_are(virtual_calibration: Calibration) -> None:
-    full = virtual_calibration.full
+    full = virtual_calibration.data.full
     assert full is not None
     assert full.scale_sd is not None
     figure = virtual_calibration.quality["joint"]["depth_sd_percent"]

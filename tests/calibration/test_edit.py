@@ -28,16 +28,16 @@ WHEN = "2026-05-06T07:08:09+00:00"
 def full_calibration(membrane: Membrane | None = None) -> Calibration:
     plain = scene.calibration()
     full = FullModel(
-        led_positions_mm=plain.led_positions_mm,
+        led_positions_mm=plain.data.led_positions_mm,
         led_sd_mm=np.full((3, 3), 0.01),
         membrane=membrane or Membrane(1.02, 0.2, 0.5, 0.3),
-        background=plain.radiance,
+        background=plain.data.radiance,
         decay_mm=0.7,
         misfit=0.01,
         held_out=(0.03, 0.02),
         kept="refined",
     )
-    return replace(plain, model="full", full=full)
+    return replace(plain, model="full").changed(full=full)
 
 
 def drawn(calibration: Calibration, **more: str) -> Calibration:
@@ -46,16 +46,18 @@ def drawn(calibration: Calibration, **more: str) -> Calibration:
 
 
 def membrane_of(calibration: Calibration) -> Membrane:
-    assert calibration.full is not None
-    return calibration.full.membrane
+    assert calibration.data.full is not None
+    return calibration.data.full.membrane
 
 
 def test_the_papers_model_uses_the_curve_as_it_is_drawn() -> None:
     plain, after = scene.calibration(), drawn(full_calibration())
-    np.testing.assert_array_equal(after.reflectance.values[1], BENT)
-    np.testing.assert_array_equal(after.reflectance.cosines[1], NODES)
+    np.testing.assert_array_equal(after.data.reflectance.values[1], BENT)
+    np.testing.assert_array_equal(after.data.reflectance.cosines[1], NODES)
     for k in (0, 2):
-        np.testing.assert_array_equal(after.reflectance.values[k], plain.reflectance.values[k])
+        np.testing.assert_array_equal(
+            after.data.reflectance.values[k], plain.data.reflectance.values[k]
+        )
 
 
 def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
@@ -89,13 +91,13 @@ def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
 
 def test_an_undone_edit_gives_nearly_the_old_membrane() -> None:
     before = full_calibration()
-    table = before.reflectance
+    table = before.data.reflectance
     back = edited(drawn(before), {1: (table.cosines[1], table.values[1])}, operator="x", made=WHEN)
     even = np.repeat(np.linspace(0.02, 1.0, 200)[:, None], 3, axis=1)
     np.testing.assert_allclose(
         membrane_of(back).diffuse_share(even), membrane_of(before).diffuse_share(even), atol=1e-4
     )
-    np.testing.assert_allclose(back.factors, before.factors, rtol=1e-5)
+    np.testing.assert_allclose(back.data.factors, before.data.factors, rtol=1e-5)
     assert len(back.provenance.edits) == 2
 
 
@@ -110,7 +112,7 @@ def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(
     curves = membrane_of(after).curves
     assert (np.diff(curves, axis=1) > 0.0).all()
     assert np.isfinite(curves).all()
-    assert (after.factors >= 0.0).all()
+    assert (after.data.factors >= 0.0).all()
 
 
 @pytest.mark.parametrize(

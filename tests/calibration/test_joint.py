@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView, view_directions
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
-from gelpolight_core.calibration.pipeline import judge_presses
+from gelpolight_core.calibration.refinement import judge_presses
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Slab

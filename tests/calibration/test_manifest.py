@@ -53,7 +53,7 @@ def forged(whole: Path, target: Path, path: tuple[str, ...], value: Any) -> Path
 def test_the_summary_says_what_the_calibration_says(whole: Path) -> None:
     summary, calibration = read_summary(whole), scene.calibration()
     assert summary.identity == calibration.identity
-    assert summary.serial == calibration.sensor.serial
+    assert summary.serial == calibration.serial
     assert summary.model == calibration.model
     assert summary.created == calibration.provenance.created
     assert summary.quality == calibration.quality

@@ -13,11 +13,11 @@ from app.calibrate.balls import judge_ball
 from app.calibrate.image_step import Judgement
 from app.calibrate.lens import judge_view
 from app.calibrate.top_pose import judge_top_view
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.open_sensor import LENS
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 
-SEVERAL = (Stage.LENS, Stage.TOP_POSE, Stage.BALLS)
+SEVERAL = ("lens", "top_pose", "balls")
 
 
 def write_noise(path: Path, size: tuple[int, int]) -> None:
@@ -36,14 +36,14 @@ def spoil(folder: Path, usual: tuple[int, int]) -> dict[str, str]:
 
 @pytest.mark.parametrize("stage", SEVERAL)
 def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
-    stage: Stage, computed_project: Callable[[], CalibrationProject]
+    stage: str, computed_project: Callable[[], Project]
 ) -> None:
     project = computed_project()
-    folder = project.session.folder / FOLDERS[stage]
-    camera = project.results.lens.camera if project.results.lens is not None else None
+    folder = project.session.folder / project.recipe[stage].folder
+    camera = project.results[LENS].camera if project.results.get(LENS) else None
     assert camera is not None
     reasons = spoil(folder, (camera.width, camera.height))
-    if stage is Stage.BALLS:
+    if stage == "balls":
         text = (project.session.folder / "session.toml").read_text()
         rows = "".join(f'"{name}" = 3.0\n' for name in reasons)
         (project.session.folder / "session.toml").write_text(
@@ -54,15 +54,15 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
     assert status.state is StageState.WARN, status.sentence
     (left_out,) = [f for f in status.quality.figures if f.key.endswith("left_out")]
     assert left_out.value == len(reasons)
-    lens = project.results.lens
+    lens = project.results.get(LENS)
     assert lens is not None
     views = {view.name: view for view in lens.views}
-    judges: dict[Stage, Callable[[str], Judgement]] = {
-        Stage.LENS: lambda name: judge_view(views.get(name)),
-        Stage.TOP_POSE: lambda name: judge_top_view(name, project, status),
-        Stage.BALLS: lambda name: judge_ball(name, project),
+    judges: dict[str, Callable[[str], Judgement]] = {
+        "lens": lambda name: judge_view(views.get(name)),
+        "top_pose": lambda name: judge_top_view(name, project, status),
+        "balls": lambda name: judge_ball(name, project),
     }
-    for path in project.session.found(FOLDERS[stage]):
+    for path in project.session.found(project.recipe[stage].folder):
         state, sentence, *_ = judges[stage](path.name)
         if path.name in reasons:
             assert state == "fail"
@@ -73,12 +73,12 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
 
 
 def test_a_stage_of_nothing_but_bad_captures_fails(
-    computed_project: Callable[[], CalibrationProject],
+    computed_project: Callable[[], Project],
 ) -> None:
     project = computed_project()
     for stage in SEVERAL:
-        folder = project.session.folder / FOLDERS[stage]
+        folder = project.session.folder / project.recipe[stage].folder
         for path in folder.iterdir():
             path.write_bytes(b"not an image")
-        if stage is not Stage.BALLS:
+        if stage != "balls":
             assert project.compute(stage).state is StageState.FAIL

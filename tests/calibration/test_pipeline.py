@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.pipeline import assemble, calibrate_session
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project, assemble, calibrate
+from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.session.session import read_session
@@ -28,7 +28,7 @@ def session(small_session: Path, tmp_path: Path) -> Path:
 def test_a_copied_image_is_refused_for_every_caller(session: Path) -> None:
     shutil.copy(session / "background" / "background.png", session / "whiteboard/whiteboard.png")
     with pytest.raises(InputError, match="copy of"):
-        calibrate_session(read_session(session))
+        calibrate(read_session(session))
 
 
 def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
@@ -37,13 +37,13 @@ def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
     image = cv2.imread(str(path))
     assert image is not None
     cv2.imwrite(str(path), np.round(0.1 * image).astype(np.uint8))
-    quality = calibrate_session(read_session(session)).calibration.quality
+    quality = calibrate(read_session(session)).calibration.quality
     assert quality["radiance"].verdict is Verdict.FAIL
     assert "whiteboard" in quality["balls"]["balls_left_out"].remedy
 
 
 def test_names_that_are_not_text_make_a_calibration_that_can_be_read(
-    small_project: CalibrationProject, tmp_path: Path
+    small_project: Project, tmp_path: Path
 ) -> None:
     folder = tmp_path / os.fsdecode(b"caf\xe9")
     try:
@@ -52,7 +52,7 @@ def test_names_that_are_not_text_make_a_calibration_that_can_be_read(
         path.rename(path.with_name(os.fsdecode(b"b\xe9.png")))
     except OSError:
         pytest.skip("this disk keeps names as text")
-    calibration = assemble(read_session(folder), small_project.results).calibration
+    calibration = assemble(FULL, read_session(folder), small_project.results).calibration
     write_calibration(calibration, tmp_path / "c.gplcal")
     provenance = read_calibration(tmp_path / "c.gplcal").provenance
     assert provenance.session == r"caf\udce9"

@@ -12,66 +12,69 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration import stages
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject, Cancelled
+from gelpolight_core.calibration.ball_stage import BALLS, Balls
+from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
+from gelpolight_core.calibration.project import Cancelled, Project
+from gelpolight_core.calibration.recipe import Work
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.description import create_session
-from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture
-def project(computed_project: Callable[[], CalibrationProject]) -> CalibrationProject:
+def project(computed_project: Callable[[], Project]) -> Project:
     """Return a computed project in its own folder."""
     return computed_project()
 
 
 def test_step_by_step_gives_the_same_calibration_as_all_at_once(
-    small_project: CalibrationProject, small_calibration: Calibration
+    small_project: Project, small_calibration: Calibration
 ) -> None:
     made = small_project.finish().calibration
-    np.testing.assert_array_equal(made.radiance, small_calibration.radiance)
-    np.testing.assert_array_equal(made.factors, small_calibration.factors)
-    np.testing.assert_array_equal(made.led_positions_mm, small_calibration.led_positions_mm)
-    assert made.full is not None
-    assert small_calibration.full is not None
+    np.testing.assert_array_equal(made.data.radiance, small_calibration.data.radiance)
+    np.testing.assert_array_equal(made.data.factors, small_calibration.data.factors)
     np.testing.assert_array_equal(
-        made.full.led_positions_mm, small_calibration.full.led_positions_mm
+        made.data.led_positions_mm, small_calibration.data.led_positions_mm
     )
-    assert made.full.membrane == small_calibration.full.membrane
+    assert made.data.full is not None
+    assert small_calibration.data.full is not None
+    np.testing.assert_array_equal(
+        made.data.full.led_positions_mm, small_calibration.data.full.led_positions_mm
+    )
+    assert made.data.full.membrane == small_calibration.data.full.membrane
 
 
 def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(
-    project: CalibrationProject,
+    project: Project,
 ) -> None:
-    project.exclude(Stage.BALLS, project.session.found("balls")[0].name)
+    project.exclude("balls", project.session.found("balls")[0].name)
     states = {stage: status.state for stage, status in project.statuses().items()}
-    late = {Stage.BALLS, Stage.REFLECTANCE, Stage.JOINT}
+    late = {"balls", "reflectance", "joint"}
     assert {s for s, state in states.items() if state is StageState.STALE} == late
-    assert project.stale() == tuple(s for s in Stage if s in late)
-    assert "excluded" in project.statuses()[Stage.BALLS].sentence
+    assert project.stale() == ("balls", "reflectance", "joint")
+    assert "excluded" in project.statuses()["balls"].sentence
 
 
-def test_another_led_height_makes_all_after_the_lights_stale(project: CalibrationProject) -> None:
+def test_another_led_height_makes_all_after_the_lights_stale(project: Project) -> None:
     sensor = replace(project.session.sensor, led_height_mm=15.0)
     project.describe(replace(project.session, sensor=sensor))
     stale = set(project.stale())
-    assert Stage.LIGHTS in stale
-    assert Stage.JOINT in stale
-    assert Stage.TOP_POSE not in stale
+    assert "lights" in stale
+    assert "joint" in stale
+    assert "top_pose" not in stale
     assert read_session(project.session.folder).sensor.led_height_mm == 15.0
 
 
-def test_captures_and_decisions_are_on_disk_at_once(project: CalibrationProject) -> None:
+def test_captures_and_decisions_are_on_disk_at_once(project: Project) -> None:
     frames = [np.full((240, 320, 3), value, np.uint8) for value in (10, 13)]
-    name = project.add_capture(Stage.BALLS, frames)
+    name = project.add_capture("balls", frames)
     project.set_ball_radius(name, 2.5)
     project.place_ball(name, PlacedCircle(320.5, 200.25, 40.0))
     project.place_spot(1, (100.25, 50.5))
-    other = CalibrationProject(project.session.folder)
+    other = Project(project.session.folder)
     assert other.session == project.session
     raw = cv2.imread(str(other.session.folder / "balls" / name), cv2.IMREAD_UNCHANGED)
     assert raw.dtype == np.uint16
@@ -79,73 +82,69 @@ def test_captures_and_decisions_are_on_disk_at_once(project: CalibrationProject)
 
 
 def test_a_new_capture_of_a_single_view_replaces_the_former(
-    project: CalibrationProject,
+    project: Project,
 ) -> None:
     before = project.session.captured("mirror")
-    name = project.add_capture(Stage.LIGHTS, [np.zeros((240, 320, 3), np.uint8)])
+    name = project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)])
     assert [p.name for p in project.session.found("mirror")] == [name]
     assert all(path.is_file() for path in before)
 
 
-def test_a_name_is_never_given_twice(project: CalibrationProject) -> None:
+def test_a_name_is_never_given_twice(project: Project) -> None:
     frame = [np.zeros((240, 320, 3), np.uint8)]
-    first = project.add_capture(Stage.LENS, frame)
-    project.exclude(Stage.LENS, first)
-    assert project.add_capture(Stage.LENS, frame) != first
+    first = project.add_capture("lens", frame)
+    project.exclude("lens", first)
+    assert project.add_capture("lens", frame) != first
 
 
-def test_an_image_without_a_ball_is_left_out_with_its_reason(project: CalibrationProject) -> None:
+def test_an_image_without_a_ball_is_left_out_with_its_reason(project: Project) -> None:
     bare = project.session.found("background")[0]
     raw = cv2.imread(str(bare), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    name = project.add_capture(Stage.BALLS, [raw])
+    name = project.add_capture("balls", [raw])
     project.set_ball_radius(name, 3.0)
-    status = project.compute(Stage.BALLS)
+    status = project.compute("balls")
     assert status.state is StageState.WARN
     assert name in status.sentence
     assert status.quality["balls_left_out"].value == 1.0
-    project.exclude(Stage.BALLS, name)
-    assert project.compute(Stage.BALLS).quality["balls_left_out"].value == 0.0
+    project.exclude("balls", name)
+    assert project.compute("balls").quality["balls_left_out"].value == 0.0
 
 
 def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
-    project: CalibrationProject,
+    project: Project,
 ) -> None:
-    project.add_capture(Stage.LIGHTS, [np.zeros((240, 320, 3), np.uint8)])
-    status = project.compute(Stage.LIGHTS)
+    project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)])
+    status = project.compute("lights")
     assert status.state is StageState.FAIL
     assert "black" in status.sentence
-    assert project.results.lens is not None
-    assert Stage.RADIANCE not in project.stale()
-    assert project.statuses()[Stage.RADIANCE].state is StageState.STALE
+    assert project.results.get(LENS) is not None
+    assert "radiance" not in project.stale()
+    assert project.statuses()["radiance"].state is StageState.STALE
 
 
-def test_a_ball_set_by_hand_is_used_at_its_position(project: CalibrationProject) -> None:
+def test_a_ball_set_by_hand_is_used_at_its_position(project: Project) -> None:
     """A circle drawn on the detected one gives the same ball within the accuracy of a hand."""
-    found = project.results.presses[0]
-    name = project.results.balls[0].file
-    table, lens = project.results.table, project.results.lens
-    assert table is not None
-    assert lens is not None
+    found = project.results[BALLS].presses[0]
+    name = project.results[BALLS].seen[0].file
+    table = project.results[TOP_POSE].table
     column, row = (round(c) for c in found.indentation.centre)
     centre = np.array([table.u_px[row, column], table.v_px[row, column]], float)
     reach = round(found.indentation.contact_radius_px)
     radius = float(table.u_px[row, column + reach] - centre[0])
     project.place_ball(name, PlacedCircle(float(centre[0]), float(centre[1]), radius))
-    project.compute(Stage.BALLS)
-    placed = project.results.presses[0]
+    project.compute("balls")
+    placed = project.results[BALLS].presses[0]
     assert np.hypot(*(np.array(placed.pose.centre_mm) - found.pose.centre_mm)) < 0.05
     assert placed.contact_radius_mm == pytest.approx(found.contact_radius_mm, rel=0.03)
     assert placed.indentation.coverage == 1.0
 
 
-def test_a_spot_set_by_hand_moves_its_led(project: CalibrationProject) -> None:
-    lights = project.results.lights
-    assert lights is not None
+def test_a_spot_set_by_hand_moves_its_led(project: Project) -> None:
+    lights = project.results[LIGHTS].leds
     u, v = lights.spots.spots[2].centre_px
     project.place_spot(2, (u + 5.0, v))
-    project.compute(Stage.LIGHTS)
-    moved = project.results.lights
-    assert moved is not None
+    project.compute("lights")
+    moved = project.results[LIGHTS].leds
     assert moved.spots.spots[2].centre_px == (u + 5.0, v)
     assert moved.spots.spots[2].centre_sd_px == 0.5
     assert moved.led_positions_mm[2, 0] != lights.led_positions_mm[2, 0]
@@ -153,7 +152,7 @@ def test_a_spot_set_by_hand_moves_its_led(project: CalibrationProject) -> None:
 
 
 def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
-    project: CalibrationProject,
+    project: Project,
 ) -> None:
     project.set_ball_radius(project.session.found("balls")[0].name, 2.9)
 
@@ -161,9 +160,9 @@ def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        project.compute(Stage.BALLS, stop)
-    assert project.statuses()[Stage.BALLS].state is StageState.STALE
-    assert project.compute(Stage.BALLS).state is not StageState.STALE
+        project.compute("balls", stop)
+    assert project.statuses()["balls"].state is StageState.STALE
+    assert project.compute("balls").state is not StageState.STALE
 
 
 def test_an_unfinished_session_says_which_stage_is_open(
@@ -171,13 +170,13 @@ def test_an_unfinished_session_says_which_stage_is_open(
 ) -> None:
     session = read_session(small_session)
     create_session(replace(session, folder=tmp_path / "new"))
-    project = CalibrationProject(tmp_path / "new")
+    project = Project(tmp_path / "new")
     # The camera response needs no images: it may be declared, or is assumed to be linear.
-    assert project.stale() == (Stage.RESPONSE,)
-    project.compute(Stage.RESPONSE)
+    assert project.stale() == ("response",)
+    project.compute("response")
     assert project.stale() == ()
     states = {stage: status.state for stage, status in project.statuses().items()}
-    assert states.pop(Stage.RESPONSE) is StageState.PASS
+    assert states.pop("response") is StageState.PASS
     assert set(states.values()) == {StageState.EMPTY}
     with pytest.raises(InputError, match="lens has no up-to-date result"):
         project.finish()
@@ -186,7 +185,7 @@ def test_an_unfinished_session_says_which_stage_is_open(
 
 
 def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
-    project: CalibrationProject,
+    project: Project,
 ) -> None:
     path = project.session.folder / "session.toml"
     path.write_text(path.read_text().replace("led_height_mm = 13.7", "led_height_mm = 13.9"))
@@ -195,7 +194,7 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
     with pytest.raises(InputError, match=r"session\.toml.*Reload"):
         project.set_ball_radius("ball_01.png", 3.5)
     assert path.read_bytes() == written
-    project.exclude(Stage.BALLS, "ball_02.png")  # the other file is unchanged
+    project.exclude("balls", "ball_02.png")  # the other file is unchanged
     project.reload()
     assert project.session.sensor.led_height_mm == 13.9
     project.set_ball_radius("ball_01.png", 3.5)
@@ -203,20 +202,20 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
 
 
 def test_a_single_view_that_cannot_replace_the_former_is_not_stored(
-    project: CalibrationProject,
+    project: Project,
 ) -> None:
     """Two used images would be averaged."""
-    project.exclude(Stage.BALLS, project.session.found("balls")[0].name)
+    project.exclude("balls", project.session.found("balls")[0].name)
     decisions = project.session.folder / "decisions.toml"
     decisions.write_text(decisions.read_text() + "# by another program\n")
     before = project.session.captured("whiteboard")
     with pytest.raises(InputError, match="nothing was written"):
-        project.add_capture(Stage.RADIANCE, [np.full((240, 320, 3), 90, np.uint8)])
+        project.add_capture("radiance", [np.full((240, 320, 3), 90, np.uint8)])
     assert read_session(project.session.folder).captured("whiteboard") == before
 
 
 def test_an_import_that_the_disk_ends_leaves_nothing_behind(
-    project: CalibrationProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    project: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before, files = project.session, []
     press = cv2.imread(str(before.found("balls")[0]))
@@ -236,28 +235,28 @@ def test_an_import_that_the_disk_ends_leaves_nothing_behind(
     for name in ("link", "replace"):
         monkeypatch.setattr(os, name, full_after_two(getattr(os, name)))
     with pytest.raises(InputError, match="The disk is full"):
-        project.import_files(Stage.BALLS, files, radius_mm=2.5)
+        project.import_files("balls", files, radius_mm=2.5)
     monkeypatch.undo()
     assert read_session(before.folder) == before == project.session
-    assert len(project.import_files(Stage.BALLS, files, radius_mm=2.5)) == 3
+    assert len(project.import_files("balls", files, radius_mm=2.5)) == 3
 
 
 def test_a_press_captured_during_a_computation_belongs_to_the_next_one(
-    project: CalibrationProject, monkeypatch: pytest.MonkeyPatch
+    project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    inputs_of = stages.inputs_of
     captured: list[str] = []
 
-    def slow(session: Session) -> object:
-        found = inputs_of(session)
-        frame = cv2.imread(str(session.found("balls")[0]))[..., ::-1]
-        captured.append(project.add_capture(Stage.BALLS, [frame], radius_mm=3.0))
-        return found
+    def slow(work: Work) -> Balls:
+        frame = cv2.imread(str(work.session.found("balls")[0]))[..., ::-1]
+        captured.append(project.add_capture("balls", [frame], radius_mm=3.0))
+        return BALLS.run(work)
 
-    monkeypatch.setattr(stages, "inputs_of", slow)
+    before = project.recipe
+    slowly = tuple(replace(s, run=slow) if s is BALLS else s for s in before.stages)
+    monkeypatch.setattr(project, "recipe", replace(before, stages=slowly))
     project.set_ball_radius(project.session.found("balls")[0].name, 3.01)
-    project.compute(Stage.BALLS)
+    project.compute("balls")
     monkeypatch.undo()
     assert captured
-    assert project.statuses()[Stage.BALLS].state is StageState.STALE
-    assert project.compute(Stage.BALLS).state in (StageState.PASS, StageState.WARN)
+    assert project.statuses()["balls"].state is StageState.STALE
+    assert project.compute("balls").state in (StageState.PASS, StageState.WARN)

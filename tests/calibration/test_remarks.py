@@ -50,7 +50,7 @@ def test_a_text_that_cannot_be_shown_is_refused(file: Path, name: str) -> None:
 
 @pytest.mark.parametrize("elastomer", ["gel 7", ""])
 def test_a_session_states_it_and_its_calibration_keeps_it(tmp_path: Path, elastomer: str) -> None:
-    sensor, board = scene.calibration().sensor, BoardSpec((9, 6), 3.0)
+    sensor, board = scene.calibration().data.sensor, BoardSpec((9, 6), 3.0)
     stated = (
         Session(tmp_path / "open", sensor, board, board, {}, 3.0, elastomer=elastomer),
         Session(

@@ -20,9 +20,11 @@ def calibration() -> Calibration:
 
 def clipped(calibration: Calibration, *, top: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the true background, brighter so that a part exceeds 1, and what a camera shows."""
-    assert calibration.full is not None
-    true = calibration.full.background * np.float32(top / calibration.full.background.max())
-    raw = true @ calibration.crosstalk.T.astype(np.float32)
+    assert calibration.data.full is not None
+    true = calibration.data.full.background * np.float32(
+        top / calibration.data.full.background.max()
+    )
+    raw = true @ calibration.data.crosstalk.T.astype(np.float32)
     shown = np.minimum(raw, np.float32(1.0))
     return true, shown
 
@@ -31,17 +33,17 @@ def test_light_beyond_saturation_is_found_from_what_is_around(calibration: Calib
     true, shown = clipped(calibration, top=1.1)
     lost = (shown >= SATURATED).any(axis=-1) & calibration.table.valid
     assert lost.sum() > 20
-    assert calibration.full is not None
-    unmixed = shown @ np.linalg.inv(calibration.crosstalk).T.astype(np.float32)
-    full = replace(calibration.full, background=unmixed)
-    unknown = np.where(lost[..., None], np.float32(0.0), calibration.factors)
+    assert calibration.data.full is not None
+    unmixed = shown @ np.linalg.inv(calibration.data.crosstalk).T.astype(np.float32)
+    full = replace(calibration.data.full, background=unmixed)
+    unknown = np.where(lost[..., None], np.float32(0.0), calibration.data.factors)
     light, factors = beyond_saturation(
-        full, shown, unknown, calibration.crosstalk, calibration.table
+        full, shown, unknown, calibration.data.crosstalk, calibration.table
     )
     assert np.percentile(np.abs(light[lost] / true[lost] - 1.0), 95.0) < 0.02
     assert np.abs(unmixed[lost] / true[lost] - 1.0).max() > 0.05
     np.testing.assert_array_equal(light[~lost], unmixed[~lost])
-    known = lost & (calibration.factors > 0.0).all(axis=-1)
-    off = np.abs(factors[known] / calibration.factors[known] - 1.0)
+    known = lost & (calibration.data.factors > 0.0).all(axis=-1)
+    off = np.abs(factors[known] / calibration.data.factors[known] - 1.0)
     assert np.percentile(off, 95.0) < 0.05
     np.testing.assert_array_equal(factors[~lost], unknown[~lost])

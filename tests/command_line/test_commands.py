@@ -18,14 +18,14 @@ from app.command_line import calibrate
 from app.command_line.calibrate import run_as_json
 from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.finding import Verdict
 from gelpolight_core.sensor_calibration import Calibration
 
 
 def test_a_calibration_of_the_virtual_sensor_finds_its_true_values(
-    virtual_session: Path, virtual_run: CalibrationRun
+    virtual_session: Path, virtual_run: Run
 ) -> None:
     """The limits are those for a full image, doubled for an image of half the size."""
     found = run_as_json(virtual_run)
@@ -122,7 +122,7 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
     assert "for teaching" in capsys.readouterr().out
 
     run = SimpleNamespace(calibration=failed, response=SimpleNamespace(summary=""))
-    monkeypatch.setattr(calibrate, "calibrate_any", lambda *_given, **_named: run)
+    monkeypatch.setattr(calibrate, "calibrate", lambda *_given, **_named: run)
     monkeypatch.setattr(calibrate, "run_as_json", lambda run: {"verdict": run.calibration.verdict})
     out = ["-o", str(tmp_path / "again.gplcal"), "--json", str(result)]
     assert main(["calibrate", str(session), *out]) == 0

@@ -126,7 +126,7 @@ def all_figures() -> tuple[Judged, ...]:
     found = []
     for folder in ("gelpolight_core", "app"):
         for path in sorted((ROOT / folder).rglob("*.py")):
-            if str(path.relative_to(ROOT)) != "gelpolight_core/quality.py":
+            if str(path.relative_to(ROOT)) != "gelpolight_core/finding.py":
                 found += figures_of(path)
     return tuple(found)
 
@@ -159,7 +159,13 @@ def limit_text(figure: Judged, expression: str) -> str | float:
         return NOTHING
     # A limit that some figures have: the chapter states it, and the text says when it is left out.
     expression = re.sub(r"^None if .+ else ", "", expression)
-    names = vars(importlib.import_module(figure.module.removesuffix(".py").replace("/", ".")))
+    names = dict(vars(importlib.import_module(figure.module.removesuffix(".py").replace("/", "."))))
+    for node in ast.walk(ast.parse((ROOT / figure.module).read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:  # also those inside a function
+            module = importlib.import_module(node.module)
+            names |= {
+                a.name: getattr(module, a.name) for a in node.names if hasattr(module, a.name)
+            }
     try:
         return float(eval(expression, dict(names)))
     except NameError:

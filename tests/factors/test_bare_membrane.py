@@ -11,23 +11,23 @@ import pytest
 
 from app.calibrate.background import detect_background
 from app.calibrate.detection import read_raw
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.open_sensor import TOP_POSE
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState, StageStatus
 
 
-def with_background(project: CalibrationProject, source: Path) -> StageStatus:
+def with_background(project: Project, source: Path) -> StageStatus:
     """Replace the background of the session by another image, with new noise."""
     (old,) = project.session.found("background")
     image = cv2.imread(str(source), cv2.IMREAD_UNCHANGED)
     assert image is not None
     noise = np.random.default_rng(2).normal(0.0, 0.6, image.shape)
     assert cv2.imwrite(str(old), np.clip(np.round(image + noise), 0, 255).astype(np.uint8))
-    return project.compute(Stage.BACKGROUND)
+    return project.compute("background")
 
 
 def test_the_bare_membrane_passes_and_its_figures_are_shown(
-    computed_project: Callable[[], CalibrationProject],
+    computed_project: Callable[[], Project],
 ) -> None:
     project = computed_project()
     status = with_background(project, project.session.found("background")[0])
@@ -37,7 +37,7 @@ def test_the_bare_membrane_passes_and_its_figures_are_shown(
 
 @pytest.mark.parametrize("what", ["cylinder", "ball", "whiteboard"])
 def test_what_the_live_hint_sees_the_stage_fails(
-    what: str, computed_project: Callable[[], CalibrationProject], small_session: Path
+    what: str, computed_project: Callable[[], Project], small_session: Path
 ) -> None:
     project = computed_project()
     session = project.session
@@ -50,7 +50,7 @@ def test_what_the_live_hint_sees_the_stage_fails(
     assert status.state is StageState.FAIL
     live = detect_background(
         read_raw(session.found("background")[0]),
-        table=project.results.table,
+        table=project.results[TOP_POSE].table,
         whiteboard=read_raw(session.found("whiteboard")[0]),
     )
     assert not live.ready

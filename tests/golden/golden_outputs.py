@@ -28,8 +28,8 @@ import numpy as np
 from numba.core.registry import cpu_target
 
 from app.command_line.main import main as gelpolight
-from gelpolight_core.calibration.closed_project import open_project
 from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.session import simulate_session
 
@@ -144,7 +144,7 @@ def outputs(name: str, folder: Path) -> tuple[Values, Maps]:
     if name in OF_SHARED:  # as a script calibrates
         found["calibrate"] = of_json("calibrate", session, "-o", calibration)
     else:  # as the window does
-        project = open_project(session)
+        project = Project(session)
         while stale := project.stale():
             project.compute(stale[0])
         found["states"] = {stage.value: s.state.value for stage, s in project.statuses().items()}
@@ -193,7 +193,7 @@ def of_json(*words: object) -> Any:
 
 def states(session: Path) -> Values:
     """Return the states of the stages of a session that was just opened."""
-    return {stage.value: s.state.value for stage, s in open_project(session).statuses().items()}
+    return {stage: s.state.value for stage, s in Project(session).statuses().items()}
 
 
 def described(key: str, array: np.ndarray) -> Values:

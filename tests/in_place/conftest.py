@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
+from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.session.session import Session, read_session
 
 MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
@@ -63,6 +63,6 @@ def closed_session(closed_folder: Path) -> Session:
 
 
 @pytest.fixture(scope="session")
-def closed_run(closed_session: Session, made_once: MadeOnce) -> InPlaceRun:
+def closed_run(closed_session: Session, made_once: MadeOnce) -> Run:
     """Return the closed sensor's calibration with its presses; not to be changed."""
-    return made_once("closed-run", lambda _: calibrate_closed_session(closed_session))
+    return made_once("closed-run", lambda _: calibrate(closed_session))

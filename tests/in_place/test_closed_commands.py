@@ -13,14 +13,15 @@ from report_pdf import report_data
 
 from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.in_place_session import InPlaceRun
+from gelpolight_core.calibration.in_place import BALLS
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.errors import InputError
 from gelpolight_core.report.build import run_report
 from gelpolight_core.session.session import Session
 
 
 @pytest.fixture(scope="module")
-def calibration(closed_run: InPlaceRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calibration(closed_run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the file of a closed sensor's calibration."""
     path = tmp_path_factory.mktemp("closed-file") / "closed.gplcal"
     write_calibration(closed_run.calibration, path)
@@ -106,17 +107,19 @@ def test_objects_with_walls_are_doubtful_because_balls_have_none(
 
 
 def test_reports_show_presses_and_what_is_not_known(
-    calibration: Path, closed_run: InPlaceRun, closed_session: Session, tmp_path: Path
+    calibration: Path, closed_run: Run, closed_session: Session, tmp_path: Path
 ) -> None:
     path = tmp_path / "report.pdf"
     assert main(["report", str(calibration), "-o", str(path)]) == 0
     facts = dict(report_data(path)["facts"])
     assert facts["Not known"] == "optics, refraction, temperature" and "mm/px" in facts["Scale"]
     refused = {"ball_99.png": InputError("No ball", where="ball_99.png", advice="Press one")}
-    result = replace(closed_run.result, refused=refused)
-    report = run_report(replace(closed_run, result=result), closed_session)
+    slopes = closed_run.results[BALLS]
+    slopes = replace(slopes, result=replace(slopes.result, refused=refused))
+    results = closed_run.results.having(BALLS, slopes)
+    report = run_report(replace(closed_run, results=results))
     sections = {section.key: section for section in report.sections}
     assert set(sections) == {"scale", "balls", "in_place"}
     assert sections["balls"].listings[0].rows == (("ball_99.png", "No ball. Press one."),)
     shown = [row[0] for row in sections["in_place"].listings[0].rows]
-    assert shown == [press.name for press in closed_run.result.presses]
+    assert shown == [press.name for press in closed_run.results[BALLS].result.presses]

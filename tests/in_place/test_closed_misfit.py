@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.in_place_session import InPlaceRun
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.terms import design_rows, position_axes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -18,7 +18,7 @@ Frame = NDArray[np.uint8]
 
 
 @pytest.fixture(scope="module")
-def reconstructor(closed_run: InPlaceRun) -> Reconstructor:
+def reconstructor(closed_run: Run) -> Reconstructor:
     return Reconstructor(closed_run.calibration)
 
 
@@ -28,19 +28,19 @@ def press(closed_folder: Path) -> Frame:
     return np.asarray(np.round(255.0 * rgb), np.uint8)
 
 
-def slopes_of(run: InPlaceRun, change: np.ndarray) -> np.ndarray:
+def slopes_of(run: Run, change: np.ndarray) -> np.ndarray:
     """Return the slopes (nodes, 2) of all nodes' colours, term by term in double precision."""
-    model = run.calibration.in_place
+    model = run.calibration.data.in_place
     x, y = (part.ravel() for part in np.meshgrid(*position_axes(*model.grid.shape)))
     return design_rows(change.reshape(-1, 3), x, y).astype(float) @ model.coefficients
 
 
-def direct(run: InPlaceRun, frame: Frame, height_map: HeightMap) -> tuple[np.ndarray, np.ndarray]:
+def direct(run: Run, frame: Frame, height_map: HeightMap) -> tuple[np.ndarray, np.ndarray]:
     """Return the angle in degrees between normals of colours and of the depth, and a misfit.
 
     The misfit is the least change of colour that makes the slopes agree.
     """
-    seen = run.calibration.in_place.change(frame.astype(np.float32) / 255.0)
+    seen = run.calibration.data.in_place.change(frame.astype(np.float32) / 255.0)
     colours = slopes_of(run, seen.change)
     down, across = np.gradient(height_map.depth_mm.astype(float), height_map.pitch_mm)
     surface = np.stack([across.ravel(), down.ravel()], axis=1)
@@ -61,7 +61,7 @@ def direct(run: InPlaceRun, frame: Frame, height_map: HeightMap) -> tuple[np.nda
 
 
 def test_the_misfit_is_that_of_a_direct_computation(
-    closed_run: InPlaceRun, reconstructor: Reconstructor, press: Frame
+    closed_run: Run, reconstructor: Reconstructor, press: Frame
 ) -> None:
     """It was 0 for any image once: the depth's gradient was compared with itself."""
     noise = np.random.default_rng(0).integers(0, 256, press.shape).astype(np.uint8)
@@ -80,7 +80,7 @@ def test_the_misfit_is_that_of_a_direct_computation(
 
 
 def test_the_image_of_a_surface_has_its_slopes(
-    closed_run: InPlaceRun, reconstructor: Reconstructor, press: Frame
+    closed_run: Run, reconstructor: Reconstructor, press: Frame
 ) -> None:
     height_map = reconstructor.depth(press)
     image = reconstructor.predict(height_map)

@@ -11,20 +11,15 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.in_place_session import (
-    InPlaceRun,
-    calibrate_closed_session,
-    expected_gain,
-    repaired,
-    with_background,
-)
+from gelpolight_core.calibration.in_place import BALLS, in_place_towards
+from gelpolight_core.calibration.in_place_session import expected_gain, with_background
 from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.in_place.calibration import require_open
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.session import Session, read_session
@@ -38,27 +33,27 @@ def held_back(session: Session, count: int) -> tuple[Session, tuple[str, ...]]:
 
 
 @pytest.fixture(scope="module")
-def held_back_run(closed_session: Session) -> tuple[InPlaceRun, tuple[str, ...]]:
+def held_back_run(closed_session: Session) -> tuple[Run, tuple[str, ...]]:
     """Return a calibration without two presses, and their names."""
     session, names = held_back(closed_session, 2)
-    return calibrate_closed_session(session), names
+    return calibrate(session), names
 
 
 def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(
-    closed_session: Session, closed_run: InPlaceRun
+    closed_session: Session, closed_run: Run
 ) -> None:
     first, *_ = closed_session.files("balls")
-    detected = closed_run.result.presses[0].ball
+    detected = closed_run.results[BALLS].result.presses[0].ball
     drawn = PlacedCircle(detected.x + 2.0, detected.y, detected.contact)
     decisions = replace(closed_session.decisions, balls={first.name: drawn})
     few = frozenset(f"balls/{path.name}" for path in closed_session.files("balls")[4:])
     few_session = replace(closed_session, decisions=replace(decisions, excluded=few))
-    with_drawn = calibrate_closed_session(few_session).result.presses[0].ball
+    with_drawn = calibrate(few_session).results[BALLS].result.presses[0].ball
     assert with_drawn.x == pytest.approx(detected.x + 2.0, abs=1.0)
 
 
 def test_presses_that_were_not_used_are_measured(
-    held_back_run: tuple[InPlaceRun, tuple[str, ...]], closed_session: Session
+    held_back_run: tuple[Run, tuple[str, ...]], closed_session: Session
 ) -> None:
     run, names = held_back_run
     reconstructor = Reconstructor(run.calibration)
@@ -81,9 +76,9 @@ def test_presses_that_were_not_used_are_measured(
 
 
 def test_normals_and_depth_have_the_signs_and_places_that_are_promised(
-    closed_run: InPlaceRun, closed_session: Session
+    closed_run: Run, closed_session: Session
 ) -> None:
-    name, x, y, contact, radius = closed_run.calibration.balls[0]
+    name, x, y, contact, radius = closed_run.calibration.data.balls[0]
     image = closed_session.image(closed_session.folder / "balls" / name)
     found = Reconstructor(closed_run.calibration).depth(image.rgb)
     height, width = image.rgb.shape[:2]
@@ -102,26 +97,26 @@ def test_normals_and_depth_have_the_signs_and_places_that_are_promised(
     assert np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).mean() < 2.0
 
 
-def test_figures_are_those_of_presses_left_out(closed_run: InPlaceRun) -> None:
+def test_figures_are_those_of_presses_left_out(closed_run: Run) -> None:
     figures = {f.key: f for t in closed_run.calibration.quality.values() for f in t.figures}
     assert figures["held_out_normal_deg"].value < 2.0
     assert figures["held_out_cap_percent"].value < 6.0
     assert figures["held_out_diameter_percent"].value < 3.0
     assert closed_run.calibration.verdict is not Verdict.FAIL
-    curve = closed_run.result.learning
+    curve = closed_run.results[BALLS].result.learning
     assert [n for n, _ in curve] == sorted({n for n, _ in curve})
     assert curve[-1][1] < curve[0][1]
-    gain = expected_gain(closed_run.result)
+    gain = expected_gain(closed_run.results[BALLS].result)
     assert gain is not None and 0.0 <= gain < 1.0
 
 
 def test_the_stated_errors_hold_on_presses_that_were_not_used(
-    held_back_run: tuple[InPlaceRun, tuple[str, ...]],
-    closed_run: InPlaceRun,
+    held_back_run: tuple[Run, tuple[str, ...]],
+    closed_run: Run,
     closed_session: Session,
 ) -> None:
     run, names = held_back_run
-    places = {ball[0]: ball[1:] for ball in closed_run.calibration.balls}
+    places = {ball[0]: ball[1:] for ball in closed_run.calibration.data.balls}
     within = []
     for name in names:
         x, y, contact, radius = places[name]
@@ -138,7 +133,7 @@ def test_the_stated_errors_hold_on_presses_that_were_not_used(
 
 
 def test_the_file_gives_the_same_depth(
-    closed_run: InPlaceRun, closed_session: Session, tmp_path: Path
+    closed_run: Run, closed_session: Session, tmp_path: Path
 ) -> None:
     path = tmp_path / "closed.gplcal"
     write_calibration(closed_run.calibration, path)
@@ -150,15 +145,13 @@ def test_the_file_gives_the_same_depth(
     first = Reconstructor(closed_run.calibration).depth(frame).depth_mm
     assert np.array_equal(Reconstructor(again).depth(frame).depth_mm, first)
     assert np.array_equal(Reconstructor(again, workers=1).depth(frame).depth_mm, first)
-    with pytest.raises(InputError, match="closed sensor"):
-        require_open(again, where="here")
+    with pytest.raises(InputError, match="another kind of sensor"):
+        _ = again.open_sensor
     with pytest.raises(InputError, match="not for full"):
         Reconstructor(again, model="full")
 
 
-def test_what_the_balls_have_not_shown_is_flagged(
-    closed_run: InPlaceRun, closed_session: Session
-) -> None:
+def test_what_the_balls_have_not_shown_is_flagged(closed_run: Run, closed_session: Session) -> None:
     reconstructor = Reconstructor(closed_run.calibration)
     frame = closed_session.averaged("background").rgb.copy()
     quiet = reconstructor.depth(frame)
@@ -181,7 +174,7 @@ def test_a_wrong_background_is_refused(closed_folder: Path, tmp_path: Path) -> N
         assert cv2.imwrite(str(path), cv2.resize(part, image.shape[1::-1]))
     session = read_session(folder)
     with pytest.raises(InputError, match="the background's"):
-        calibrate_closed_session(session)
+        calibrate(session)
 
 
 def test_a_set_without_any_ball_is_refused(closed_folder: Path, tmp_path: Path) -> None:
@@ -197,11 +190,11 @@ def test_a_set_without_any_ball_is_refused(closed_folder: Path, tmp_path: Path) 
         assert cv2.imwrite(str(path), image.astype(np.uint8 if top == 255 else np.uint16))
     session = read_session(folder)
     with pytest.raises(InputError, match=r"0 of \d+ images show a pressed ball"):
-        calibrate_closed_session(session)
+        calibrate(session)
 
 
 def test_a_new_background_and_new_presses_refresh_a_calibration(
-    closed_run: InPlaceRun, closed_session: Session
+    closed_run: Run, closed_session: Session
 ) -> None:
     old = closed_run.calibration
     background = closed_session.averaged("background")
@@ -216,19 +209,19 @@ def test_a_new_background_and_new_presses_refresh_a_calibration(
         f"balls/{p.name}" for p in closed_session.files("balls") if p.name not in keep
     )
     few = replace(closed_session, decisions=replace(closed_session.decisions, excluded=others))
-    mended = repaired(old, few)
-    assert len(mended.result.presses) == len(keep)
-    alone = calibrate_closed_session(few)
+    mended = calibrate(few, in_place_towards(old.data.in_place.coefficients))
+    assert len(mended.results[BALLS].result.presses) == len(keep)
+    alone = calibrate(few)
 
-    def error(run: InPlaceRun) -> float:
-        return float(np.mean([press.held_out.normal_deg for press in run.result.presses]))
+    def error(run: Run) -> float:
+        return float(
+            np.mean([press.held_out.normal_deg for press in run.results[BALLS].result.presses])
+        )
 
     assert error(mended) <= error(alone) + 0.1
 
 
-def test_drift_and_zero_work_without_optics(
-    closed_run: InPlaceRun, closed_session: Session
-) -> None:
+def test_drift_and_zero_work_without_optics(closed_run: Run, closed_session: Session) -> None:
     frame = closed_session.averaged("background").rgb
     assert background_shift(frame, closed_run.calibration).quality.verdict is Verdict.PASS
     new = zeroed(

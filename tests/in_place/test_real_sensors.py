@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core import Measurement, measure, read_image
-from gelpolight_core.calibration.in_place_session import calibrate_closed_session
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import InPlace, Session, read_session
 
@@ -32,7 +32,7 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None
     trained = {row["file"] for row in labels[1::4]}
     excluded = frozenset(f"balls/{p.name}" for p in session.files("balls") if p.name not in trained)
     training = replace(session, decisions=replace(session.decisions, excluded=excluded))
-    run = calibrate_closed_session(training)
+    run = calibrate(training)
     reconstructor, scale = (
         Reconstructor(run.calibration),
         (session.in_place or InPlace()).stated_scale,
@@ -68,7 +68,7 @@ def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data: Path) 
         if n % 3 or path.name in names
     }
     training = replace(session, decisions=replace(session.decisions, excluded=frozenset(excluded)))
-    reconstructor = Reconstructor(calibrate_closed_session(training).calibration)
+    reconstructor = Reconstructor(calibrate(training).calibration)
     for name in names:
         image = read_image(session.folder / "balls" / name)
 
@@ -92,9 +92,7 @@ def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data: Path)
     session = real_session(shared_data, "wedge-1")
     some = [path.name for path in session.files("balls")]
     excluded = frozenset(f"balls/{name}" for number, name in enumerate(some) if number % 4)
-    run = calibrate_closed_session(
-        replace(session, decisions=replace(session.decisions, excluded=excluded))
-    )
+    run = calibrate(replace(session, decisions=replace(session.decisions, excluded=excluded)))
     image = session.image(session.folder / "balls" / some[1])
     found = Reconstructor(run.calibration).depth(image.rgb)
     assert np.isfinite(found.depth_mm).all()

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.measure.press_check import to_image
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
+from gelpolight_core.calibration.in_place import BALLS
+from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -63,14 +63,14 @@ def housed_session(
 
 
 def test_a_region_gives_the_depth_of_the_membrane_alone_at_the_places_of_the_whole_image(
-    housed_session: Session, closed_run: InPlaceRun, closed_session: Session, tmp_path: Path
+    housed_session: Session, closed_run: Run, closed_session: Session, tmp_path: Path
 ) -> None:
-    run = calibrate_closed_session(housed_session)
+    run = calibrate(housed_session)
     path = tmp_path / "housed.gplcal"
     write_calibration(run.calibration, path)
     calibration = read_calibration(path)
     assert calibration.identity == run.calibration.identity != closed_run.calibration.identity
-    name = run.result.presses[0].name
+    name = run.results[BALLS].result.presses[0].name
     whole = housed_session.image(housed_session.folder / "balls" / name).rgb
     alone = closed_session.image(closed_session.folder / "balls" / name).rgb
     found = Reconstructor(calibration).depth(whole)
@@ -82,16 +82,16 @@ def test_a_region_gives_the_depth_of_the_membrane_alone_at_the_places_of_the_who
     assert found.y_mm == pytest.approx(wanted.y_mm + shift[1], abs=1e-6)
     table = calibration.table
     assert (table.u_px[0, 0], table.v_px[0, 0]) == pytest.approx((LEFT, TOP), abs=1e-3)
-    ball = run.result.presses[0].ball
-    place = np.array([run.calibration.balls[0][1:3]])
-    assert to_image(place, calibration)[0] == pytest.approx((ball.x + LEFT, ball.y + TOP))
+    ball = run.results[BALLS].result.presses[0].ball
+    place = np.array([run.calibration.data.balls[0][1:3]])
+    assert calibration.data.to_pixels(place)[0] == pytest.approx((ball.x + LEFT, ball.y + TOP))
 
 
 def test_a_region_beyond_the_image_is_refused(housed_session: Session) -> None:
     assert housed_session.in_place is not None
     beyond = replace(housed_session.in_place, region_px=(LEFT, TOP, 10_000, 60))
     with pytest.raises(InputError, match="is not inside the image"):
-        calibrate_closed_session(replace(housed_session, in_place=beyond))
+        calibrate(replace(housed_session, in_place=beyond))
 
 
 @pytest.fixture(scope="module")
@@ -110,21 +110,21 @@ def squeezed_session(
 
 
 def test_pixels_that_are_not_square_give_a_metric_map(
-    squeezed_session: Session, closed_run: InPlaceRun, tmp_path: Path
+    squeezed_session: Session, closed_run: Run, tmp_path: Path
 ) -> None:
-    run = calibrate_closed_session(squeezed_session)
+    run = calibrate(squeezed_session)
     path = tmp_path / "tall.gplcal"
     write_calibration(run.calibration, path)
-    name = run.result.presses[0].name
+    name = run.results[BALLS].result.presses[0].name
     image = squeezed_session.image(squeezed_session.folder / "balls" / name).rgb
     found = Reconstructor(read_calibration(path)).depth(image)
     assert np.diff(found.y_mm) == pytest.approx(np.diff(found.x_mm)[0])
-    assert found.depth_mm.shape == closed_run.result.model.grid.shape
+    assert found.depth_mm.shape == closed_run.results[BALLS].result.model.grid.shape
     for (_, *ball), (_, *wanted) in zip(
-        run.calibration.balls, closed_run.calibration.balls, strict=True
+        run.calibration.data.balls, closed_run.calibration.data.balls, strict=True
     ):
         assert ball == pytest.approx(wanted, abs=0.15)
-    ratios = [press.held_out.diameter_ratio for press in run.result.presses]
+    ratios = [press.held_out.diameter_ratio for press in run.results[BALLS].result.presses]
     assert np.median(ratios) == pytest.approx(1.0, abs=0.03)
 
 

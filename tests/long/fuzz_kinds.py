@@ -50,6 +50,7 @@ from gelpolight_core.sensor_calibration import (
     Calibration,
     FullModel,
     HandEdit,
+    OpenSensor,
     Provenance,
     sensor_stack,
 )
@@ -119,7 +120,7 @@ def _calibrations(folder: Path) -> tuple[bytes, ...]:
     camera = Camera(48, 40, 52.0, 52.0, 24.3, 19.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
     plane, sensor = (
         TopPlane((0.0, 0.0, 1.0), 39.0),
-        SensorData("T", 13.7, 14.0, 1.41, 0, 1.49, 40.0),
+        SensorData("T", 13.7, 14.0, 1.41, 0.0, 1.49, 40.0),
     )
     grid = build_resampling_table(
         camera, plane, sensor_stack(sensor, plane), working_diameter_mm=40.0
@@ -135,11 +136,12 @@ def _calibrations(folder: Path) -> tuple[bytes, ...]:
                         (edit,))  # fmt: skip
     files = []
     for model, more in (("paper", None), ("full", full)):
-        calibration = Calibration(
-            sensor, model, camera, plane, leds, np.tile(0.01 * np.eye(3), (3, 1, 1)), np.eye(3),
-            light, light, cosine_table(), np.full(3, 0.002), quality, origin, more,
+        data = OpenSensor(
+            sensor, camera, plane, leds, np.tile(0.01 * np.eye(3), (3, 1, 1)), np.eye(3),
+            light, light, cosine_table(), np.full(3, 0.002), more,
             None if more is None else gamma_response(2.2),
         )  # fmt: skip
+        calibration = Calibration(model, data, quality, origin)
         write_calibration(calibration, folder / "seed.gplcal")
         files.append((folder / "seed.gplcal").read_bytes())
     return tuple(files)

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board
 
-from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.open_sensor import LENS
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
@@ -158,11 +159,11 @@ def test_intrinsics_that_no_camera_has_are_recognised(camera: Camera, says: str)
 
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
 def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
-    shared_data: Path, rendered_optics: Callable[[str], StageResults], sensor: str
+    shared_data: Path, rendered_optics: Callable[[str], Results], sensor: str
 ) -> None:
     """Every length of the sensor depends on this one."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["camera"]
-    lens = rendered_optics(sensor).lens
+    lens = rendered_optics(sensor)[LENS]
     assert lens is not None
     assert lens.camera.fx == pytest.approx(truth["fx"], rel=1e-3)
     assert lens.camera.fy == pytest.approx(truth["fy"], rel=1e-3)

@@ -12,7 +12,8 @@ from boards import CAMERA, board_pose, render_board
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.open_sensor import TOP_POSE
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
@@ -168,13 +169,13 @@ def test_without_a_usable_image_the_reason_is_given() -> None:
 @pytest.mark.parametrize(("sensor", "normal_deg"), [("sensor-A", 0.05), ("sensor-B", 0.1)])
 def test_rendered_sessions_give_the_surface_with_our_own_lens(
     shared_data: Path,
-    rendered_optics: Callable[[str], StageResults],
+    rendered_optics: Callable[[str], Results],
     sensor: str,
     normal_deg: float,
 ) -> None:
     """0.1 % of the distance is 0.1 % of every length; 0.1 degrees moves a light by 0.1 mm."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["top_plane"]
-    result = rendered_optics(sensor).top_pose
+    result = rendered_optics(sensor)[TOP_POSE].pose
     assert result is not None
     x, y, z = truth["normal_camera"]
     plane = TopPlane((x, y, z), truth["offset_mm"])

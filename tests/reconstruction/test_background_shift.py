@@ -111,15 +111,15 @@ def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(
 def test_a_place_too_dim_for_the_calibration_stays_out_after_zeroing(
     small_calibration: Calibration, warm: list[Frame]
 ) -> None:
-    dim = small_calibration.radiance.copy()
+    dim = small_calibration.data.radiance.copy()
     rows, columns = (slice(n // 2, n // 2 + 5) for n in dim.shape[:2])
     dim[rows, columns, 1] *= 0.005 / dim[rows, columns, 1].max()
-    factors = small_calibration.factors.copy()
+    factors = small_calibration.data.factors.copy()
     factors[rows, columns] = 0.0
-    dull = replace(small_calibration, radiance=dim, factors=factors)
+    dull = small_calibration.changed(radiance=dim, factors=factors)
     new = zeroed(dull, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
-    assert not new.factors[rows, columns].any()
-    assert new.factors.any(axis=2).mean() > 0.9 * factors.any(axis=2).mean()
+    assert not new.data.factors[rows, columns].any()
+    assert new.data.factors.any(axis=2).mean() > 0.9 * factors.any(axis=2).mean()
 
 
 def test_zeroing_is_on_record_and_has_a_name_of_its_own(

@@ -69,7 +69,7 @@ def press(session: Path, name: str = PRESSES[0]) -> Map:
 
 def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> Solved:
     """Solve the whole grid at full scale."""
-    return NearLightSolver(calibration, workers=workers).depth(rgb, Wanted(everywhere=True))
+    return NearLightSolver(calibration.data, workers=workers).depth(rgb, Wanted(everywhere=True))
 
 
 @pytest.mark.parametrize("name", PRESSES)
@@ -109,11 +109,11 @@ def test_the_refined_leds_are_nearer_to_the_truth_than_the_mirrors(
     virtual_session: Path, virtual_calibration: Calibration
 ) -> None:
     """The housing states one height; the LEDs scatter about it by up to 0.2 mm."""
-    full = virtual_calibration.full
+    full = virtual_calibration.data.full
     assert full is not None
     leds = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in SensorDesign().leds])
     refined = np.linalg.norm(full.led_positions_mm - leds, axis=1)
-    mirror = np.linalg.norm(virtual_calibration.led_positions_mm - leds, axis=1)
+    mirror = np.linalg.norm(virtual_calibration.data.led_positions_mm - leds, axis=1)
     assert refined.mean() < mirror.mean()
     assert (refined < 0.12).all()
     truth = json.loads((virtual_session / "truth.json").read_text())

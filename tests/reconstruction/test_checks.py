@@ -118,7 +118,7 @@ def test_known_bad_pixels_are_left_out_of_the_solve() -> None:
     spoilt = frame.copy()
     spoilt[bad] = 255
     places = np.argwhere(bad).astype(np.int32)
-    known = replace(calibration, bad=BadPixels(places, height, width))
+    known = calibration.changed(bad=BadPixels(places, height, width))
     for effort in EFFORTS:
         reconstruct = Reconstructor(calibration, effort=effort)
         good = reconstruct.depth(frame)
@@ -140,7 +140,7 @@ def test_a_contact_on_the_rim_is_not_taken_for_another_sensor() -> None:
 def test_lights_in_one_plane_are_refused_with_their_condition() -> None:
     calibration = standard_sensor().calibration
     row = np.array([[-8.0, 0.1, -13.7], [0.0, 0.0, -13.7], [8.0, 0.0, -13.7]])
-    assert calibration.full is not None
-    flat = replace(calibration, full=replace(calibration.full, led_positions_mm=row))
+    assert calibration.data.full is not None
+    flat = calibration.changed(full=replace(calibration.data.full, led_positions_mm=row))
     with pytest.raises(InputError, match="condition"):
         Reconstructor(flat)

@@ -81,12 +81,12 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
     off: float,
 ) -> None:
     known = sensor(0.25)
-    full = known.calibration.full
+    full = known.calibration.data.full
     assert full is not None
     brighter = np.float32(1.1 / full.background.max())
     true = full.background * brighter
     filled = np.where(true > 1.0, off * true, true).astype(np.float32)
-    calibration = replace(known.calibration, full=replace(full, background=filled))
+    calibration = known.calibration.changed(full=replace(full, background=filled))
     solver = Reconstructor(calibration).solver
     frame = np.minimum(known.bare() * brighter, 1.0)
     assert (frame == 1.0).any(axis=2).sum() > 100
@@ -120,7 +120,7 @@ def test_with_any_camera_response_nothing_is_solved_while_nothing_is_pressed(mod
     if model == "bent":
         levels = np.linspace(0.0, 1.0, 256)
         response = CameraResponse(np.tile(levels**1.2, (3, 1)))
-        calibration = replace(calibration, response=response)
+        calibration = calibration.changed(response=response)
         frame = np.rint(255.0 * (frame / 255.0) ** (1.0 / 1.2)).astype(np.uint8)
     for effort in EFFORTS:
         found = Reconstructor(calibration, effort=effort).depth(frame)
@@ -131,7 +131,7 @@ def test_with_any_camera_response_nothing_is_solved_while_nothing_is_pressed(mod
 
 def test_a_calibration_whose_noise_hides_presses_says_so() -> None:
     known = sensor(0.25)
-    deaf = replace(known.calibration, noise=np.full(3, 0.2))
+    deaf = known.calibration.changed(noise=np.full(3, 0.2))
     press = known.pressed(Ball(4.0, 0.05), samples=1)
     for effort in EFFORTS:
         reconstruct = Reconstructor(deaf, effort=effort)

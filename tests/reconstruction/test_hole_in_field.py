@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from gelpolight_core.reconstruction.height_map import Flag
@@ -21,8 +19,8 @@ def test_a_hole_on_a_face_is_filled_in_and_flagged() -> None:
     deepest = np.unravel_index(np.argmax(whole), whole.shape)
     middle = np.median(np.argwhere(whole > 0.9 * whole[deepest]), axis=0).astype(int)
     hole = np.hypot(x - x[tuple(middle)], y - y[tuple(middle)]) < 0.8
-    factors = np.where(hole[..., None], np.float32(0.0), calibration.factors)
-    found = Reconstructor(replace(calibration, factors=factors)).depth(frame)
+    factors = np.where(hole[..., None], np.float32(0.0), calibration.data.factors)
+    found = Reconstructor(calibration.changed(factors=factors)).depth(frame)
     assert np.abs(found.depth_mm[hole] / whole[hole] - 1.0).max() < 0.03
     lost = int(Flag.OUTSIDE | Flag.INVALID)
     assert ((found.flags[hole] & lost) == lost).all()

@@ -111,7 +111,7 @@ def test_with_a_camera_that_is_not_linear_the_light_is_corrected_too(
     known: KnownSensor, press: KnownPress
 ) -> None:
     camera = replace(known.sensor.design.camera, response="gamma", gamma=2.2)
-    bent = replace(known.calibration, response=gamma_response(2.2))
+    bent = known.calibration.changed(response=gamma_response(2.2))
     for effort in ("best", "fast"):
         reconstructor = Reconstructor(bent, effort=effort)
         depths = []

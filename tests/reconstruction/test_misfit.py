@@ -76,7 +76,7 @@ def test_the_image_of_a_true_surface_is_that_of_the_camera(
     left = np.abs(Reconstructor(known.calibration).residual(frame, true)).mean(axis=-1)
     assert np.nanmedian(left[pressed]) < 1e-3
     assert np.nanmean(left[pressed]) < 0.015  # edges that the pixels blur
-    unmixed = Reconstructor(replace(known.calibration, crosstalk=np.eye(3)))
+    unmixed = Reconstructor(known.calibration.changed(crosstalk=np.eye(3)))
     wrong = np.abs(unmixed.residual(frame, true)).mean(axis=-1)
     assert np.nanmedian(wrong[pressed]) > 0.05
     too_flat = np.abs(Reconstructor(known.calibration).residual(frame, surface(0.8))).mean(axis=-1)

@@ -13,7 +13,7 @@ from gelpolight_core.reconstruction.paper.depth import PaperSolver, SlopeField
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 CALIBRATION = scene.calibration()
-SOLVER = PaperSolver(CALIBRATION, workers=1)
+SOLVER = PaperSolver(CALIBRATION.data, workers=1)
 TABLE = CALIBRATION.table
 
 

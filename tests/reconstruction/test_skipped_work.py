@@ -29,7 +29,7 @@ def test_skipped_work_changes_the_depth_by_no_more_than_stated(
     frame = known.noisy(known.pressed(Cylinder(3.0, height_mm), samples=1).frame)
     settings = {effort: replace(SETTINGS[effort], **without) for effort in EFFORTS}
     usual_solver, other_solver = (
-        NearLightSolver(known.calibration, workers=2, settings=s) for s in (SETTINGS, settings)
+        NearLightSolver(known.calibration.data, workers=2, settings=s) for s in (SETTINGS, settings)
     )
     for effort in EFFORTS:
         wanted = Wanted(effort, normals=False)

@@ -39,7 +39,7 @@ def whole(rgb: Map, virtual_calibration: Calibration) -> Solved:
 
 def solved(rgb: Map, calibration: Calibration, **left_out: bool | int) -> Solved:
     wanted = Wanted(terms=Terms(**left_out))  # type: ignore[arg-type]
-    return NearLightSolver(calibration, workers=2).depth(rgb, wanted)
+    return NearLightSolver(calibration.data, workers=2).depth(rgb, wanted)
 
 
 def scored(result: Solved, calibration: Calibration, session: Path) -> DepthScore:

@@ -17,7 +17,7 @@ from gelpolight_core.recording.recording import RecordingHeader
 @pytest.mark.parametrize("named", [True, False])
 def test_another_calibration_of_the_same_sensor_will_do(tmp_path: Path, named: bool) -> None:
     calibration = scene.calibration()
-    serial = calibration.sensor.serial if named else ""
+    serial = calibration.serial if named else ""
     header = RecordingHeader(serial=serial, calibration_id="an older one")
     shape = (calibration.camera.height, calibration.camera.width)
     write_recording(tmp_path / "a.gplrec", frames=1, shape=shape, header=header)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from app.calibrate.balls import judge_ball
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
-from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
+from gelpolight_core.calibration.open_sensor import LIGHTS, RADIANCE, TOP_POSE
+from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reflectance.agreement import PressAgreement, compare_presses
@@ -21,28 +22,26 @@ Map = np.ndarray
 ODD = "ball_01.png"
 
 
-def compared(results: StageResults, images: tuple[Map, ...]) -> tuple[PressAgreement, ...]:
-    assert results.table is not None and results.lights is not None
-    assert results.radiance is not None and results.factors is not None
+def compared(results: Results, images: tuple[Map, ...]) -> tuple[PressAgreement, ...]:
     return compare_presses(
-        results.presses,
+        results[BALLS].presses,
         images,
-        results.table,
-        results.lights.led_positions_mm,
-        results.radiance,
-        results.factors.factors,
+        results[TOP_POSE].table,
+        results[LIGHTS].leds.led_positions_mm,
+        results[RADIANCE],
+        results[REFLECTANCE].factors.factors,
     )
 
 
-def recomputed(project: CalibrationProject) -> StageStatus:
-    project.compute(Stage.BALLS)
-    return project.compute(Stage.REFLECTANCE)
+def recomputed(project: Project) -> StageStatus:
+    project.compute("balls")
+    return project.compute("reflectance")
 
 
-def test_good_presses_agree_with_each_other(small_project: CalibrationProject) -> None:
+def test_good_presses_agree_with_each_other(small_project: Project) -> None:
     results = small_project.results
-    found = compared(results, results.images)
-    assert len(found) == len(results.presses)
+    found = compared(results, results[BALLS].images)
+    assert len(found) == len(results[BALLS].presses)
     assert [a.fault for a in found] == [""] * len(found)
     assert max(a.radius_off_percent for a in found) < 8.0
     assert max(a.odd_share for a in found) < 0.05
@@ -50,7 +49,7 @@ def test_good_presses_agree_with_each_other(small_project: CalibrationProject) -
 
 @pytest.mark.parametrize("stated", [8.0, 3.0])
 def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
-    stated: float, computed_project: Callable[[], CalibrationProject]
+    stated: float, computed_project: Callable[[], Project]
 ) -> None:
     """The ball has a radius of 4 mm."""
     project = computed_project()
@@ -59,7 +58,7 @@ def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
     assert status.state is StageState.FAIL
     assert status.quality["press_radius_percent"].verdict is Verdict.FAIL
     assert ODD in status.sentence
-    reflectance = project.results.reflectance
+    reflectance = project.results[REFLECTANCE].table
     assert reflectance is not None
     (odd,) = [a for a in reflectance.agreements if a.fault]
     assert odd.name.endswith(ODD)
@@ -71,32 +70,30 @@ def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
     assert recomputed(project).quality["press_radius_percent"].verdict is Verdict.PASS
 
 
-def test_a_misplaced_circle_is_named(computed_project: Callable[[], CalibrationProject]) -> None:
+def test_a_misplaced_circle_is_named(computed_project: Callable[[], Project]) -> None:
     project = computed_project()
     results = project.results
-    assert results.table is not None
-    press = next(p for p in results.presses if p.name.endswith(ODD))
-    rows, columns = np.nonzero(contact_mask(press, results.table))
-    u = float(results.table.u_px[rows, columns].mean())
-    v = float(results.table.v_px[rows, columns].mean())
-    radius = float(np.ptp(results.table.u_px[rows, columns]) / 2.0)
+    press = next(p for p in results[BALLS].presses if p.name.endswith(ODD))
+    rows, columns = np.nonzero(contact_mask(press, results[TOP_POSE].table))
+    u = float(results[TOP_POSE].table.u_px[rows, columns].mean())
+    v = float(results[TOP_POSE].table.v_px[rows, columns].mean())
+    radius = float(np.ptp(results[TOP_POSE].table.u_px[rows, columns]) / 2.0)
     project.place_ball(ODD, PlacedCircle(u + radius, v, 1.3 * radius))
     status = recomputed(project)
     assert status.state is not StageState.PASS
-    reflectance = project.results.reflectance
+    reflectance = project.results[REFLECTANCE].table
     assert reflectance is not None
     assert [a.name for a in reflectance.agreements if a.fault] == [f"balls/{ODD}"]
 
 
-def test_dirt_on_a_contact_is_named(small_project: CalibrationProject) -> None:
+def test_dirt_on_a_contact_is_named(small_project: Project) -> None:
     results = small_project.results
-    assert results.table is not None
-    mask = contact_mask(results.presses[1], results.table)
+    mask = contact_mask(results[BALLS].presses[1], results[TOP_POSE].table)
     columns = np.nonzero(mask)[1]
     mask[:, : int(np.quantile(columns, 0.7))] = False
-    dirty = results.images[1].copy()
+    dirty = results[BALLS].images[1].copy()
     dirty[mask] *= 0.4
-    images = (results.images[0], dirty, *results.images[2:])
+    images = (results[BALLS].images[0], dirty, *results[BALLS].images[2:])
     (odd,) = [a for a in compared(results, images) if a.fault]
     assert odd.name.endswith(ODD)
     assert "dirt" in odd.fault

@@ -18,9 +18,10 @@ from report_pdf import report_data, report_text
 
 from app.command_line.main import MENDABLE, main
 from app.workspace.validation import Comparison, Validation, write_validation
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
 from gelpolight_core.report.build import calibration_report, run_report
@@ -28,7 +29,6 @@ from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.report.file import report_pdf, write_report
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import use_language
 
 NASTY = (
@@ -44,9 +44,9 @@ def small() -> Calibration:
 
 
 @pytest.fixture(scope="module")
-def whole(virtual_run: CalibrationRun, virtual_session: Path) -> Report:
+def whole(virtual_run: Run, virtual_session: Path) -> Report:
     """Return the whole report of the virtual session."""
-    return run_report(virtual_run, read_session(virtual_session))
+    return run_report(virtual_run)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def written(report: Report, folder: Path) -> Path:
 
 
 def test_programs_find_every_figure_of_every_stage_in_the_file(
-    virtual_run: CalibrationRun, whole_file: Path
+    virtual_run: Run, whole_file: Path
 ) -> None:
     data = report_data(whole_file)
     quality = virtual_run.calibration.quality
@@ -83,11 +83,11 @@ def test_programs_find_every_figure_of_every_stage_in_the_file(
     calibration = data["data"]["calibration"]
     assert calibration["identity"] == virtual_run.calibration.identity
     leds = np.array(calibration["led_positions_mm"])
-    assert (leds == virtual_run.calibration.led_positions_mm).all()
+    assert (leds == virtual_run.calibration.data.led_positions_mm).all()
 
 
 def test_the_pages_show_every_figure_drawing_and_source(
-    virtual_run: CalibrationRun, whole: Report, whole_file: Path
+    virtual_run: Run, whole: Report, whole_file: Path
 ) -> None:
     text = report_text(whole_file)
     for section in whole.sections:
@@ -114,7 +114,7 @@ def test_the_pages_are_a4(whole_file: Path) -> None:
 
 
 def test_a_german_report_has_the_same_numbers(
-    whole_file: Path, virtual_run: CalibrationRun, tmp_path: Path, german: None
+    whole_file: Path, virtual_run: Run, tmp_path: Path, german: None
 ) -> None:
     path = written(calibration_report(virtual_run.calibration), tmp_path)
     data, english = report_data(path), report_data(whole_file)
@@ -131,10 +131,10 @@ def test_too_few_presses_to_hold_any_out_are_reported(
     virtual_calibration: Calibration,
 ) -> None:
     """Nothing was compared: there is neither a loss nor a verdict on the refinement."""
-    full = virtual_calibration.full
+    full = virtual_calibration.data.full
     assert full is not None
     assert "Loss on held-out presses" in dict(stage_facts(virtual_calibration)["joint"])
-    few = replace(virtual_calibration, full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
+    few = virtual_calibration.changed(full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
     facts = dict(stage_facts(few)["joint"])
     assert "too few presses" in facts["LEDs used"]
     assert "Loss on held-out presses" not in facts
@@ -144,8 +144,7 @@ def test_texts_from_files_are_shown_and_never_obeyed(tmp_path: Path) -> None:
     c = small()
     figure = judge(NASTY, NASTY, float("nan"), NASTY, warn=1.0, remedy=NASTY)
     hostile = replace(
-        c,
-        sensor=replace(c.sensor, serial=NASTY),
+        c.changed(sensor=replace(c.data.sensor, serial=NASTY)),
         provenance=replace(c.provenance, operator=NASTY, created=NASTY, sources={NASTY: NASTY}),
         quality={NASTY: QualityTable((figure,))},
     )
@@ -227,13 +226,15 @@ def test_the_same_report_gives_the_same_file() -> None:
 
 
 def test_the_scatter_is_what_the_curves_were_fitted_to(
-    virtual_run: CalibrationRun, virtual_session: Path
+    virtual_run: Run, virtual_session: Path
 ) -> None:
-    scatter = gather_scatter(virtual_run, read_session(virtual_session))
-    assert scatter.names == tuple(p.name for p in virtual_run.reflectance.presses)
-    for k, fit in enumerate(virtual_run.reflectance.fits):
+    scatter = gather_scatter(virtual_run)
+    assert scatter.names == tuple(p.name for p in virtual_run.results[REFLECTANCE].table.presses)
+    for k, fit in enumerate(virtual_run.results[REFLECTANCE].table.fits):
         off = (
-            scatter.values[k] / virtual_run.reflectance.table.response(k, scatter.cosines[k]) - 1.0
+            scatter.values[k]
+            / virtual_run.results[REFLECTANCE].table.table.response(k, scatter.cosines[k])
+            - 1.0
         )
         # The spread is the robust standard deviation of exactly that; the factors were fed back
         # once.

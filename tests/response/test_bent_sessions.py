@@ -11,7 +11,9 @@ import pytest
 
 from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session
+from gelpolight_core.calibration.open_sensor import LIGHTS, RESPONSE
+from gelpolight_core.calibration.project import Run, calibrate
+from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.design.parts import Press, SessionDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -23,10 +25,10 @@ SCALE = 0.3
 PRESS = "presses/cylinder_s6_d100.png"
 DEFAULT = SensorDesign()
 
-Run = tuple[Path, CalibrationRun]
+Made = tuple[Path, Run]
 
 
-def calibrated(folder: Path, response: str, session: SessionDesign, model: str = "full") -> Run:
+def calibrated(folder: Path, response: str, session: SessionDesign, model: str = "full") -> Made:
     """Return a small session of the virtual sensor with another camera, and its calibration."""
     design = replace(
         DEFAULT,
@@ -36,41 +38,42 @@ def calibrated(folder: Path, response: str, session: SessionDesign, model: str =
         session=session,
     )
     simulate_session(design, folder / response, scale=SCALE)
-    return folder / response, calibrate_session(read_session(folder / response), model=model)
+    made = read_session(folder / response)
+    return folder / response, calibrate(made, recipe_of(made, model))
 
 
 @pytest.fixture(scope="module")
-def linear(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def linear(tmp_path_factory: pytest.TempPathFactory) -> Made:
     """Return the session of a linear camera, with an exposure series and single-LED images."""
     asked = SessionDesign(response_pictures=6, single_led=True)
     return calibrated(tmp_path_factory.mktemp("bent"), "linear", asked)
 
 
 @pytest.fixture(scope="module")
-def gamma(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def gamma(tmp_path_factory: pytest.TempPathFactory) -> Made:
     """Return the session of a camera with a declared gamma of 2.2."""
     return calibrated(tmp_path_factory.mktemp("bent"), "gamma", SessionDesign())
 
 
 @pytest.fixture(scope="module")
-def srgb(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def srgb(tmp_path_factory: pytest.TempPathFactory) -> Made:
     """Return the session of an sRGB camera whose response is only measured."""
     asked = SessionDesign(declares_response=False, response_pictures=6)
     return calibrated(tmp_path_factory.mktemp("bent"), "srgb", asked, model="paper")
 
 
-def raw(run: Run) -> np.ndarray:
+def raw(run: Made) -> np.ndarray:
     """Return the press as delivered by the camera, RGB."""
     return np.ascontiguousarray(cv2.imread(str(run[0] / PRESS))[..., ::-1])
 
 
-def test_known_camera_settings_are_reported(linear: Run, gamma: Run, srgb: Run) -> None:
+def test_known_camera_settings_are_reported(linear: Made, gamma: Made, srgb: Made) -> None:
     for (folder, run), source, left_out, declared in (
         (linear, "measured", True, False),
         (gamma, "declared", False, True),
         (srgb, "measured", False, False),
     ):
-        assert run.response.source == source
+        assert run.results[RESPONSE].source == source
         assert (run.calibration.response is None) is left_out
         assert ("[camera]" in (folder / "session.toml").read_text()) is declared
         assert next(iter(run.calibration.quality)) == "response"
@@ -78,7 +81,7 @@ def test_known_camera_settings_are_reported(linear: Run, gamma: Run, srgb: Run) 
 
 @pytest.mark.parametrize("model", ["paper", "full"])
 def test_bent_and_straight_cameras_see_the_same_depth(
-    linear: Run, gamma: Run, srgb: Run, model: str
+    linear: Made, gamma: Made, srgb: Made, model: str
 ) -> None:
     """5 um are half a percent of the press, the error of the full model on matt sensors."""
     straight = Reconstructor(linear[1].calibration, model=model).depth(raw(linear)).depth_mm
@@ -91,15 +94,15 @@ def test_bent_and_straight_cameras_see_the_same_depth(
         assert np.median(bent[top]) == pytest.approx(np.median(straight[top]), rel=0.005)
 
 
-def test_an_unmodelled_gamma_would_be_noticed(gamma: Run) -> None:
+def test_an_unmodelled_gamma_would_be_noticed(gamma: Made) -> None:
     """The test above can fail."""
     calibration = gamma[1].calibration
     right = Reconstructor(calibration).depth(raw(gamma)).depth_mm
-    wrong = Reconstructor(replace(calibration, response=None)).depth(raw(gamma)).depth_mm
+    wrong = Reconstructor(calibration.changed(response=None)).depth(raw(gamma)).depth_mm
     assert np.sqrt(np.mean((wrong - right) ** 2)) > 0.05
 
 
-def test_pixel_values_and_read_images_give_the_same_light(gamma: Run) -> None:
+def test_pixel_values_and_read_images_give_the_same_light(gamma: Made) -> None:
     folder, run = gamma
     read = read_image(folder / PRESS, response=run.calibration.response).rgb
     for model in ("paper", "full"):
@@ -110,7 +113,7 @@ def test_pixel_values_and_read_images_give_the_same_light(gamma: Run) -> None:
         np.testing.assert_allclose(reconstruct.depth(wide).depth_mm, from_numbers, atol=1e-4)
 
 
-def test_what_is_saturated_stays_saturated(gamma: Run) -> None:
+def test_what_is_saturated_stays_saturated(gamma: Made) -> None:
     from gelpolight_core.reconstruction.height_map import Flag
 
     bright = raw(gamma).copy()
@@ -121,7 +124,7 @@ def test_what_is_saturated_stays_saturated(gamma: Run) -> None:
         assert ((flags & int(Flag.SATURATED)) != 0).sum() > 25
 
 
-def test_noise_is_judged_alike(linear: Run, gamma: Run, srgb: Run) -> None:
+def test_noise_is_judged_alike(linear: Made, gamma: Made, srgb: Made) -> None:
     """Steps of a non-linear scale are up to twice as wide where bright, and finer where dark."""
     straight = linear[1].calibration.noise
     for _, run in (gamma, srgb):
@@ -130,7 +133,7 @@ def test_noise_is_judged_alike(linear: Run, gamma: Run, srgb: Run) -> None:
         ).all()
 
 
-def test_the_curve_is_the_camera_s_to_a_third_of_a_percent(srgb: Run) -> None:
+def test_the_curve_is_the_camera_s_to_a_third_of_a_percent(srgb: Made) -> None:
     found = srgb[1].calibration.response
     assert found is not None
     encoded = np.linspace(0.0, 1.0, found.curves.shape[1])
@@ -138,17 +141,17 @@ def test_the_curve_is_the_camera_s_to_a_third_of_a_percent(srgb: Run) -> None:
     assert np.abs(found.curves - truth).max() < 0.0033
 
 
-def test_crosstalk_comes_from_single_led_images_if_there_are_any(linear: Run, gamma: Run) -> None:
+def test_crosstalk_comes_from_single_led_images_if_there_are_any(linear: Made, gamma: Made) -> None:
     truth = np.array(DEFAULT.photometry.crosstalk)
-    assert linear[1].crosstalk.source == "single_led"
-    assert gamma[1].crosstalk.source == "mirror"
+    assert linear[1].results[LIGHTS].crosstalk.source == "single_led"
+    assert gamma[1].results[LIGHTS].crosstalk.source == "mirror"
     # One grey level in 250 of the brightest pixels.
-    assert np.abs(linear[1].calibration.crosstalk - truth).max() < 0.002
-    assert linear[1].crosstalk.quality["crosstalk_difference_percent"].value < 1.0
+    assert np.abs(linear[1].calibration.data.crosstalk - truth).max() < 0.002
+    assert linear[1].results[LIGHTS].crosstalk.quality["crosstalk_difference_percent"].value < 1.0
 
 
 def test_the_response_is_stored_in_the_file_and_changes_the_identity(
-    gamma: Run, tmp_path: Path
+    gamma: Made, tmp_path: Path
 ) -> None:
     before = gamma[1].calibration
     write_calibration(before, tmp_path / "c.gplcal")
@@ -157,11 +160,11 @@ def test_the_response_is_stored_in_the_file_and_changes_the_identity(
     assert after.response is not None
     np.testing.assert_array_equal(after.response.curves, before.response.curves)
     assert after.identity == before.identity
-    assert replace(before, response=None).identity != before.identity
+    assert before.changed(response=None).identity != before.identity
 
 
 def test_commands_undo_the_response(
-    linear: Run, gamma: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    linear: Made, gamma: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     heights = []
     for number, (folder, run) in enumerate((linear, gamma)):

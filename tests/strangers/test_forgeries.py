@@ -22,7 +22,7 @@ from app.workspace.validation import read_validation
 from app.workspace.workspace import Workspace, folder_name
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.design.sensor_design import read_design
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.npy import array_of
@@ -310,7 +310,7 @@ def test_a_pipe_in_a_session_is_not_waited_for(tmp_path: Path, name: str) -> Non
     (tmp_path / "session.toml").write_text(sessions_toml(""))
     (tmp_path / name).parent.mkdir(exist_ok=True)
     os.mkfifo(tmp_path / name)
-    project = CalibrationProject(tmp_path)
+    project = Project(tmp_path)
     if name != "decisions.toml":
         with pytest.raises(InputError):
             project.statuses()

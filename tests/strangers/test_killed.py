@@ -63,7 +63,7 @@ for number, press in enumerate(run.wanted):
     write_indenters(first_indenters()[number % 3 :], workspace.folder)
     progress("indenters", number % 3)
     path = workspace.calibration_path("T-1", f"c{number}")
-    write_calibration(replace(made, noise=made.noise * (number + 1)), path)
+    write_calibration(made.changed(noise=made.noise * (number + 1)), path)
     workspace.use(path)
     progress("calibration", path.name)
 """

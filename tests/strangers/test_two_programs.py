@@ -29,8 +29,7 @@ from recorded import noisy
 from written import RECORD, calibration
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
 
 root, who, rounds = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
@@ -38,17 +37,17 @@ workspace = Workspace(root / "workspace")
 source = root / who / "c.gplcal"  # the other one imports a file of the same name
 source.parent.mkdir()
 made = calibration()
-write_calibration(replace(made, noise=made.noise * (1 + (who == "b"))), source)
+write_calibration(made.changed(noise=made.noise * (1 + (who == "b"))), source)
 print("ready", flush=True)
 sys.stdin.readline()
-project = CalibrationProject(root / "session")
+project = Project(root / "session")
 done = {"captures": [], "records": [], "refused": []}
 for number in range(rounds):
     try:
         workspace.use(workspace.import_calibration(source))
-        done["captures"].append(project.add_capture(Stage.BALLS, [noisy(number)]))
+        done["captures"].append(project.add_capture("balls", [noisy(number)]))
         done["records"].append(workspace.records.add(RECORD))
-        project.exclude(Stage.BALLS, done["captures"][-1], True)
+        project.exclude("balls", done["captures"][-1], True)
     except InputError as error:
         done["refused"].append(str(error))
 print(json.dumps(done))

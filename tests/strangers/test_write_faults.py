@@ -13,8 +13,7 @@ import pytest
 from recorded import noisy
 
 from app.workspace.indenters import first_indenters, read_indenters, write_indenters
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import NameTakenError, write_atomically
@@ -42,12 +41,12 @@ def session(tmp_path: Path) -> Path:
 
 
 def test_two_programs_that_capture_into_one_session_keep_both_images(session: Path) -> None:
-    one, two = CalibrationProject(session), CalibrationProject(session)
+    one, two = Project(session), Project(session)
     one._next_name = lambda folder, suffix=".png": "ball_001.png"  # type: ignore[method-assign]
-    assert one.add_capture(Stage.BALLS, [noisy(1)]) == "ball_001.png"
+    assert one.add_capture("balls", [noisy(1)]) == "ball_001.png"
     names = iter(["ball_001.png", "ball_002.png"])  # it looked before the other one had written
     two._next_name = lambda folder, suffix=".png": next(names)  # type: ignore[method-assign]
-    assert two.add_capture(Stage.BALLS, [noisy(2)]) == "ball_002.png"
+    assert two.add_capture("balls", [noisy(2)]) == "ball_002.png"
     assert len(list((session / "balls").iterdir())) == 2
 
 
@@ -88,7 +87,7 @@ def test_a_strangers_session_leads_no_writer_out_of_its_folder(
     before = {p.name: p.read_bytes() for p in outside.iterdir()}
     (session / name).unlink(missing_ok=True)
     (session / name).symlink_to(target)
-    project = CalibrationProject(session)
+    project = Project(session)
     with pytest.raises(InputError, match="a link that points outside the folder"):
         match name:
             case "decisions.toml":
@@ -96,7 +95,7 @@ def test_a_strangers_session_leads_no_writer_out_of_its_folder(
             case "session.toml":
                 project.set_ball_radius("a.png", 2.0)
             case _:
-                project.add_capture(Stage.BALLS, [noisy(1)])
+                project.add_capture("balls", [noisy(1)])
     assert {p.name: p.read_bytes() for p in outside.iterdir()} == before
 
 

@@ -72,8 +72,8 @@ def _import(folder: Path, which: int) -> None:
         path = folder / "elsewhere" / f"{k}.gplcal"
         if not path.exists():
             path.parent.mkdir(exist_ok=True)
-            sensor = replace(calibration().sensor, serial=f"S-{k}")
-            write_calibration(replace(calibration(), sensor=sensor), path)
+            sensor = replace(calibration().data.sensor, serial=f"S-{k}")
+            write_calibration(calibration().changed(sensor=sensor), path)
             write_validation(TRIAL, path)
     (folder / "library" / "sensors" / "S-1").mkdir(parents=True, exist_ok=True)
     Workspace(folder / "library").import_calibration(source)
@@ -180,7 +180,7 @@ def heightmap(depth_mm: float) -> HeightMap:
 
 KINDS = (
     Written("calibration", lambda f, k: write_calibration(
-        replace(calibration(), noise=np.full(3, 1e-3 * (k + 1))), f / "c.gplcal")),
+        calibration().changed(noise=np.full(3, 1e-3 * (k + 1))), f / "c.gplcal")),
     Written("library", _import),
     Written("calibration in use", _workspace),
     Written("validation", lambda f, k: write_validation(

@@ -20,16 +20,24 @@ from unittest.mock import patch
 import numpy as np
 
 from gelpolight_core.calibration import joint
-from gelpolight_core.calibration.pipeline import assemble
-from gelpolight_core.calibration.refinement import bare_calibration, refine
-from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.open_sensor import LIGHTS
+from gelpolight_core.calibration.project import assemble
+from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipes import PAPER as PAPER_RECIPE
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.score import score_depth, scored_radius_mm
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import Session, read_session
-from tests.studies.presses import TruePress, folder_named, show, stage_results, true_presses
+from tests.studies.presses import (
+    TruePress,
+    folder_named,
+    full_calibration,
+    show,
+    stage_results,
+    true_presses,
+)
 
 PAPER = "paper's model"
 TERMS = {
@@ -75,7 +83,7 @@ VARIANTS = (*TERMS, *REFINEMENTS, RAW, PAPER)
 
 def ablate(
     session: Session,
-    results: StageResults,
+    results: Results,
     presses: list[TruePress],
     names: Sequence[str] = VARIANTS,
 ) -> Iterator[dict[str, Any]]:
@@ -111,16 +119,14 @@ def ablate(
         }
 
 
-def _solvers(
-    session: Session, results: StageResults, names: Sequence[str]
-) -> dict[str, Reconstructor]:
+def _solvers(session: Session, results: Results, names: Sequence[str]) -> dict[str, Reconstructor]:
     """Return the reconstructor of each variant; one that no reconstruction accepts is named."""
-    whole = bare_calibration(session, refine(session, results))
+    whole = full_calibration(session, results)
     solvers = {}
     for name in names:
         try:
             if name == PAPER:
-                paper = assemble(session, results, model="paper").calibration
+                paper = assemble(PAPER_RECIPE, session, results).calibration
                 solvers[name] = Reconstructor(paper, model="paper")
             elif name in TERMS:
                 solvers[name] = Reconstructor(whole, terms=TERMS[name])
@@ -131,15 +137,16 @@ def _solvers(
     return solvers
 
 
-def _refined(session: Session, results: StageResults, name: str) -> Calibration:
+def _refined(session: Session, results: Results, name: str) -> Calibration:
     """Refine without a term of the membrane or the LEDs."""
     if name == RAW:
-        assert results.crosstalk is not None
-        results = replace(results, crosstalk=replace(results.crosstalk, matrix=np.eye(3)))
-        return bare_calibration(session, refine(session, results))
+        lights = results[LIGHTS]
+        none = replace(lights.crosstalk, matrix=np.eye(3))
+        results = results.having(LIGHTS, replace(lights, crosstalk=none))
+        return full_calibration(session, results)
     function, change = REFINEMENTS[name]
     with patch.object(joint, function, partial(change, getattr(joint, function))):
-        return bare_calibration(session, refine(session, results))
+        return full_calibration(session, results)
 
 
 if __name__ == "__main__":

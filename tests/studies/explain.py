@@ -19,7 +19,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.calibration.board_reflectance import BesideBoard
-from gelpolight_core.calibration.file import read_open_calibration
+from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
@@ -116,14 +116,14 @@ def explain(
     calibration: Calibration, presses: list[TruePress]
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], float, float]:
     """Return height errors by press, light by side and slope, and both reflectances."""
-    full = calibration.full
+    full = calibration.data.full
     assert full is not None
-    solver = NearLightSolver(calibration, workers=2)
+    solver = NearLightSolver(calibration.data, workers=2)
     losses, parts = [], []
     for press in presses:
         solved = solver.solved(press.frame, Wanted("fast"))
         assert solved is not None
-        losses.append(_loss(press, solved, scored_radius_mm(calibration.sensor)))
+        losses.append(_loss(press, solved, scored_radius_mm(calibration.data.sensor)))
         # Walls mirror even distant membrane: light is gathered from the whole field.
         whole = solver.solved(press.frame, Wanted("fast", everywhere=True))
         assert whole is not None
@@ -131,8 +131,13 @@ def explain(
     values = np.concatenate(parts)
     steep = values[values[:, 1] >= STEEP_DEG]
     rest, reflected = steep[:, 2] - steep[:, 3], steep[:, 5]
-    usable = calibration.table.valid & (calibration.factors > 0.0).all(axis=-1)
-    light = full.background, calibration.radiance, calibration.crosstalk, full.led_positions_mm
+    usable = calibration.table.valid & (calibration.data.factors > 0.0).all(axis=-1)
+    light = (
+        full.background,
+        calibration.data.radiance,
+        calibration.data.crosstalk,
+        full.led_positions_mm,
+    )
     board = BesideBoard.of(calibration.table, usable, *light)
     return (
         losses,
@@ -225,7 +230,7 @@ def _in_bands(values: np.ndarray) -> Iterator[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    calibrated = read_open_calibration(folder_named(1))
+    calibrated = read_calibration(folder_named(1))
     heights, lights, needed, measured = explain(
         calibrated, true_presses(read_session(folder_named(2)))
     )

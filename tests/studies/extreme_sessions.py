@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
@@ -116,7 +116,7 @@ def _measured(change: Change, scale: float = SCALE) -> Seen:
         folder = Path(temporary) / "session"
         shutil.copytree(Path(_base(scale).name) / "session", folder)
         change(folder)
-        run = calibrate_session(read_session(folder))
+        run = calibrate(read_session(folder))
         image = next((folder / "presses").glob("*.png"))
         frame, _ = read_raw_image(image)
     tables = run.calibration.quality.values()

@@ -132,7 +132,7 @@ def _rms_um(sensor: VirtualSensor, leds_mm: np.ndarray, surface: PressedSurface)
     except InputError:
         return None
     truth = TrueDepth(surface.depth_mm, surface.x_mm, surface.y_mm)
-    radius_mm = scored_radius_mm(known.calibration.sensor)
+    radius_mm = scored_radius_mm(known.calibration.data.sensor)
     places = found.depth_mm, found.x_mm, found.y_mm
     return score_depth(*places, truth, height_mm=DEPTH_MM, radius_mm=radius_mm).rms_um
 

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.pipeline import stages_of
-from gelpolight_core.calibration.results import StageResults
-from gelpolight_core.calibration.stages import run_stage
+from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipes import PAPER
+from gelpolight_core.calibration.refinement import refine, sensor_data
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.score import TrueDepth, read_true_depth
+from gelpolight_core.sensor_calibration import Calibration, Provenance
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import Session
 
@@ -43,13 +43,19 @@ def true_presses(session: Session, most: int | None = None) -> list[TruePress]:
     ]
 
 
-def stage_results(session: Session) -> StageResults:
+def stage_results(session: Session) -> Results:
     """Return the results of the stages of the paper's model."""
-    results = StageResults()
-    for stage in stages_of("paper"):
-        print(Stage(stage).value, file=sys.stderr)
-        results = run_stage(stage, session, results)
+    results = Results()
+    for stage in PAPER.stages:
+        print(stage.key, file=sys.stderr)
+        results = PAPER.run(stage, session, results)
     return results
+
+
+def full_calibration(session: Session, results: Results) -> Calibration:
+    """Return the calibration of these results after a joint refinement, without figures."""
+    data = sensor_data(session, results, refine(session, results))
+    return Calibration("full", data, {}, Provenance("", "", "", "", {}))
 
 
 def show(rows: Iterable[Mapping[str, Any]]) -> None:

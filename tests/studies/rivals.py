@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from gelpolight_core.calibration.refinement import bare_calibration, refine
-from gelpolight_core.calibration.results import StageResults, need
+from gelpolight_core.calibration.ball_stage import BALLS
+from gelpolight_core.calibration.open_sensor import BACKGROUND, TOP_POSE
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.measurement.score import score_depth, scored_radius_mm
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
@@ -28,7 +29,14 @@ from gelpolight_core.reflectance.press import BallPress, contact_mask
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 from tests.studies.integrators import shifted_cosine_transform
-from tests.studies.presses import TruePress, folder_named, show, stage_results, true_presses
+from tests.studies.presses import (
+    TruePress,
+    folder_named,
+    full_calibration,
+    show,
+    stage_results,
+    true_presses,
+)
 
 Predict = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """From relative changes (N, 3) and positions in mm (N, 2) to slopes (N, 2)."""
@@ -60,12 +68,12 @@ def relative_change(light: np.ndarray, background: np.ndarray) -> np.ndarray:
     return np.where(lit, light / np.where(lit, background, 1.0) - 1.0, 0.0).astype(np.float32)
 
 
-def ball_samples(results: StageResults) -> Samples:
+def ball_samples(results: Results) -> Samples:
     """Return the pixels of all ball presses, inside and far outside the contact."""
-    table, background = need(results.table, "balls"), need(results.background, "balls")
+    table, background, balls = results[TOP_POSE].table, results[BACKGROUND].light, results[BALLS]
     parts = [
         _samples_of(number, press, relative_change(image, background), table)
-        for number, (press, image) in enumerate(zip(results.presses, results.images, strict=True))
+        for number, (press, image) in enumerate(zip(balls.presses, balls.images, strict=True))
     ]
     return Samples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
@@ -213,12 +221,12 @@ FITS = {"table": fit_table, "polynomial": fit_polynomial, "network": fit_network
 
 
 def compare(
-    full: Calibration, results: StageResults, presses: list[TruePress], fits: Any = FITS
+    full: Calibration, results: Results, presses: list[TruePress], fits: Any = FITS
 ) -> Iterator[dict[str, Any]]:
     """Yield the errors of each method on the presses; `full` is the calibration by `results`."""
-    table, background = full.table, need(results.background, "balls")
+    table, background = full.table, results[BACKGROUND].light
     grid, valid = table.grid, table.valid
-    radius_mm = scored_radius_mm(full.sensor)
+    radius_mm = scored_radius_mm(full.data.sensor)
     samples = ball_samples(results)
     solver = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm)
 
@@ -265,5 +273,6 @@ def compare(
 
 if __name__ == "__main__":
     own = read_session(folder_named())
-    found = refine(own, stage_results(own))
-    show(compare(bare_calibration(own, found), found, true_presses(own)))
+    found = stage_results(own)
+    made = full_calibration(own, found)
+    show(compare(made, found, true_presses(own)))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 from tests.studies import ablation, explain, integrators, rivals
@@ -16,7 +16,7 @@ from tests.studies.presses import show, true_presses
 
 
 def test_terms_are_worth_what_they_correct(
-    virtual_session: Path, virtual_results: StageResults, capsys: pytest.CaptureFixture[str]
+    virtual_session: Path, virtual_results: Results, capsys: pytest.CaptureFixture[str]
 ) -> None:
     session = read_session(virtual_session)
     names = ("all terms", "light for depth 0 only", ablation.PAPER, "no glossy lobe")
@@ -41,7 +41,7 @@ def test_the_virtual_sensors_light_is_direct_and_integration_loses_next_to_nothi
 
 
 def test_no_rival_reaches_the_full_model_and_wrong_eigenvalues_spoil_all(
-    virtual_session: Path, virtual_results: StageResults, virtual_calibration: Calibration
+    virtual_session: Path, virtual_results: Results, virtual_calibration: Calibration
 ) -> None:
     fits = {"table": rivals.fit_table, "polynomial": rivals.fit_polynomial}
     presses = true_presses(read_session(virtual_session), 2)

@@ -97,7 +97,7 @@ def test_every_press_is_timed_and_scored_in_every_mode(
 def test_a_calibration_of_the_papers_model_has_this_mode_only(
     two_presses: Path, virtual_calibration: Calibration
 ) -> None:
-    paper = replace(virtual_calibration, model="paper", full=None)
+    paper = replace(virtual_calibration, model="paper").changed(full=None)
     points = measure_session(two_presses, paper, repeats=1)
     assert [point.mode for point in points] == ["paper"]
 
@@ -116,7 +116,7 @@ def test_the_virtual_sensor_is_calibrated_at_each_width(
     monkeypatch.setattr(work_precision, "simulate_session", simulate)
     monkeypatch.setattr(
         work_precision,
-        "calibrate_session",
+        "calibrate",
         lambda *_, **__: SimpleNamespace(calibration=small_calibration),
     )
     shares: list[float] = []
@@ -155,7 +155,9 @@ def test_what_cannot_be_measured_is_refused_before_the_work(
 def test_presses_of_another_sensor_are_refused(
     two_presses: Path, virtual_calibration: Calibration
 ) -> None:
-    other = replace(virtual_calibration, sensor=replace(virtual_calibration.sensor, serial="other"))
+    other = virtual_calibration.changed(
+        sensor=replace(virtual_calibration.data.sensor, serial="other")
+    )
     with pytest.raises(InputError, match="other"):
         measure_session(two_presses, other)
     with pytest.raises(InputError, match="other"):

@@ -16,8 +16,9 @@ from app.calibrate.reflectance.lut_model import Curve, CurveEdit, start_edit, wi
 from app.services.jobs import Job
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
+from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.session.decisions import Point
@@ -56,8 +57,8 @@ class Curves(QWidget):
     def show_results(self) -> None:
         """Show the present curves, or explain why there are none yet."""
         project = self._model.project
-        present = project.results.reflectance
-        if present is None or Stage.REFLECTANCE in project.stale():
+        present = project.results.get(REFLECTANCE)
+        if present is None or "reflectance" in project.stale():
             self.close_editor()
             self._made_of = None
             waits = self._model.jobs.busy
@@ -69,7 +70,7 @@ class Curves(QWidget):
                 )
             )
             return
-        made_of = present, project.results.balls
+        made_of = present, project.results.get(BALLS)
         if self._made_of is not None and all(map(is_, made_of, self._made_of)):
             return
         self._made_of = made_of
@@ -114,7 +115,7 @@ class Curves(QWidget):
     def _on_edit(self, fitted: CurveEdit, text: str, before: CurveEdit, after: CurveEdit) -> None:
         self._model.correct(
             text, partial(self._put, fitted, after), partial(self._put, fitted, before),
-            Stage.REFLECTANCE,
+            "reflectance",
         )  # fmt: skip
 
     def _put(self, fitted: CurveEdit, state: CurveEdit) -> None:
@@ -142,11 +143,11 @@ def _curves(nodes: Nodes) -> dict[int, Curve]:
     }
 
 
-def _gather(project: CalibrationProject) -> Material:
-    known = project.statuses()[Stage.JOINT].state in (StageState.PASS, StageState.WARN)
-    run = project.finish(model="full" if known else "paper")
-    session = project.session
-    fitted = start_edit(project.results.reflectance.table)
-    scatter = gather_scatter(run, session)
+def _gather(project: Project) -> Material:
+    known = project.statuses()["joint"].state in (StageState.PASS, StageState.WARN)
+    run = project.finish(None if known else PAPER)
+    session = run.session
+    fitted = start_edit(run.results[REFLECTANCE].table.table)
+    scatter = gather_scatter(run)
     edited = _curves(dict(session.decisions.curves))
-    return fitted, with_curves(fitted, edited), scatter, ball_effect(run, session)
+    return fitted, with_curves(fitted, edited), scatter, ball_effect(run)

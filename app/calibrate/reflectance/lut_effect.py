@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.calibrate.reflectance.lut_model import CurveEdit
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import edited
-from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.calibration.project import Run
+from gelpolight_core.calibration.recipes import JOINT
 from gelpolight_core.reconstruction.reconstructor import SOLVERS
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.session.images import read_image
-from gelpolight_core.session.session import Session
 
 Array = NDArray[np.float64]
 REACH = 2.0
@@ -59,41 +60,40 @@ class Effect:
         return self.profile_mm - self.sphere_mm
 
 
-def ball_effect(run: CalibrationRun, session: Session) -> Callable[[CurveEdit, str], Effect]:
+def ball_effect(run: Run) -> Callable[[CurveEdit, str], Effect]:
     """Return a function of (state, name of press) that reconstructs the press with those curves.
 
     Parameters
     ----------
-    run : CalibrationRun
+    run : Run
         Gives the presses and everything except the curves.
-    session : Session
-        Session with the ball images.
     """
     calibration = run.calibration
     wanted = Wanted(effort=EFFORTS[0], normals=False, everywhere=True)
 
     @lru_cache(maxsize=2)
     def frame(name: str) -> NDArray[np.float32]:
-        return read_image(session.folder / name, response=calibration.response).rgb
+        return read_image(run.session.folder / name, response=calibration.response).rgb
 
     def effect(edit: CurveEdit, name: str) -> Effect:
         curves = {
             k: (np.array(c.curve.cosines), np.array(c.curve.values)) for k, c in enumerate(edit)
         }
         changed = edited(calibration, curves, operator="", made="")
-        solver = SOLVERS[calibration.model](changed, workers=1)
+        solver = SOLVERS[calibration.model](changed.data, workers=1)
         return _compare(solver.depth(frame(name), wanted).depth_mm.astype(np.float64), name, run)
 
     return effect
 
 
-def _compare(depth: Array, name: str, run: CalibrationRun) -> Effect:
+def _compare(depth: Array, name: str, run: Run) -> Effect:
     """Compare with the ball where the model shows it."""
-    press = next(press for press in run.reflectance.presses if press.name == name)
+    press = next(press for press in run.results[REFLECTANCE].table.presses if press.name == name)
     table = run.calibration.table
     grid, pose, contact = table.grid, press.pose, press.contact_radius_mm
-    if run.joint is not None and name in run.joint.ball_names:
-        pose = run.joint.balls[run.joint.ball_names.index(name)]
+    joint = run.results.get(JOINT)
+    if joint is not None and name in joint.refined.ball_names:
+        pose = joint.refined.balls[joint.refined.ball_names.index(name)]
         centre = np.asarray(pose.centre_mm)
     else:
         # The paper's model shows it straight below the seen contact.

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QWidget
 
 from app.calibrate.step import StepPresenter
-from app.calibrate.step_data import Step
-from gelpolight_core.calibration.inputs import Stage
+from app.calibrate.step_data import step_of
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -22,10 +22,8 @@ class ReflectanceStep(StepPresenter):
     opens_slowly = True
     only_shows = True
 
-    step = Step(
-        "reflectance",
-        tr("Reflectance"),
-        (Stage.REFLECTANCE,),
+    step = step_of(
+        REFLECTANCE,
         tr(
             "Check the curves that were fitted to the ball presses. Correct them by hand "
             "where dirt or shadows have distorted them."

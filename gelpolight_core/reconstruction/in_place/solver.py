@@ -17,7 +17,7 @@ from gelpolight_core.reconstruction.height_map import (
     normals_from_slopes,
     surface_slopes,
 )
-from gelpolight_core.reconstruction.in_place.calibration import MODEL, InPlaceCalibration
+from gelpolight_core.reconstruction.in_place.calibration import MODEL, ClosedSensor
 from gelpolight_core.reconstruction.in_place.depth import depth_of
 from gelpolight_core.reconstruction.in_place.inverse import Inverse, inverse
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
@@ -54,7 +54,7 @@ class InPlaceSolver:
 
     Parameters
     ----------
-    calibration : InPlaceCalibration
+    calibration : ClosedSensor
         The sensor's.
     workers : int, optional
         Threads; results do not depend on their number.
@@ -63,13 +63,13 @@ class InPlaceSolver:
     made_for: ClassVar[tuple[str, ...]] = (MODEL,)
     visible_mm = None
 
-    def __init__(self, calibration: InPlaceCalibration, *, workers: int = 2) -> None:
+    def __init__(self, calibration: ClosedSensor, *, workers: int = 2) -> None:
         self.calibration = calibration
         self._model = calibration.in_place
         self._threads = RowWorkers(workers)
 
     @staticmethod
-    def refuse_unfit(calibration: InPlaceCalibration) -> None:
+    def refuse_unfit(calibration: ClosedSensor) -> None:
         """Refuse nothing: a closed sensor's calibration has one model."""
 
     def check(self, frame: NDArray[Any], *, whole: bool = False) -> None:

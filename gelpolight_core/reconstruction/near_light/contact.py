@@ -21,7 +21,7 @@ from gelpolight_core.reconstruction.integration.poisson import good_length
 from gelpolight_core.reconstruction.near_light.sampling import block_means
 from gelpolight_core.reconstruction.near_light.structures import Region, Scale
 from gelpolight_core.reconstruction.threads import RowWorkers
-from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 
 Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -214,7 +214,7 @@ def margin_mm(full: FullModel) -> float:
     return max(MARGIN_DECAYS * full.decay_mm, LEAST_MARGIN_MM)
 
 
-def contact_finder(calibration: Calibration, full: FullModel) -> ContactFinder:
+def contact_finder(calibration: OpenSensor, full: FullModel) -> ContactFinder:
     """Bring a calibration's background into the camera's image, in blocks."""
     camera, table = calibration.camera, calibration.table
     grid = table.grid
@@ -328,7 +328,7 @@ def means(frame: NDArray[Any], block: int, workers: RowWorkers) -> Map:
     return result
 
 
-def _points(calibration: Calibration) -> NDArray[np.float64]:
+def _points(calibration: OpenSensor) -> NDArray[np.float64]:
     """Return places on the membrane (rows, columns, 2) of every `STRIDE`-th raw pixel."""
     camera = calibration.camera
     u = np.arange(0, camera.width + STRIDE, STRIDE, dtype=np.float64)

@@ -22,7 +22,7 @@ from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers
 from gelpolight_core.reflectance.gathered_light import Slab, returned_to_flat
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.surroundings import view_directions
-from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -49,7 +49,7 @@ class SensorMaps:
         The sensor's.
     """
 
-    calibration: Calibration
+    calibration: OpenSensor
     full: FullModel
 
     @cached_property

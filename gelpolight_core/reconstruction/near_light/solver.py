@@ -66,7 +66,7 @@ from gelpolight_core.reconstruction.solver import (
 )
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.stated_lengths import stated_sd
 from gelpolight_core.translation import tr
 
@@ -109,7 +109,7 @@ class NearLightSolver(OpenSolver):
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : OpenSensor
         The sensor's, with its full model.
     workers : int
         Threads.
@@ -119,7 +119,7 @@ class NearLightSolver(OpenSolver):
 
     def __init__(
         self,
-        calibration: Calibration,
+        calibration: OpenSensor,
         *,
         workers: int,
         settings: Mapping[str, Settings] = SETTINGS,
@@ -142,12 +142,12 @@ class NearLightSolver(OpenSolver):
         return self.finder(False).visible_mm
 
     @staticmethod
-    def refuse_unfit(calibration: Calibration) -> None:
+    def refuse_unfit(calibration: OpenSensor) -> None:
         """Refuse a calibration without full model, lights nearly in one plane, and no light."""
         if calibration.full is None:
             raise InputError(
                 tr("the calibration was made for the paper's model only"),
-                where=calibration.identity,
+                where=calibration.serial,
                 advice=tr("Calibrate again with --model full, or use --model paper"),
             )
         refuse_coplanar_lights(calibration, calibration.full.led_positions_mm)

@@ -52,7 +52,7 @@ from gelpolight_core.reconstruction.solver import (
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
-from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -66,7 +66,7 @@ class PaperSolver(OpenSolver):
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : OpenSensor
         The sensor's.
     workers : int
         Threads.
@@ -74,7 +74,7 @@ class PaperSolver(OpenSolver):
 
     visible_mm = None
 
-    def __init__(self, calibration: Calibration, *, workers: int) -> None:
+    def __init__(self, calibration: OpenSensor, *, workers: int) -> None:
         known = usable(calibration.table.valid, calibration.radiance, calibration.factors)
         super().__init__(calibration, calibration.led_positions_mm, known, workers)
         grid = calibration.table.grid
@@ -82,7 +82,7 @@ class PaperSolver(OpenSolver):
         self.slopes = SlopeSolver(calibration, known, self.workers)
 
     @staticmethod
-    def refuse_unfit(calibration: Calibration) -> None:
+    def refuse_unfit(calibration: OpenSensor) -> None:
         """Refuse lights nearly in one plane, and a membrane without light."""
         refuse_coplanar_lights(calibration, calibration.led_positions_mm)
         refuse_dark_membrane(calibration, calibration.radiance)
@@ -222,7 +222,7 @@ class SlopeSolver:
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : OpenSensor
         The sensor's.
     known : (rows, columns) bool
         Nodes that can be solved.
@@ -231,7 +231,7 @@ class SlopeSolver:
     """
 
     def __init__(
-        self, calibration: Calibration, known: NDArray[np.bool_], workers: RowWorkers
+        self, calibration: OpenSensor, known: NDArray[np.bool_], workers: RowWorkers
     ) -> None:
         grid = calibration.table.grid
         self._shape = grid.shape
@@ -327,7 +327,7 @@ class SlopeSolver:
         return np.ndarray((height * width,), np.uint64, words, strides=(4,))
 
 
-def _blocks(calibration: Calibration, known: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
+def _blocks(calibration: OpenSensor, known: NDArray[np.bool_]) -> tuple[Map, NDArray[np.bool_]]:
     """Return pixels and gains 1 / (rho |L|), block by block, and which blocks have known nodes.
 
     Unknown nodes have gain 0.

@@ -13,7 +13,7 @@ from technician import ScriptedCamera, Technician
 from app.calibrate.page import CalibratePage
 from app.context.context import AppContext
 from app.sources.source import SourceInfo
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
 
@@ -47,8 +47,8 @@ def technician(context: AppContext, qtbot: QtBot) -> Iterator[Technician]:
 
 
 @pytest.fixture
-def fresh(small_session: Path, tmp_path: Path) -> CalibrationProject:
+def fresh(small_session: Path, tmp_path: Path) -> Project:
     """Return a new session of the small sensor without images."""
     folder = tmp_path / "fresh"
     create_session(replace(read_session(small_session), folder=folder))
-    return CalibrationProject(folder)
+    return Project(folder)

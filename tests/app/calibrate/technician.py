@@ -18,7 +18,7 @@ from pytestqt.qtbot import QtBot
 from app.calibrate.page import CalibratePage
 from app.calibrate.wizard import Wizard
 from app.sources.source import Frame, Setting, SourceLost
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 
 RATE_HZ = 60.0
 # Much longer than a busy machine needs; only a failing test waits so long.
@@ -100,7 +100,7 @@ class Technician:
         """The folder of the session."""
         return self.wizard.project.session.folder
 
-    def begin(self, project: CalibrationProject, step: str) -> None:
+    def begin(self, project: Project, step: str) -> None:
         """Open a session at a step."""
         self.page._show_wizard(project, step=step)
         self.rest()

@@ -106,7 +106,13 @@ def setting(session: Session, known: Known) -> BallSetting:
     """Return the setting of the ball stage."""
     background, table = session.averaged("background"), known.table
     bare = unmix(table.apply(background.rgb), known.crosstalk)
-    return BallSetting(table, known.led_positions_mm, known.crosstalk, bare, background.size)
+    return BallSetting(
+        table,
+        known.led_positions_mm,
+        known.crosstalk,
+        bare,
+        background.size,
+    )
 
 
 def test_a_board_is_marked_on_its_true_corners(tilted: np.ndarray) -> None:

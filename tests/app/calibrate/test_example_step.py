@@ -9,7 +9,7 @@ import pytest
 from technician import Technician
 
 from app.calibrate import steps
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 
 CONTRIBUTING = Path(__file__).parents[3] / "CONTRIBUTING.md"
 
@@ -26,10 +26,9 @@ def example(name: str) -> Any:
 
 
 def test_the_example_step_keeps_the_notes(
-    technician: Technician, fresh: CalibrationProject, monkeypatch: pytest.MonkeyPatch
+    technician: Technician, fresh: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    route = (steps.SetupStep, example("NotesStep"), *steps.OPEN_ROUTE[1:])
-    monkeypatch.setattr(steps, "OPEN_ROUTE", route)
+    monkeypatch.setattr(steps, "FIRST", (*steps.FIRST, example("NotesStep")))
     technician.begin(fresh, "notes")
     assert technician.state("notes") == "empty"
     technician.wizard.at("notes").editor.insertPlainText("Zweiter Würfel, neue Membran")
@@ -37,9 +36,9 @@ def test_the_example_step_keeps_the_notes(
     assert (technician.session / "notes.txt").read_text("utf-8") == "Zweiter Würfel, neue Membran"
     assert technician.state("notes") == "pass"
     notes = technician.session / "notes.txt"
-    technician.begin(CalibrationProject(technician.session), "lens")
+    technician.begin(Project(technician.session), "lens")
     technician.page.may_close()
     assert notes.read_text("utf-8").startswith("Zweiter"), "not opened: nothing saved"
-    technician.begin(CalibrationProject(notes.parent), "notes")
+    technician.begin(Project(notes.parent), "notes")
     assert technician.wizard.at("notes").editor.toPlainText().startswith("Zweiter")
     technician.rest()

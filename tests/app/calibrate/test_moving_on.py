@@ -12,11 +12,10 @@ from technician import ScriptedCamera, Technician, read_rgb
 from app.calibrate import moving_on
 from app.context.context import AppContext
 from app.services.settings import Settings
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 
-Made = Callable[[], CalibrationProject]
+Made = Callable[[], Project]
 
 
 @pytest.fixture
@@ -42,7 +41,7 @@ def test_a_completed_step_leads_to_the_next_one_that_needs_the_user_and_back(
 ) -> None:  # fmt: skip
     project = computed_project()
     former = project.session.found("background")[0]
-    project.exclude(Stage.BACKGROUND, former.name)
+    project.exclude("background", former.name)
     image = read_rgb(small_session / "background" / "background.png")
     camera.show(np.full_like(image, 3))
     technician.begin(project, "background")
@@ -81,12 +80,12 @@ def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
 ) -> None:
     project = computed_project()
     for path in project.session.found("mirror"):
-        project.exclude(Stage.LIGHTS, path.name)
+        project.exclude("lights", path.name)
     technician.begin(project, "lights")
     technician.click("calibrate.next")
     assert technician.wizard.open.step.key == "lights"
     assert technician.wizard.panel.notice.text() == technician.wizard.open.obstacle() != ""
-    project.exclude(Stage.LIGHTS, project.session.captured("mirror")[0].name, False)
+    project.exclude("lights", project.session.captured("mirror")[0].name, False)
     technician.wizard.model.changed.emit()
     technician.click("calibrate.next")
     assert technician.wizard.open.step.key == "radiance"

@@ -12,6 +12,7 @@ from test_wizard import Made
 
 from app.calibrate.film_strip import Capture
 from app.calibrate.residual_table import ResidualTable
+from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.session.session import read_session
 
 CAPTURES = (
@@ -56,7 +57,7 @@ def test_the_worst_press_is_excluded_to_be_repeated_and_undo_restores_it(
 ) -> None:
     technician.begin(computed_project(), "balls")
     table, project = technician.wizard.panel.residuals, technician.wizard.project
-    misfits = {press.name: press.shading_misfit for press in project.results.presses}
+    misfits = {press.name: press.shading_misfit for press in project.results[BALLS].presses}
     worst = max(misfits, key=lambda name: misfits[name])
     assert len(table.texts()) == len(misfits)
     qtbot.mouseClick(table.repeat, Qt.MouseButton.LeftButton)

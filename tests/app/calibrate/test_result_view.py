@@ -6,14 +6,12 @@ from pytestqt.qtbot import QtBot
 
 from app.calibrate.lens import LensStep
 from app.calibrate.result import ResultView
-from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.finding import QualityTable
 
 
 def _show(view: ResultView, state: StageState, *, saved: str) -> None:
-    status = StageStatus(Stage.LENS, state, "", QualityTable(()))
-    view.show_states({"lens": (state.value, "")}, {Stage.LENS: status}, busy=False, saved=saved)
+    status = StageStatus(state, "")
+    view.show_states({"lens": (state.value, "")}, {"lens": status}, busy=False, saved=saved)
 
 
 def test_where_it_was_saved_is_shown_until_the_captures_change(qtbot: QtBot) -> None:

@@ -13,14 +13,14 @@ from technician import Technician
 from app.bench.virtual_session import virtual_session
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.session.session import read_session
 
 WAIT_MS = 60_000
 TEXTS = {"name": "C310", "identity": "x", "control.gain": "3"}
-Made = Callable[[], CalibrationProject]
+Made = Callable[[], Project]
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def test_settings_are_stored_with_the_images_and_monitored(
     technician: Technician,
     context: AppContext,
     fake: FakeCamera,
-    fresh: CalibrationProject,
+    fresh: Project,
     qtbot: QtBot,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -79,7 +79,7 @@ def test_settings_are_stored_with_the_images_and_monitored(
 
 
 def test_the_mirror_may_have_its_own_exposure(
-    technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
+    technician: Technician, context: AppContext, fake: FakeCamera, fresh: Project,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
     """The reference is the whiteboard image, with which all others are compared."""
@@ -109,7 +109,7 @@ def test_the_mirror_may_have_its_own_exposure(
 
 
 def test_the_camera_of_another_sensor_is_rejected(
-    technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
+    technician: Technician, context: AppContext, fake: FakeCamera, fresh: Project,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
     """The same model but another camera: it belongs to another sensor."""

@@ -15,14 +15,14 @@ from technician import ScriptedCamera, Technician, read_rgb
 
 from app.context.context import AppContext
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 
-Made = Callable[[], CalibrationProject]
+Made = Callable[[], Project]
 
 
 def test_a_reported_capture_is_on_disk_with_its_radius(
@@ -63,7 +63,7 @@ def test_a_typed_radius_is_kept_and_used_without_enter(
 
 
 def test_captures_do_not_wait_for_a_computation(
-    technician: Technician, camera: ScriptedCamera, fresh: CalibrationProject, small_session: Path
+    technician: Technician, camera: ScriptedCamera, fresh: Project, small_session: Path
 ) -> None:
     technician.begin(fresh, "lens")
     views = sorted((small_session / "checkerboard").glob("*.png"))[:3]
@@ -126,7 +126,7 @@ def test_a_capture_is_undone_in_order_and_can_be_redone(
     controller, project = technician.wizard.model, technician.wizard.project
     former = [path.name for path in project.session.found("mirror")]
     technician.wizard.at("lights").place_spot(1, (100.0, 90.0))
-    controller.exclude(Stage.BALLS, "ball_02.png", True)
+    controller.exclude("balls", "ball_02.png", True)
     technician.rest()
     camera.show(read_rgb(small_session / "mirror" / "mirror.png"))
     name = technician.capture()
@@ -157,8 +157,7 @@ def test_a_manually_moved_spot_stays_until_undo(
     panel, view = technician.wizard.panel, technician.wizard.area.view
     technician.wizard.show_capture(project.session.found("mirror")[0].name)
     technician.until(lambda: "found" in panel.live.text())
-    assert project.results.lights is not None
-    u, v = project.results.lights.spots.spots[1].centre_px
+    u, v = project.results[LIGHTS].leds.spots.spots[1].centre_px
     view.moved.emit("mirror.1", u + 30.0, v + 20.0, 0.0)
     technician.until(lambda: "spot is dark" in panel.live.text())
     assert read_session(technician.session).decisions.spots_px[1] == (u + 30.0, v + 20.0)
@@ -201,7 +200,7 @@ def test_a_radius_corrected_on_a_capture_can_be_undone(
 
 
 def test_automatic_capture_waits_for_a_still_good_image_and_a_new_view(
-    technician: Technician, camera: ScriptedCamera, fresh: CalibrationProject, small_session: Path,
+    technician: Technician, camera: ScriptedCamera, fresh: Project, small_session: Path,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
     first, second = sorted((small_session / "checkerboard").glob("*.png"))[:2]
@@ -230,14 +229,14 @@ def test_the_saved_calibration_equals_that_of_the_command_line(
     (path,) = (tmp_path / "workspace" / "sensors").rglob("*.gplcal")
     made, theirs = read_calibration(path), small_calibration
     assert made.identity == theirs.identity
-    assert made.full is not None
-    assert theirs.full is not None
+    assert made.data.full is not None
+    assert theirs.data.full is not None
     for ours, others in (
-        (made.radiance, theirs.radiance),
-        (made.factors, theirs.factors),
-        (made.led_positions_mm, theirs.led_positions_mm),
-        (made.full.led_positions_mm, theirs.full.led_positions_mm),
-        (made.full.background, theirs.full.background),
+        (made.data.radiance, theirs.data.radiance),
+        (made.data.factors, theirs.data.factors),
+        (made.data.led_positions_mm, theirs.data.led_positions_mm),
+        (made.data.full.led_positions_mm, theirs.data.full.led_positions_mm),
+        (made.data.full.background, theirs.data.full.background),
     ):
         np.testing.assert_array_equal(ours, others)
 
@@ -253,7 +252,9 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
     project, view = technician.wizard.project, technician.wizard.at("result").view
     results = project._results
     failed = QualityTable((judge("k", "Half a pixel", 0.5, "px", fail=0.3),))
-    project._results = replace(results, top_pose=replace(results.top_pose, quality=failed))
+    top = results[TOP_POSE]
+    failed_top = replace(top, pose=replace(top.pose, quality=failed))
+    project._results = results.having(TOP_POSE, failed_top)
     technician.wizard.refresh()
     assert "Failed" in view.headline.text() and view.headline.property("meaning") == "fail"
     assert view.save.text() == "&Save as a draft"
@@ -299,7 +300,7 @@ def test_curves_and_other_corrections_share_one_history(
     smoothed = editor.state
     assert smoothed != fitted
     assert set(read_session(technician.session).decisions.curves) == {0}
-    technician.wizard.model.exclude(Stage.BALLS, "ball_01.png", True)
+    technician.wizard.model.exclude("balls", "ball_01.png", True)
     assert undo.count() == 2
     undo.undo()
     assert set(read_session(technician.session).decisions.curves) == {0}
@@ -328,7 +329,7 @@ def test_points_excluded_with_the_lasso_change_the_calibration(
 
 
 def test_a_step_with_too_few_images_is_incomplete_not_failed(
-    technician: Technician, camera: ScriptedCamera, fresh: CalibrationProject, small_session: Path
+    technician: Technician, camera: ScriptedCamera, fresh: Project, small_session: Path
 ) -> None:
     technician.begin(fresh, "lens")
     camera.show(read_rgb(sorted((small_session / "checkerboard").glob("*.png"))[0]))
@@ -389,9 +390,7 @@ def test_a_press_image_is_validated_with_its_truth_file(
     assert technician.state("validation") == "pass"
 
 
-def test_a_waiting_step_names_the_step_it_waits_for(
-    technician: Technician, fresh: CalibrationProject
-) -> None:
+def test_a_waiting_step_names_the_step_it_waits_for(technician: Technician, fresh: Project) -> None:
     technician.begin(fresh, "refraction")
     assert "captured" in technician.wizard.panel.sentence.text()
     assert "earlier steps" in technician.see("calibrate.maps.none").text()
@@ -408,10 +407,10 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
     technician.rest()
     folder, hold = technician.session, threading.Event()
     technician.page._leave_session()
-    compute = CalibrationProject.compute
+    compute = Project.compute
     with monkeypatch.context() as slow:
         slow.setattr(
-            CalibrationProject, "compute",
+            Project, "compute",
             lambda self, *given: (hold.wait(60.0), compute(self, *given))[1],
         )  # fmt: skip
         technician.page.open_path(folder)
@@ -425,7 +424,7 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
         step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
         technician.until(lambda: "Diameter" in step.form.result.text())
         assert wizard.model.jobs.busy
-        wizard.model.exclude(Stage.BALLS, "ball_01.png", True)
+        wizard.model.exclude("balls", "ball_01.png", True)
         assert "have changed since" in step.form.calibration.text()
         wizard.model.undo.undo()
         assert "present captures" in step.form.calibration.text()

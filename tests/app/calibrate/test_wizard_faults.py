@@ -14,10 +14,9 @@ import pytest
 from technician import ScriptedCamera, Technician, read_rgb
 
 from app.context.context import AppContext
-from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 
-Made = Callable[[], CalibrationProject]
+Made = Callable[[], Project]
 
 
 def test_a_stopped_camera_is_reported_and_can_be_reconnected(
@@ -184,7 +183,7 @@ def test_a_full_disk_is_reported_and_partial_files_are_ignored(
     technician.until(lambda: "disk is full" in technician.wizard.panel.notice.text())
     technician.rest()
     assert sorted(project.session.folder.rglob("*")) == before
-    technician.wizard.model.exclude(Stage.BALLS, "ball_01.png", True)
+    technician.wizard.model.exclude("balls", "ball_01.png", True)
     assert technician.wizard.model.undo.count() == 0
     assert "disk is full" in technician.wizard.panel.notice.text()
     assert project.session.decisions.excluded == frozenset()
@@ -202,7 +201,7 @@ def test_an_unsaved_image_is_reported_after_the_session_is_closed(
     press = cv2.imread(str(project.session.found("balls")[0]))
     cv2.imwrite(str(tmp_path / "press.png"), np.roll(press, 1, axis=0))
     full_disk(monkeypatch)
-    technician.wizard.model.import_files(Stage.BALLS, [tmp_path / "press.png"])
+    technician.wizard.model.import_files("balls", [tmp_path / "press.png"])
     technician.page._leave_session()
     assert "disk is full" in caplog.text
     monkeypatch.undo()

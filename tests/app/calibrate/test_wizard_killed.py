@@ -13,8 +13,8 @@ import pytest
 from killing import Forks
 from technician import Technician
 
-from gelpolight_core.calibration.inputs import FOLDERS
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session, read_session
@@ -44,7 +44,7 @@ def test_reported_work_survives_a_kill(
     lines = wizards.lines_until_killed(arguments, tmp_path, seed=seed, longest_s=LONGEST_S)
     reported: list[dict[str, Any]] = [json.loads(line) for line in lines]
     assert reported
-    project = CalibrationProject(folder)
+    project = Project(folder)
     session = project.session
     for item in reported:
         if "captured" in item:
@@ -56,7 +56,7 @@ def test_reported_work_survives_a_kill(
             assert item["excluded"] in session.decisions.excluded
     for name, allowed in may_be_there(reported).items():
         assert decided(session, name) in allowed
-    for stage in FOLDERS.values():
+    for stage in FULL.folders(session):
         for path in session.captured(stage):
             read_image(path)
     technician.page._show_wizard(project)

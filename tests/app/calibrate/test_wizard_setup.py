@@ -7,10 +7,10 @@ from collections.abc import Callable
 import pytest
 from technician import Technician
 
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.session.session import read_session
 
-Made = Callable[[], CalibrationProject]
+Made = Callable[[], Project]
 
 
 def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(

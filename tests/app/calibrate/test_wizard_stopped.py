@@ -9,9 +9,9 @@ import pytest
 from technician import Technician
 
 from app.services.jobs import Job
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 
-Made = Callable[[], CalibrationProject]
+Made = Callable[[], Project]
 
 
 @pytest.fixture

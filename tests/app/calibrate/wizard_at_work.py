@@ -18,7 +18,6 @@ from app.calibrate.page import CalibratePage
 from app.calibrate.wizard import Wizard
 from app.desktop import make_application, make_context
 from app.sources.source import SourceInfo
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.session.decisions import PlacedCircle
 
 TICK_MS = 5
@@ -47,8 +46,8 @@ class Work:
 
     def _on_captured(self, stage: str, name: str) -> None:
         session = self._wizard.project.session
-        radius = session.ball_radii_mm.get(name) if stage == Stage.BALLS else None
-        progress(captured=f"{FOLDERS[Stage(stage)]}/{name}", radius_mm=radius)
+        radius = session.ball_radii_mm.get(name) if stage == "balls" else None
+        progress(captured=f"{self._wizard.project.recipe[stage].folder}/{name}", radius_mm=radius)
 
     def go_on(self) -> None:
         """Start a random action."""
@@ -61,7 +60,7 @@ class Work:
             self._on_step(self._random.choice(("lens", "balls", "balls", "lights", "background")))
         elif chance < 0.3 and (views := session.found("checkerboard")):
             name = self._random.choice(views).name
-            controller.exclude(Stage.LENS, name, True)
+            controller.exclude("lens", name, True)
             progress(excluded=f"checkerboard/{name}")
         elif chance < 0.5 and (balls := session.found("balls")):
             name = self._random.choice(balls).name

@@ -165,7 +165,7 @@ def test_a_rejected_value_is_shown_as_read_back(
     qtbot.waitUntil(lambda: gain.value() == 64.0, timeout=WAIT_MS)
     table = panel.locks._table["gain"]
     assert (table.verdict.value, table.value) == ("fail", 64.0)
-    assert "Gain is 64, not 90" in table.remedies
+    assert "Gain is 64, not 90" in table.remedy
 
 
 def test_a_listed_format_is_selected_with_a_compression_warning(

@@ -170,8 +170,8 @@ def test_a_calibration_of_another_sensor_is_refused_with_both_serials(
 ) -> None:
     context.source.choose_virtual_sensor()
     page.enter()
-    sensor = replace(small_calibration.sensor, serial="lab-7")
-    _use(page, replace(small_calibration, sensor=sensor))
+    sensor = replace(small_calibration.data.sensor, serial="lab-7")
+    _use(page, small_calibration.changed(sensor=sensor))
     text, button = _advice(page)
     assert "lab-7" in text and "virtual-1" in text
     assert "Calibrate the virtual sensor" in button.text()
@@ -289,7 +289,7 @@ def test_zero_uses_the_present_background_and_can_be_undone(
 
     info = image_folder(small_session / "background")
     context.source.choose(info)
-    path = context.workspace.calibration_path(small_calibration.sensor.serial, "mine")
+    path = context.workspace.calibration_path(small_calibration.serial, "mine")
     write_calibration(small_calibration, path)
     context.workspace.use(path)
     page.enter()
@@ -307,7 +307,7 @@ def test_undo_of_a_second_zero_restores_the_original(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     workspace, offered = context.workspace, []
-    path = workspace.calibration_path(small_calibration.sensor.serial, "mine")
+    path = workspace.calibration_path(small_calibration.serial, "mine")
     write_calibration(small_calibration, path)
     kept = path.read_bytes()
     image = min((small_session / "background").glob("*.png"))
@@ -327,7 +327,7 @@ def test_leaving_while_zero_waits_for_frames_is_reported_as_zero_not_set(
     page: InspectPage, presses: Path, context: AppContext, qtbot: QtBot,
     small_calibration: Calibration, caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
-    path = context.workspace.calibration_path(small_calibration.sensor.serial, "mine")
+    path = context.workspace.calibration_path(small_calibration.serial, "mine")
     write_calibration(small_calibration, path)
     context.workspace.use(path)
     page.enter()

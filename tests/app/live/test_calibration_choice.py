@@ -68,7 +68,7 @@ def test_a_replaced_file_is_read_again(
     choice.use_what_fits("", None)
     choice.refresh()
     first = jobs.job
-    write_calibration(replace(small_calibration, factors=0.9 * small_calibration.factors), path)
+    write_calibration(small_calibration.changed(factors=0.9 * small_calibration.data.factors), path)
     choice.refresh()
     second = jobs.job
     assert second is not first
@@ -90,7 +90,7 @@ def test_matching_is_the_newest_validated_one_and_never_one_that_failed(
 
     def kept(day: int, calibration: Calibration) -> Path:
         provenance = replace(plain.provenance, created=f"2026-01-{day:02}T00:00:00+00:00")
-        made = replace(calibration, factors=day * plain.factors, provenance=provenance)
+        made = replace(calibration, provenance=provenance).changed(factors=day * plain.data.factors)
         return workspace.keep_calibration(made, f"day {day}")
 
     kept(4, scene.failed(plain))

@@ -62,7 +62,7 @@ def test_frames_of_a_camera_that_is_still_settling_show_no_fault(depth: LiveDept
 
 def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: LiveDepth) -> None:
     camera = SimpleNamespace(width=6, height=4)
-    calibration = SimpleNamespace(camera=camera, sensor=SimpleNamespace(serial="A"))
+    calibration = SimpleNamespace(camera=camera, serial="A")
     calibration.provenance = SimpleNamespace(camera_settings={})
     reconstructor: Any = SimpleNamespace(calibration=calibration)
     loaded, switched = list[object](), list[object]()
@@ -88,9 +88,7 @@ def test_a_calibration_of_another_camera_is_used_only_if_the_user_says_that_it_i
     there = replace(C310, identity="046d:081b@1-3:1.0")
     context.cameras.driver = FakeDriver(FakeCamera(device=there))
     context.source.choose(context.cameras.infos()[0])
-    calibration = SimpleNamespace(
-        camera=SimpleNamespace(width=6, height=4), sensor=SimpleNamespace(serial="A")
-    )
+    calibration = SimpleNamespace(camera=SimpleNamespace(width=6, height=4), serial="A")
     texts = {"name": C310.name, "identity": "046d:081b@1-2:1.0", "model": C310.model}
     calibration.provenance = SimpleNamespace(camera_settings=texts)
     reconstructor: Any = SimpleNamespace(calibration=calibration)

@@ -21,7 +21,7 @@ PATIENCE_MS = 60_000
 
 
 def _other_sensors(calibration: Calibration) -> Calibration:
-    return replace(calibration, sensor=replace(calibration.sensor, serial="B-2"))
+    return calibration.changed(sensor=replace(calibration.data.sensor, serial="B-2"))
 
 
 def test_a_removed_image_is_released_and_the_next_one_is_measured(
@@ -49,21 +49,21 @@ def test_results_of_an_earlier_calibration_are_not_shown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     first, second = small_calibration, _other_sensors(small_calibration)
-    go = {calibration.sensor.serial: threading.Event() for calibration in (first, second)}
+    go = {calibration.serial: threading.Event() for calibration in (first, second)}
     begun, arrived = threading.Event(), list[str]()
 
     class Slow(Measuring):
         def __call__(self, request: MeasureRequest | None) -> ImageResults | None:
             if request is not None:
                 begun.set()
-                assert go[request.calibration.sensor.serial].wait(60.0)
+                assert go[request.calibration.serial].wait(60.0)
             return super().__call__(request)
 
     class Watched(NewestWins[Any, Any]):
         def take(self) -> Finished[Any, Any] | None:
             found = super().take()
             if found is not None:
-                arrived.append(found.request.calibration.sensor.serial)
+                arrived.append(found.request.calibration.serial)
             return found
 
     monkeypatch.setattr("app.measure.work.Measuring", Slow)
@@ -73,10 +73,10 @@ def test_results_of_an_earlier_calibration_are_not_shown(
     work.take(MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png"))))
     assert begun.wait(60.0)
     work.use(Reconstructor(second))
-    go[first.sensor.serial].set()
-    qtbot.waitUntil(lambda: arrived == [first.sensor.serial], timeout=PATIENCE_MS)
+    go[first.serial].set()
+    qtbot.waitUntil(lambda: arrived == [first.serial], timeout=PATIENCE_MS)
     assert work.heightmap is None
-    go[second.sensor.serial].set()
+    go[second.serial].set()
     qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
     assert work.heightmap is not None
     assert work.heightmap.calibration_id == second.identity

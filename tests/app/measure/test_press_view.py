@@ -77,7 +77,7 @@ def test_a_frozen_frame_is_not_measured_with_another_sensors_calibration(
     qtbot: QtBot,
     tmp_path: Path,
 ) -> None:
-    serial = small_calibration.sensor.serial
+    serial = small_calibration.serial
     rgb = np.ascontiguousarray(cv2.imread(str(_press(small_session)))[..., ::-1])
     path = tmp_path / "press.gplrec"
     with RecordingWriter(path, RecordingHeader(serial=serial)) as writer:
@@ -88,7 +88,7 @@ def test_a_frozen_frame_is_not_measured_with_another_sensors_calibration(
     qtbot.waitUntil(press_view.freeze_action.isEnabled, timeout=PATIENCE_MS)
     press_view.freeze()
     qtbot.waitUntil(lambda: press_view.work.heightmap is not None, timeout=PATIENCE_MS)
-    other = replace(small_calibration, sensor=replace(small_calibration.sensor, serial="B-2"))
+    other = small_calibration.changed(sensor=replace(small_calibration.data.sensor, serial="B-2"))
     _use(context, other, tmp_path / "other.gplcal")
     advice = press_view.banner.findChild(object, "inspect.advice")
     output = f"sensor {serial}"

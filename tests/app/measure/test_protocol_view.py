@@ -47,7 +47,9 @@ def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
     target = make_target(press, calibration)
     seen = np.vstack([target.outline_px, [target.centre_px]])
     back, _ = camera_to_membrane(
-        calibration.camera.directions(seen), calibration.plane, calibration.stack
+        calibration.data.camera.directions(seen),
+        calibration.data.plane,
+        calibration.data.stack,
     )
     away = np.linalg.norm(back - np.array(press.position_mm), axis=1)
     assert away[-1] == pytest.approx(0.0, abs=1e-6)

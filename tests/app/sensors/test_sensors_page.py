@@ -220,7 +220,7 @@ def test_the_trash_restores_what_was_removed_in_an_earlier_run(
     page.trash.trigger()
     trash = page.findChild(TrashDialog)
     row = [trash.table.sorted.index(0, column).data() for column in (0, 1)]
-    assert row == [scene.calibration().sensor.serial, "made"]
+    assert row == [scene.calibration().data.sensor.serial, "made"]
     trash.restore_button.click()
     assert page.chosen().path == path
     assert page.chosen().in_use

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.calibrate.steps import OPEN_ROUTE, steps_of
+from app.calibrate.steps import full_route, steps_of
 from app.context.context import AppContext
 from app.shell import documentation
 from app.shell import main_window as main_window_module
@@ -41,7 +41,7 @@ def test_every_step_and_page_has_its_section(qtbot: QtBot) -> None:
     known = {name for name, _ in PAGES}
     assert set(OF_PAGE.values()) <= known
     window.show_page("guide/calibrate")
-    for step in steps_of(OPEN_ROUTE):
+    for step in steps_of(full_route()):
         page = "guide/validate" if step.key == "validation" else "guide/calibrate"
         window.show_page(page)
         title = "Validate" if step.key == "validation" else step.title

@@ -58,7 +58,7 @@ def test_a_session_with_a_saved_calibration_is_finished(
     page: StartPage, context: AppContext
 ) -> None:
     calibration = scene.calibration()
-    session_of(context, calibration.sensor.serial, calibration.provenance.session, "balls")
+    session_of(context, calibration.serial, calibration.provenance.session, "balls")
     page.enter()
     assert page.go_on.isVisible()
     context.workspace.keep_calibration(calibration, "made")

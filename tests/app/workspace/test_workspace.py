@@ -87,11 +87,9 @@ def test_another_file_of_the_same_name_overwrites_nothing(
 ) -> None:
     first = workspace.import_calibration(source)
     old = scene.calibration()
-    other = replace(
-        old,
-        led_positions_mm=old.led_positions_mm + 0.01,
-        provenance=replace(old.provenance, created="2020-01-01T00:00:00+00:00"),
-    )
+    made = replace(old.provenance, created="2020-01-01T00:00:00+00:00")
+    leds_mm = old.data.led_positions_mm + 0.01
+    other = replace(old, provenance=made).changed(led_positions_mm=leds_mm)
     write_calibration(other, tmp_path / source.name)
     second = workspace.import_calibration(tmp_path / source.name)
     assert second != first

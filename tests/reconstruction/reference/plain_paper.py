@@ -34,15 +34,15 @@ def plain_slopes(frame: NDArray[Any], calibration: Calibration) -> tuple[Array, 
     where = [table.v_px.astype(np.float64), table.u_px.astype(np.float64)]
     points = table.grid.points_mm()
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
-    light, _ = light_directions(calibration.led_positions_mm, at_top)
+    light, _ = light_directions(calibration.data.led_positions_mm, at_top)
     cosines = np.zeros((*points.shape[:2], 3))
-    strength = calibration.radiance.astype(np.float64) * calibration.factors
+    strength = calibration.data.radiance.astype(np.float64) * calibration.data.factors
     known = table.valid & (strength > 0.0).all(axis=2)
     for k in range(3):
         channel = frame[..., k].astype(np.float64) / full_scale
         seen = map_coordinates(channel, where, order=1, mode="nearest")
         processed = np.divide(seen, strength[..., k], out=np.zeros_like(seen), where=known)
-        cosines[..., k] = calibration.reflectance.cosine(k, processed)
+        cosines[..., k] = calibration.data.reflectance.cosine(k, processed)
     normals = np.linalg.solve(light, cosines[..., None])[..., 0]
     slopes = np.zeros_like(normals[..., :2])
     good = known & (normals[..., 2] < 0.0)

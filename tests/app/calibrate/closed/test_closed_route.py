@@ -18,10 +18,10 @@ from app.calibrate.detection import as_image, read_raw
 from app.calibrate.setup_form import SetupForm
 from app.calibrate.setup_values import new_session
 from app.calibrate.validation import KnownObject
-from gelpolight_core.calibration.closed_project import ClosedProject
+from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.in_place_session import SETTLED
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.in_place.preset import preset_named
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import InPlace, SensorData, read_session
@@ -154,13 +154,13 @@ def test_the_scale_is_measured_on_a_pressed_pin_grid(
     technician.wizard.open.import_files([with_pins(background, tmp_path / "pins.png")])
     technician.rest()
     technician.until(lambda: technician.state("scale") == "pass")
-    measured = project.results.scale
+    measured = project.results[in_place.SCALE].measured
     assert measured.mm_per_px == pytest.approx(3.0 / PINS_PX, rel=0.01)
     name = project.session.found("scale")[0].name
     technician.wizard.show_capture(name)
     said = technician.see("calibrate.live")
     technician.until(lambda: f"{measured.pins} pins" in said.text())
-    assert Stage.BALLS in project.stale()
+    assert "balls" in project.stale()
     technician.wizard.model.undo.undo()
     technician.rest()
     assert technician.state("scale") == "empty"
@@ -189,7 +189,7 @@ def with_pins(rgb: NDArray[np.float32], path: Path) -> Path:
     return path
 
 
-def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> ClosedProject:
+def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> Project:
     """Return a session with the background and some presses of the small sensor."""
     source = read_session(opened)
     session = replace(
@@ -199,11 +199,11 @@ def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> ClosedProject
         in_place=SCALE,
     )
     create_session(session)
-    project = ClosedProject(session.folder)
-    project.import_files(Stage.BACKGROUND, source.files("background"))
+    project = Project(session.folder)
+    project.import_files("background", source.files("background"))
     for path in source.files("balls")[:balls]:
         radius_mm = source.ball_radius_mm(path.name)
-        project.import_files(Stage.BALLS, [path], radius_mm=radius_mm)
+        project.import_files("balls", [path], radius_mm=radius_mm)
     return project
 
 
@@ -217,14 +217,14 @@ def test_a_change_makes_the_calibration_outdated_and_undo_restores_it(
     made = project.finish().calibration
     assert made.provenance.inputs == project.all_inputs
     name = project.session.found("balls")[0].name
-    project.exclude(Stage.BALLS, name)
-    assert project.stale() == (Stage.BALLS,)
-    project.exclude(Stage.BALLS, name, False)
+    project.exclude("balls", name)
+    assert project.stale() == ("balls",)
+    project.exclude("balls", name, False)
     assert project.stale() == ()
     session = project.session
     twice = InPlace((2.0 * MM_PER_PX, 2.0 * MM_PER_PX))
     project.describe(replace(session, in_place=twice))
-    assert project.stale() == (Stage.BALLS,)
+    assert project.stale() == ("balls",)
     kept = read_session(session.folder)
     assert kept.in_place == twice
     assert kept.ball_radii_mm == session.ball_radii_mm

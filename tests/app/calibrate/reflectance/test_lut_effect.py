@@ -9,16 +9,14 @@ import pytest
 
 from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_effect import ball_effect
-from gelpolight_core.calibration.pipeline import CalibrationRun
-from gelpolight_core.session.session import read_session
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.project import Run
 
 
-def test_a_wrong_table_changes_the_press(
-    virtual_run: CalibrationRun, virtual_session: Path
-) -> None:
-    effect = ball_effect(virtual_run, read_session(virtual_session))
-    start = model.start_edit(virtual_run.reflectance.table)
-    name = virtual_run.reflectance.presses[0].name
+def test_a_wrong_table_changes_the_press(virtual_run: Run, virtual_session: Path) -> None:
+    effect = ball_effect(virtual_run)
+    start = model.start_edit(virtual_run.results[REFLECTANCE].table.table)
+    name = virtual_run.results[REFLECTANCE].table.presses[0].name
     bent = model.thin_nodes(start, 0)
     index = int(np.argmin(np.abs(np.subtract(bent[0].curve.cosines, 0.4))))  # on the ball's side
     low, value = bent[0].curve.values[index - 1 : index + 1]

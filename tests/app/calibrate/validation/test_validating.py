@@ -16,11 +16,10 @@ from technician import Technician
 from app.calibrate import validation as validating
 from app.command_line.main import main
 from app.workspace.validation import Comparison, Validation, write_validation
-from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.project import Project
 
-Made = Callable[[], CalibrationProject]
+Made = Callable[[], Project]
 PRESS = "presses/cylinder_s5_d100.png"
 
 
@@ -38,7 +37,7 @@ class Held:
         return self._function(*given, **named)
 
 
-def save(technician: Technician, project: CalibrationProject, workspace: Path) -> Path:
+def save(technician: Technician, project: Project, workspace: Path) -> Path:
     """Save the calibration and open the validation; return the saved path."""
     technician.begin(project, "result")
     technician.click("result.save")
@@ -99,7 +98,7 @@ def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
         write_validation(trial, path)
         controller.changed.emit()
         assert technician.state("validation") == state
-    controller.exclude(Stage.BALLS, "ball_01.png", True)
+    controller.exclude("balls", "ball_01.png", True)
     assert technician.state("validation") == "stale"
     controller.undo.undo()
     assert technician.state("validation") == "pass"

@@ -1,0 +1,287 @@
+"""The stages of the ball presses of an open sensor: where each ball is, and the reflectance."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gelpolight_core.calibration.open_sensor import (
+    BACKGROUND,
+    LENS,
+    LIGHTS,
+    RADIANCE,
+    TOP_POSE,
+    linear,
+    same_size,
+)
+from gelpolight_core.calibration.recipe import Results, Stage, Table, Work
+from gelpolight_core.errors import InputError
+from gelpolight_core.finding import (
+    Finding,
+    QualityTable,
+    Verdict,
+    joined_tables,
+    judge_left_out,
+)
+from gelpolight_core.translation import pattern, tr
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from gelpolight_core.factors.background import FactorResult
+    from gelpolight_core.optics.camera import Camera
+    from gelpolight_core.optics.frame import TopPlane
+    from gelpolight_core.optics.refraction import LayerStack
+    from gelpolight_core.reflectance.press import BallPress, PlacedContact
+    from gelpolight_core.reflectance.stage import ReflectanceResult
+    from gelpolight_core.session.decisions import PlacedCircle
+    from gelpolight_core.session.session import Session
+
+    Map = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class SeenBall:
+    """The result for one image of a ball press.
+
+    Attributes
+    ----------
+    file : str
+        Its name in ``balls``.
+    key : str
+        Changes with any input of the result.
+    image : (rows, columns, 3) float32 or None
+        Resampled onto the grid; None if no ball was found.
+    press : BallPress or None
+        The ball; None if none was found.
+    fault : InputError or None
+        Why no ball was found.
+    """
+
+    file: str
+    key: str
+    image: Map | None
+    press: BallPress | None
+    fault: InputError | None
+
+
+@dataclass(frozen=True, slots=True)
+class Balls:
+    """What was found in the images of ball presses."""
+
+    seen: tuple[SeenBall, ...]
+
+    @property
+    def presses(self) -> tuple[BallPress, ...]:
+        """The detected balls."""
+        return tuple(ball.press for ball in self.seen if ball.press is not None)
+
+    @property
+    def images(self) -> tuple[Map, ...]:
+        """Their images, resampled."""
+        return tuple(ball.image for ball in self.seen if ball.image is not None)
+
+    @property
+    def left_out(self) -> QualityTable:
+        """Which captures were left out, and why."""
+        refused = [
+            pattern(
+                "{file}: {found}. {advice}",
+                file=ball.file,
+                found=ball.fault.found,
+                advice=ball.fault.advice,
+            )
+            for ball in self.seen
+            if ball.fault is not None
+        ]
+        return QualityTable((judge_left_out("balls_left_out", tr("Captures left out"), refused),))
+
+    @property
+    def quality(self) -> QualityTable:
+        """What was left out, and of each figure of the presses the worst."""
+        worst = worst_figures([press.quality for press in self.presses])
+        return QualityTable((*self.left_out.figures, *worst))
+
+
+def worst_figures(tables: Sequence[QualityTable]) -> tuple[Finding, ...]:
+    """Return the worst-judged instance of each figure of several tables, in their order."""
+    order = list(Verdict)
+    worst: dict[str, Finding] = {}
+    for table in tables:
+        for figure in table.figures:
+            known = worst.get(figure.key)
+            if known is None or order.index(figure.verdict) > order.index(known.verdict):
+                worst[figure.key] = figure
+    return tuple(worst.values())
+
+
+def _require_balls(results: Results) -> None:
+    """Refuse results without any ball, with the fault of the background or of the first capture."""
+    balls = results[BALLS]
+    if balls.presses:
+        return
+    for figure in results[BACKGROUND].quality.figures:
+        if figure.verdict is Verdict.FAIL:
+            raise InputError(
+                tr("No ball was found with this background ({label}: {value:.1f} {unit})").format(
+                    label=figure.text, value=figure.value, unit=figure.unit
+                ),
+                where=tr("background"),
+                advice=figure.remedy,
+            )
+    for ball in balls.seen:
+        if ball.fault is not None:
+            raise ball.fault
+
+
+def _run_balls(work: Work) -> Balls:
+    """Find the ball in each image; those found earlier from the same inputs are used again."""
+    from gelpolight_core.lights.crosstalk import unmix
+    from gelpolight_core.parallel import in_parallel
+
+    session, before = linear(work.session, work.results), work.results.get(BALLS)
+    known = {ball.key: ball for ball in (() if before is None else before.seen)}
+    depends_on = tuple(work.inputs[need.key].fingerprint for need in BALLS.needs)
+    hashes = dict(work.inputs[BALLS.key].images)
+    # A press captured at this moment belongs to the next computation.
+    files = [path for path in session.files(BALLS.folder) if path.name in hashes]
+    bare = unmix(work[BACKGROUND].light, work[LIGHTS].crosstalk.matrix)
+
+    def ball(path: Path) -> SeenBall:
+        name, placed = path.name, session.decisions.balls.get(path.name)
+        inputs = (*depends_on, hashes[name]), (name, session.ball_radius_mm(name), placed)
+        key = hashlib.sha256(repr(inputs).encode()).hexdigest()
+        return known[key] if key in known else _find_ball(path, key, session, work, bare)
+
+    balls: list[SeenBall] = []
+    with closing(in_parallel(ball, files)) as seen:
+        for found in seen:
+            work.progress(len(balls) / len(files))
+            balls.append(found)
+    return Balls(tuple(balls))
+
+
+def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) -> SeenBall:
+    from gelpolight_core.lights.crosstalk import unmix
+    from gelpolight_core.reflectance.press import find_ball
+    from gelpolight_core.sensor_calibration import sensor_stack
+    from gelpolight_core.session.images import require_colour
+
+    lens, lights, top = work[LENS], work[LIGHTS], work[TOP_POSE]
+    radius_mm, plane = session.ball_radius_mm(path.name), top.pose.plane
+    placed = session.decisions.balls.get(path.name)
+    try:
+        image = session.image(path)
+        require_colour(image, where=str(path))
+        same_size(image, lens, BALLS.folder)
+        seen = top.table.apply(work[BACKGROUND].bad.left_out(image.rgb))
+        contact = None
+        if placed is not None:
+            stack = sensor_stack(session.sensor, plane)
+            contact = placed_contact(placed, lens.camera, plane, stack)
+        press = find_ball(
+            unmix(seen, lights.crosstalk.matrix),
+            bare,
+            top.table,
+            lights.leds.led_positions_mm,
+            radius_mm=radius_mm,
+            name=f"{BALLS.folder}/{path.name}",
+            usable=work[RADIANCE].usable,
+            placed=contact,
+        )
+    except InputError as fault:
+        return SeenBall(path.name, key, None, None, fault)
+    return SeenBall(path.name, key, seen, press, None)
+
+
+def placed_contact(
+    circle: PlacedCircle, camera: Camera, plane: TopPlane, stack: LayerStack
+) -> PlacedContact:
+    """Return the circle on the undeformed membrane for a circle set in the raw image.
+
+    Raises
+    ------
+    InputError
+        If it extends beyond the visible part of the membrane.
+    """
+    from gelpolight_core.optics.refraction import camera_to_membrane
+    from gelpolight_core.reflectance.press import PlacedContact
+
+    turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    u = circle.u_px + circle.radius_px * np.cos(turns)
+    v = circle.v_px + circle.radius_px * np.sin(turns)
+    edge_mm, _ = camera_to_membrane(camera.directions(np.stack([u, v], axis=-1)), plane, stack)
+    if not np.isfinite(edge_mm).all():
+        raise InputError(
+            tr("The circle set by hand extends beyond the visible membrane"),
+            where=tr("balls"),
+            advice=tr("Move it inside the working area, or exclude the image"),
+        )
+    middle = edge_mm.mean(axis=0)
+    radius_mm = float(np.hypot(*(edge_mm - middle).T).mean())
+    return PlacedContact((float(middle[0]), float(middle[1])), radius_mm)
+
+
+BALLS = Stage(
+    "balls",
+    tr("Ball presses"),
+    _run_balls,
+    (BACKGROUND,),
+    "balls",
+    "ball",
+    stated=lambda s: (
+        (sorted(s.ball_radii_mm.items()), s.ball_default_radius_mm),
+        sorted(s.decisions.balls.items()),
+    ),
+    share=30,
+    colour=True,
+    lit=True,
+    tables=(Table("balls", tr("Ball presses"), lambda balls: balls.left_out),),
+    require=_require_balls,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Reflectance:
+    """The reflectance table of the membrane, and the factors of each place."""
+
+    table: ReflectanceResult
+    factors: FactorResult
+
+    @property
+    def quality(self) -> QualityTable:
+        """Figures of both."""
+        return joined_tables((self.table.quality, self.factors.quality))
+
+
+def _run_reflectance(work: Work) -> Reflectance:
+    """Fit the table, then the factors, and feed these back once (section V-E)."""
+    from gelpolight_core.factors.background import calibrate_factors
+    from gelpolight_core.reflectance.stage import calibrate_reflectance
+
+    table, leds_mm = work[TOP_POSE].table, work[LIGHTS].leds.led_positions_mm
+    radiance, bare, balls = work[RADIANCE], work[BACKGROUND].light, work[BALLS]
+    presses, images = balls.presses, balls.images
+    first = calibrate_reflectance(presses, images, table, leds_mm, radiance)
+    factors = calibrate_factors(bare, table, leds_mm, radiance, first.table)
+    second = calibrate_reflectance(presses, images, table, leds_mm, radiance, factors.factors)
+    return Reflectance(second, calibrate_factors(bare, table, leds_mm, radiance, second.table))
+
+
+REFLECTANCE = Stage(
+    "reflectance",
+    tr("Reflectance"),
+    _run_reflectance,
+    (BALLS,),
+    share=5,
+    tables=(
+        Table("reflectance", tr("Reflectance"), lambda made: made.table.quality),
+        Table("factors", tr("Reflectance factors"), lambda made: made.factors.quality),
+    ),
+)

@@ -1,0 +1,155 @@
+"""The recipe of a closed sensor: the untouched membrane, and balls pressed into it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from gelpolight_core.calibration.recipe import Recipe, Results, Stage, Table, Work
+from gelpolight_core.finding import QualityTable
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from gelpolight_core.calibration.in_place_session import PixelScale, Slopes
+    from gelpolight_core.image.linear import LinearImage
+    from gelpolight_core.sensor_calibration import Calibration, Provenance
+    from gelpolight_core.session.session import Session
+
+
+@dataclass(frozen=True, slots=True)
+class Untouched:
+    """The untouched membrane: its image, and its figures."""
+
+    image: LinearImage
+    quality: QualityTable
+
+
+def _run_background(work: Work) -> Untouched:
+    from gelpolight_core.calibration.in_place_session import stated_grid
+    from gelpolight_core.factors.bare_membrane import check_bare_membrane
+    from gelpolight_core.session.images import require_colour
+    from gelpolight_core.session.session import InPlace
+
+    image = work.session.averaged(BACKGROUND.folder)
+    grid = stated_grid(work.session.in_place or InPlace(), image.size)
+    membrane = replace(image, rgb=grid.cut(image.rgb))
+    require_colour(membrane, where=str(work.session.folder / BACKGROUND.folder))
+    return Untouched(image, check_bare_membrane(membrane.rgb).quality)
+
+
+def _region_stated(session: Session) -> object:
+    """Return the declared response and, where it is stated, the membrane's region."""
+    region_px = None if session.in_place is None else session.in_place.region_px
+    response = session.declared_response
+    return response if region_px is None else (response, region_px)
+
+
+BACKGROUND = Stage(
+    "background",
+    tr("Background"),
+    _run_background,
+    folder="background",
+    stated=_region_stated,
+    share=5,
+    one_image=True,
+    colour=True,
+    lit=True,
+    tables=(),
+)
+
+
+def _run_scale(work: Work) -> PixelScale:
+    from gelpolight_core.calibration.in_place_session import measured_scale
+
+    return measured_scale(work.session, work[BACKGROUND].image)
+
+
+SCALE = Stage(
+    "scale",
+    tr("Scale"),
+    _run_scale,
+    (BACKGROUND,),
+    "scale",
+    stated=lambda s: s.in_place,
+    used=lambda s: s.in_place is not None and s.in_place.mm_per_px is None,
+    share=5,
+    colour=True,
+    tables=(),
+)
+
+
+def _run_balls(work: Work, towards: NDArray[np.float64] | None = None) -> Slopes:
+    from gelpolight_core.calibration.in_place_session import find_slopes
+
+    image, scale = work[BACKGROUND].image, work.results.get(SCALE)
+    return find_slopes(
+        work.session,
+        image,
+        scale if SCALE.used(work.session) else None,
+        towards=towards,
+        progress=work.progress,
+    )
+
+
+def _stated(session: Session) -> object:
+    """Return the radii, the circles drawn by hand, and what is stated of the images' scale."""
+    radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
+    circles, stated = sorted(session.decisions.balls.items()), session.in_place
+    assert stated is not None
+    scale = stated.stated_scale, stated.mm_per_px_sd, stated.pressed_scale
+    return (radii, circles, scale, *(() if stated.region_px is None else (stated.region_px,)))
+
+
+BALLS = Stage(
+    "balls",
+    tr("Ball presses"),
+    _run_balls,
+    (BACKGROUND, SCALE),
+    "balls",
+    "ball",
+    stated=_stated,
+    share=95,
+    colour=True,
+    lit=True,
+    tables=(
+        Table("scale", tr("Scale"), lambda slopes: slopes.tables["scale"]),
+        Table("balls", tr("Ball presses"), lambda slopes: slopes.tables["balls"]),
+        Table(
+            "in_place", tr("Slopes of presses left out"), lambda slopes: slopes.tables["in_place"]
+        ),
+        # A calibration gets this one when its background is replaced.
+        Table("gel", tr("Gel change"), lambda _slopes: QualityTable()),
+    ),
+)
+
+
+def _finish(
+    session: Session, results: Results, quality: dict[str, QualityTable], made: Provenance
+) -> Calibration:
+    from gelpolight_core.calibration.in_place_session import in_place_calibration
+
+    return in_place_calibration(session, results[BALLS], quality, made)
+
+
+IN_PLACE = Recipe(
+    "in-place",
+    (BACKGROUND, SCALE, BALLS),
+    _finish,
+    closed=True,
+    depends_on=lambda session, inputs: (inputs[BALLS.key], session.serial),
+)
+
+
+def in_place_towards(coefficients: NDArray[np.float64]) -> Recipe:
+    """Return the recipe for few presses of a new gel, which correct an earlier calibration.
+
+    Parameters
+    ----------
+    coefficients : (terms, 2)
+        Of the earlier calibration.
+    """
+    balls = replace(BALLS, run=lambda work: _run_balls(work, coefficients))
+    return replace(IN_PLACE, stages=(BACKGROUND, SCALE, balls))

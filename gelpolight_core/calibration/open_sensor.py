@@ -1,0 +1,319 @@
+"""The stages of a sensor that can be opened, in the order in which light travels.
+
+``ball_stage.py`` has the stage of the ball presses, ``joint_stage.py`` that of the full model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gelpolight_core.calibration.recipe import Results, Stage, Table, Work
+from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from gelpolight_core.bad_pixels import BadPixels
+    from gelpolight_core.image.linear import LinearImage
+    from gelpolight_core.lights.crosstalk import CrosstalkResult
+    from gelpolight_core.lights.positions import LightResult
+    from gelpolight_core.optics.lens import LensResult
+    from gelpolight_core.optics.pose import TopPoseResult
+    from gelpolight_core.optics.resampling import ResamplingTable
+    from gelpolight_core.radiance.whiteboard import RadianceResult
+    from gelpolight_core.response.stage import ResponseResult
+    from gelpolight_core.session.session import Session
+
+
+@dataclass(frozen=True, slots=True)
+class TopSurface:
+    """Pose of the top surface, and the table from image to membrane that follows from it."""
+
+    pose: TopPoseResult
+    table: ResamplingTable
+
+    @property
+    def quality(self) -> QualityTable:
+        """Figures of the pose."""
+        return self.pose.quality
+
+
+@dataclass(frozen=True, slots=True)
+class Lights:
+    """Positions of the LEDs, and how their colours mix in the camera."""
+
+    leds: LightResult
+    crosstalk: CrosstalkResult
+
+    @property
+    def quality(self) -> QualityTable:
+        """Figures of both."""
+        return joined_tables((self.leds.quality, self.crosstalk.quality))
+
+
+@dataclass(frozen=True, slots=True)
+class Background:
+    """The untouched membrane.
+
+    Attributes
+    ----------
+    light : (rows, columns, 3) float32
+        Its light, resampled onto the grid.
+    bad : BadPixels
+        Pixels of the camera that do not follow the light.
+    quality : QualityTable
+        Figures of both.
+    """
+
+    light: NDArray[np.float32]
+    bad: BadPixels
+    quality: QualityTable
+
+
+def linear(session: Session, results: Results) -> Session:
+    """Return the session with the camera response as the first stage found it."""
+    return replace(session, response=results[RESPONSE].response)
+
+
+def stage_image(work: Work, folder: str) -> LinearImage:
+    """Return the average image of a stage with one view, in colour and of the lens views' size."""
+    from gelpolight_core.session.images import require_colour
+
+    image = linear(work.session, work.results).averaged(folder)
+    require_colour(image, where=f"{folder}/{image.name}")
+    same_size(image, work[LENS], folder)
+    return image
+
+
+def same_size(image: LinearImage, lens: LensResult, folder: str) -> None:
+    """Refuse an image whose size differs from that of the lens views."""
+    from gelpolight_core.image.linear import require_size
+
+    size = lens.camera.width, lens.camera.height
+    require_size(image.size, size, where=f"{folder}/{image.name}")
+
+
+def _run_response(work: Work) -> ResponseResult:
+    from gelpolight_core.response.stage import declare_response, measure_response
+
+    session = work.session
+    if "response" in session.optional_stages:
+        return measure_response(*session.series(), declared=session.declared_response)
+    return declare_response(session.declared_response)
+
+
+RESPONSE = Stage(
+    "response",
+    tr("Camera response"),
+    _run_response,
+    optional=lambda _session: ("response",),
+    stated=lambda s: (s.declared_response, sorted(s.exposures_ms.items())),
+    share=2,
+)
+
+
+def _run_lens(work: Work) -> LensResult:
+    from gelpolight_core.optics.lens import calibrate_lens
+
+    images, refused = linear(work.session, work.results).usable_images(LENS.folder)
+    return calibrate_lens(images, work.session.checkerboard, refused=refused)
+
+
+LENS = Stage(
+    "lens",
+    tr("Lens"),
+    _run_lens,
+    (RESPONSE,),
+    "checkerboard",
+    "view",
+    stated=lambda s: s.checkerboard,
+    share=28,
+)
+
+
+def _run_top_pose(work: Work) -> TopSurface:
+    from gelpolight_core.optics.pose import estimate_top_pose
+    from gelpolight_core.optics.resampling import build_resampling_table
+    from gelpolight_core.sensor_calibration import sensor_stack
+
+    lens, session = work[LENS], linear(work.session, work.results)
+    images, refused = session.usable_images(TOP_POSE.folder)
+    pose = estimate_top_pose(
+        images,
+        session.top_pose,
+        lens.camera,
+        focal_sd_px=lens.focal_sd_px[0],
+        refused=refused,
+    )
+    table = build_resampling_table(
+        lens.camera,
+        pose.plane,
+        sensor_stack(session.sensor, pose.plane),
+        working_diameter_mm=session.sensor.working_diameter_mm,
+    )
+    return TopSurface(pose, table)
+
+
+TOP_POSE = Stage(
+    "top_pose",
+    tr("Top surface"),
+    _run_top_pose,
+    (LENS,),
+    "top_pose",
+    "top",
+    stated=lambda s: (
+        s.top_pose,
+        s.sensor.elastomer_thickness_mm,
+        s.sensor.elastomer_refractive_index,
+        s.sensor.window_thickness_mm,
+        s.sensor.window_refractive_index,
+        s.sensor.working_diameter_mm,
+    ),
+    share=10,
+)
+
+
+def _run_lights(work: Work) -> Lights:
+    from gelpolight_core.lights.crosstalk import find_crosstalk
+    from gelpolight_core.lights.mirror import find_mirror_spots
+    from gelpolight_core.lights.positions import locate_leds
+    from gelpolight_core.set_up import judge_set_up, judge_set_up_by_pose
+
+    session, pose = work.session, work[TOP_POSE].pose
+    image = stage_image(work, LIGHTS.folder)
+    spots = find_mirror_spots(image, placed=session.decisions.spots_px)
+    leds = locate_leds(
+        spots,
+        work[LENS].camera,
+        pose.plane,
+        led_height_mm=session.sensor.led_height_mm,
+        plane_distance_sd_mm=pose.distance_sd_mm,
+        plane_normal_sd_rad=float(np.radians(pose.normal_sd_deg)),
+    )
+    poor = (
+        *judge_set_up(session.sensor),
+        *judge_set_up_by_pose(session.sensor, work[LENS].camera, pose.plane, leds.led_positions_mm),
+    )
+    leds = replace(leds, quality=QualityTable((*leds.quality.figures, *poor)))
+    return Lights(leds, find_crosstalk(spots, _single_led(work)))
+
+
+def _single_led(work: Work) -> tuple[LinearImage, ...]:
+    from gelpolight_core.session.images import require_colour
+
+    if "single_led" not in work.session.optional_stages:
+        return ()
+    images = linear(work.session, work.results).single_led()
+    for image in images:
+        require_colour(image, where=f"single_led/{image.name}")
+    same_size(images[0], work[LENS], "single_led")
+    return images
+
+
+LIGHTS = Stage(
+    "lights",
+    tr("Lights"),
+    _run_lights,
+    (TOP_POSE,),
+    "mirror",
+    optional=lambda _session: ("single_led",),
+    stated=lambda s: (s.sensor.led_height_mm, sorted(s.decisions.spots_px.items())),
+    share=5,
+    one_image=True,
+    colour=True,
+    tables=(
+        Table("lights", tr("Lights"), lambda lights: lights.leds.quality),
+        Table("crosstalk", tr("Crosstalk"), lambda lights: lights.crosstalk.quality),
+    ),
+)
+
+
+def _run_radiance(work: Work) -> RadianceResult:
+    from gelpolight_core.radiance.whiteboard import calibrate_radiance
+
+    leds_mm = work[LIGHTS].leds.led_positions_mm
+    return calibrate_radiance(stage_image(work, RADIANCE.folder), work[TOP_POSE].table, leds_mm)
+
+
+RADIANCE = Stage(
+    "radiance",
+    tr("Light intensity"),
+    _run_radiance,
+    (LIGHTS,),
+    "whiteboard",
+    share=3,
+    one_image=True,
+    colour=True,
+    lit=True,
+)
+
+
+def _run_background(work: Work) -> Background:
+    from gelpolight_core.bad_pixels import find_bad_pixels, no_bad_pixels
+    from gelpolight_core.factors.bare_membrane import check_bare_membrane
+
+    table, image = work[TOP_POSE].table, stage_image(work, BACKGROUND.folder)
+    _refuse_unlit(image)
+    # As encoded by the camera, like the live hint.
+    raw, board = replace(work.session, response=None), RADIANCE.folder
+    whiteboard = raw.averaged(board).rgb if raw.found(board) else None
+    encoded = raw.averaged(BACKGROUND.folder).rgb
+    seen = check_bare_membrane(encoded, table=table, whiteboard=whiteboard)
+    bad = no_bad_pixels(*image.rgb.shape[:2])
+    if whiteboard is not None and whiteboard.shape == image.rgb.shape:
+        lit = linear(work.session, work.results).averaged(board).rgb
+        bad = find_bad_pixels([image.rgb, lit], noise=0.0)
+    figures = QualityTable((*seen.quality.figures, _judge_bad_pixels(bad)))
+    return Background(table.apply(bad.left_out(image.rgb)), bad, figures)
+
+
+def _judge_bad_pixels(bad: BadPixels) -> Finding:
+    """Judge how many pixels of the camera do not follow the light."""
+    from gelpolight_core.bad_pixels import FAR_SHARE
+
+    return judge(
+        "bad_pixels_percent",
+        tr("Dead and hot pixels, left out"),
+        100.0 * len(bad.pixels) / max(bad.height * bad.width, 1),
+        "%",
+        warn=0.5,
+        fail=100.0 * FAR_SHARE,
+        remedy=tr("Replace the camera, or lower its gain and temperature"),
+    )
+
+
+def _refuse_unlit(image: LinearImage) -> None:
+    from gelpolight_core.masks import saturated
+
+    brightest = np.percentile(image.rgb, 99.5, axis=(0, 1))
+    if brightest.min() < 0.05:
+        raise InputError(
+            tr("The image is dark (a channel only reaches {v:.1%})").format(v=brightest.min()),
+            where=f"background/{image.name}",
+            advice=tr("Switch all three LEDs on, or use a longer exposure"),
+        )
+    share = float(saturated(image.rgb).any(axis=2).mean())
+    if share > 0.2:
+        raise InputError(
+            tr("{share:.0%} of the image is saturated").format(share=share),
+            where=f"background/{image.name}",
+            advice=tr("Use a shorter exposure"),
+        )
+
+
+BACKGROUND = Stage(
+    "background",
+    tr("Background"),
+    _run_background,
+    (RADIANCE,),
+    "background",
+    share=2,
+    one_image=True,
+    colour=True,
+    lit=True,
+)

@@ -1,0 +1,318 @@
+"""A calibration is a recipe: stages in order, each a function of images and earlier results.
+
+Nothing slow is imported here or by the modules of the recipes: windows and commands list stages
+before anything is computed. A stage imports what it computes with when it runs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable
+from gelpolight_core.session.file_hashes import file_hash
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from gelpolight_core.sensor_calibration import Provenance
+    from gelpolight_core.session.session import Session
+
+Progress = Callable[[float], None]
+
+
+class Result(Protocol):
+    """What a stage returns: its figures, and whatever later stages use of it."""
+
+    @property
+    def quality(self) -> QualityTable:
+        """The figures by which the stage is judged."""
+        ...
+
+
+R = TypeVar("R", bound=Result)
+
+
+@dataclass(frozen=True, slots=True)
+class StageInputs:
+    """All inputs of a stage's result.
+
+    Attributes
+    ----------
+    images : tuple of (name, SHA-256)
+        Its own images, without excluded ones.
+    stated : str
+        Stated values and decisions that it uses.
+    earlier : tuple of str
+        Fingerprints of the stages that it needs.
+    """
+
+    images: tuple[tuple[str, str], ...]
+    stated: str
+    earlier: tuple[str, ...]
+
+    @property
+    def fingerprint(self) -> str:
+        """A text that changes with any of the inputs."""
+        return hashlib.sha256(repr((self.images, self.stated, self.earlier)).encode()).hexdigest()
+
+    def changes_since(self, before: StageInputs) -> str:
+        """Describe what has changed since a result was computed."""
+        old, new = dict(before.images), dict(self.images)
+        changes = []
+        for names, text in (
+            ([name for name in new if name not in old], tr("{names} added")),
+            ([name for name in old if name not in new], tr("{names} excluded")),
+            ([n for n in new if n in old and new[n] != old[n]], tr("{names} changed")),
+        ):
+            if names:
+                more = tr(" and {n} more").format(n=len(names) - 3) if len(names) > 3 else ""
+                changes.append(text.format(names=", ".join(names[:3]) + more))
+        if before.stated != self.stated:
+            changes.append(tr("a stated value or a manual correction changed"))
+        if before.earlier != self.earlier:
+            changes.append(tr("an earlier stage changed"))
+        return "; ".join(changes)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of figures in the finished calibration.
+
+    Attributes
+    ----------
+    key, title : str
+        For files, and for people.
+    of : callable
+        Takes the stage's result and returns the table; an empty one is left out.
+    """
+
+    key: str
+    title: str
+    of: Callable[[Any], QualityTable] = lambda result: result.quality
+
+
+@dataclass(frozen=True, eq=False)
+class Stage(Generic[R]):
+    """One stage of a calibration: everything that the program knows about it.
+
+    Attributes
+    ----------
+    key, title : str
+        For files and programs, and for people.
+    run : callable
+        Takes the :class:`Work` and returns the result. It raises InputError if the images cannot be
+        used. Of several captures (checkerboard, top_pose, balls) one that cannot be used is left
+        out with its reason; the stage is refused only if too few are left.
+    needs : tuple of Stage
+        The stages whose results it uses directly.
+    folder : str
+        Folder of its images in a session; empty if it has none.
+    stem : str
+        Beginning of the names of new images; by default `folder`.
+    optional : callable
+        Takes the session and returns folders of additional images that it uses.
+    stated : callable
+        Takes the session and returns the stated values and decisions that the stage uses.
+    used : callable
+        Takes the session and returns whether it has this stage; by default every session has.
+    share : float
+        Its share of the whole work, in parts of any size.
+    one_image : bool
+        Whether a new image replaces the former one.
+    colour : bool
+        Whether grey images are refused.
+    lit : bool
+        Whether the brightness is compared with that of other stages: the camera must not change.
+    task : str
+        What a person does to capture its images.
+    tables : tuple of Table or None
+        Its tables in the finished calibration; by default one, with the figures of the result.
+    require : callable
+        Takes all results and raises InputError if the one of this stage is of no use.
+    """
+
+    key: str
+    title: str
+    run: Callable[[Work], R]
+    needs: tuple[Stage[Any], ...] = ()
+    folder: str = ""
+    stem: str = ""
+    optional: Callable[[Session], tuple[str, ...]] = lambda _session: ()
+    stated: Callable[[Session], object] = lambda _session: None
+    used: Callable[[Session], bool] = lambda _session: True
+    share: float = 1.0
+    one_image: bool = False
+    colour: bool = False
+    lit: bool = False
+    task: str = ""
+    tables: tuple[Table, ...] | None = None
+    require: Callable[[Results], None] = lambda _results: None
+
+    @property
+    def all_tables(self) -> tuple[Table, ...]:
+        """Its tables in the finished calibration."""
+        return (Table(self.key, self.title),) if self.tables is None else self.tables
+
+    def folders(self, session: Session) -> tuple[str, ...]:
+        """Return the folders of its images."""
+        own = (self.folder,) if self.folder else ()
+        return own + self.optional(session)
+
+
+class Results:
+    """The newest result of every stage.
+
+    Parameters
+    ----------
+    found : mapping, optional
+        Results by the keys of their stages.
+    """
+
+    def __init__(self, found: Mapping[str, Any] | None = None) -> None:
+        self._found = dict(found or {})
+
+    def __getitem__(self, stage: Stage[R]) -> R:
+        """Return the result of a stage; raises InputError if there is none."""
+        result = self.get(stage)
+        if result is None:
+            raise InputError(
+                tr("An earlier stage has no result yet"),
+                where=stage.title,
+                advice=tr("Complete the earlier stages first"),
+            )
+        return result
+
+    def get(self, stage: Stage[R]) -> R | None:
+        """Return the result of a stage; None if there is none."""
+        return self._found.get(stage.key)
+
+    def having(self, stage: Stage[R], result: R) -> Results:
+        """Return the results with a new one."""
+        return Results({**self._found, stage.key: result})
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What a stage is given.
+
+    Attributes
+    ----------
+    session : Session
+        Images, stated values and decisions.
+    results : Results
+        Of the stages that it needs; ``work[STAGE]`` is one of them.
+    inputs : mapping of str to StageInputs
+        Of every stage, by its key. An image that is not among them was captured since.
+    progress : callable
+        Called with the share of the stage that is done, 0..1.
+    """
+
+    session: Session
+    results: Results
+    inputs: Mapping[str, StageInputs]
+    progress: Progress = lambda _share: None
+
+    def __getitem__(self, stage: Stage[R]) -> R:
+        """Return the result of an earlier stage."""
+        return self.results[stage]
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """The stages of a kind of sensor, and how its calibration is made from them.
+
+    Attributes
+    ----------
+    key : str
+        Name of the model that the calibration is for.
+    stages : tuple of Stage
+        In their order.
+    finish : callable
+        Takes session, results, tables of figures and provenance, and returns the calibration.
+    closed : bool
+        Whether it is for sensors that cannot be opened.
+    depends_on : callable
+        Takes the session and the fingerprints of the stages by their keys, and returns everything
+        that the calibration depends on.
+    """
+
+    key: str
+    stages: tuple[Stage[Any], ...]
+    finish: Callable[[Session, Results, dict[str, QualityTable], Provenance], Any]
+    closed: bool = False
+    depends_on: Callable[[Session, dict[str, str]], object] = field(
+        default=lambda session, inputs: (list(inputs.values()), session.serial)
+    )
+
+    def __getitem__(self, key: str) -> Stage[Any]:
+        """Return a stage by its key."""
+        return next(stage for stage in self.stages if stage.key == key)
+
+    def fits(self, session: Session) -> bool:
+        """Return whether the recipe is for the kind of sensor of a session."""
+        return self.closed == (session.in_place is not None)
+
+    def of(self, session: Session) -> tuple[Stage[Any], ...]:
+        """Return the stages that a session has."""
+        return tuple(stage for stage in self.stages if stage.used(session))
+
+    def needed(self, key: str) -> set[str]:
+        """Return the keys of a stage and of all stages that it builds on."""
+        return {key}.union(*(self.needed(need.key) for need in self[key].needs))
+
+    def run(
+        self,
+        stage: Stage[Any],
+        session: Session,
+        results: Results,
+        *,
+        inputs: Mapping[str, StageInputs] | None = None,
+        progress: Progress = lambda _share: None,
+    ) -> Results:
+        """Return the results with that of one more stage; arguments as in :class:`Work`."""
+        found = self.inputs(session) if inputs is None else inputs
+        return results.having(stage, stage.run(Work(session, results, found, progress)))
+
+    def folders(self, session: Session) -> tuple[str, ...]:
+        """Return the folders of all images that a calibration uses."""
+        return tuple(folder for stage in self.of(session) for folder in stage.folders(session))
+
+    def files(self, session: Session) -> tuple[Path, ...]:
+        """Return the images that a calibration is made from, stage by stage."""
+        return tuple(path for folder in self.folders(session) for path in session.found(folder))
+
+    def missing(self, session: Session) -> tuple[str, ...]:
+        """Return the folders that must have images and have none."""
+        folders = (stage.folder for stage in self.of(session) if stage.folder)
+        return tuple(folder for folder in folders if not session.found(folder))
+
+    def inputs(
+        self, session: Session, hashes: Callable[[Path], str] = file_hash
+    ) -> dict[str, StageInputs]:
+        """Return the present inputs of every stage, by its key.
+
+        Parameters
+        ----------
+        session : Session
+            Images, description and decisions.
+        hashes : callable, optional
+            Returns the hash of a file; a caching one avoids reading every image again.
+        """
+        found: dict[str, StageInputs] = {}
+        for stage in self.of(session):
+            files = [path for name in stage.folders(session) for path in session.found(name)]
+            found[stage.key] = StageInputs(
+                tuple((path.name, hashes(path)) for path in files),
+                repr(stage.stated(session)),
+                tuple(found[n.key].fingerprint for n in stage.needs if n.key in found),
+            )
+        return found
+
+    def all_inputs(self, session: Session, inputs: Mapping[str, StageInputs]) -> str:
+        """Return a text that changes with any input of the calibration."""
+        fingerprints = {key: found.fingerprint for key, found in inputs.items()}
+        return hashlib.sha256(repr(self.depends_on(session, fingerprints)).encode()).hexdigest()
