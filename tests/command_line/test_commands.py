@@ -18,6 +18,7 @@ from app.command_line import calibrate
 from app.command_line.calibrate import run_as_json
 from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.open_sensor import RESPONSE
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.finding import Verdict
@@ -121,7 +122,7 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
     assert main(["inspect", str(file)]) == 0
     assert "for teaching" in capsys.readouterr().out
 
-    run = SimpleNamespace(calibration=failed, response=SimpleNamespace(summary=""))
+    run = SimpleNamespace(calibration=failed, results={RESPONSE: SimpleNamespace(summary="")})
     monkeypatch.setattr(calibrate, "calibrate", lambda *_given, **_named: run)
     monkeypatch.setattr(calibrate, "run_as_json", lambda run: {"verdict": run.calibration.verdict})
     out = ["-o", str(tmp_path / "again.gplcal"), "--json", str(result)]

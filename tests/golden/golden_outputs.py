@@ -147,7 +147,7 @@ def outputs(name: str, folder: Path) -> tuple[Values, Maps]:
         project = Project(session)
         while stale := project.stale():
             project.compute(stale[0])
-        found["states"] = {stage.value: s.state.value for stage, s in project.statuses().items()}
+        found["states"] = {stage: s.state.value for stage, s in project.statuses().items()}
         write_calibration(project.finish().calibration, calibration)
     found["figures"] = {
         stage: {figure.key: [figure.value, figure.verdict.value] for figure in table.figures}
