@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gelpolight_core.finding import Finding, QualityTable, Verdict
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -76,28 +76,11 @@ CAUSES = (
 )
 
 
-def ranked_causes(findings: Iterable[Finding]) -> tuple[Cause, ...]:
-    """Return the causes of two or more poor findings, the best explanation first.
-
-    A cause is better, the more poor findings it moves, less the ones that it would move and that
-    are not poor.
-
-    Parameters
-    ----------
-    findings : iterable of Finding
-        Of all stages of a calibration.
-    """
-    poor = {finding.key for finding in findings if finding.verdict is not Verdict.PASS}
-
-    def agreement(cause: Cause) -> int:
-        return len(cause.moves & poor) - len(cause.moves - poor)
-
-    likely = [cause for cause in CAUSES if len(cause.moves & poor) > 1]
-    return tuple(sorted(likely, key=agreement, reverse=True))
-
-
 def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]:
     """Return the remedy of a calibration's most likely cause, and the findings that follow from it.
+
+    A cause is the better, the more poor findings it moves, less the ones that it would move and
+    that are not poor.
 
     Parameters
     ----------
@@ -107,9 +90,20 @@ def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]
     Returns
     -------
     remedy : str
-        Empty if no cause explains two findings.
+        Empty if no cause explains two findings, or two causes explain them equally well.
     keys : frozenset of str
         Findings whose own remedies are not shown.
     """
-    causes = ranked_causes(finding for table in quality.values() for finding in table.figures)
-    return (causes[0].remedy, causes[0].moves) if causes else ("", frozenset())
+    figures = [figure for table in quality.values() for figure in table.figures]
+    poor = {figure.key for figure in figures if figure.verdict is not Verdict.PASS}
+    likely = sorted(
+        (
+            (2 * len(cause.moves & poor) - len(cause.moves), cause)
+            for cause in CAUSES
+            if len(cause.moves & poor) > 1
+        ),
+        key=lambda ranked: -ranked[0],
+    )
+    if not likely or (len(likely) > 1 and likely[0][0] == likely[1][0]):
+        return "", frozenset()
+    return likely[0][1].remedy, likely[0][1].moves
