@@ -37,6 +37,7 @@ IN_WORDS = {
     "largest_sd": "1 px, or {100LARGEST_SD:g} % of the radius",
     "lowest": "{100LEAST_COVERAGE:g} %",
     "LEAST_INDEX if too_low else MOST_INDEX": "{MOST_INDEX:g} (or < {LEAST_INDEX:g})",
+    "DOUBTFUL_SIGMAS * 100.0 * stretch.sd": "{DOUBTFUL_SIGMAS:g} standard deviations",
     "0.9 * radius_mm": "0.9 ball radii",
     "0.15 * contact_mm": "0.15 contact radii",
     "0.4 * contact_mm": "0.4 contact radii",

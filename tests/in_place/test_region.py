@@ -129,12 +129,12 @@ def test_pixels_that_are_not_square_give_a_metric_map(
 
 
 def test_contacts_that_are_all_oval_alike_say_what_pixels_to_state(
-    squeezed_session: Session, closed_run: InPlaceRun, closed_session: Session
+    squeezed_session: Session, closed_run: Run, closed_session: Session
 ) -> None:
     assert squeezed_session.in_place is not None
     scale = scale_of(closed_session)
     nearly = replace(squeezed_session.in_place, mm_per_px=(scale, 1.15 * scale))
-    run = calibrate_closed_session(replace(squeezed_session, in_place=nearly))
+    run = calibrate(replace(squeezed_session, in_place=nearly))
     figures = {f.key: f for f in run.calibration.quality["scale"].figures}
     oval = figures["contact_stretch_percent"]
     assert oval.verdict is Verdict.WARN
@@ -161,4 +161,4 @@ def test_a_channel_without_light_in_all_images_is_named(
     stated = f"mm_per_px = {scale_of(closed_session)}"
     session = changed(closed_folder, tmp_path / "session", without_blue, stated)
     with pytest.raises(InputError, match="The blue channel shows no light of its own"):
-        calibrate_closed_session(session)
+        calibrate(session)
