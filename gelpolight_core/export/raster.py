@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import struct
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.io.npy import read_arrays
-from gelpolight_core.io.reading import check_version, refusing
+from gelpolight_core.io.reading import refusing
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
@@ -35,7 +33,6 @@ NPZ_MAPS = ("depth_mm", "normals", *SD_MAPS)
 NPZ_NUMBERS = ("pitch_mm", "lateral_per_mm", *SENSOR_NUMBERS)
 NPZ_TEXTS = ("calibration_id", "model", "source", "notes", "faults", "doubts", "flag_names")
 NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags")
-FORMAT, VERSION = "gelpolight-height-map", 1
 LEAST_STEP_MM = 1e-6
 """Step for a map with constant depth."""
 
@@ -103,18 +100,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     for name in SENSOR_NUMBERS:
         if getattr(heightmap, name) is not None:
             arrays[name] = np.float64(getattr(heightmap, name))
-    head = {"format": np.array(FORMAT), "version": np.int64(VERSION)}
-    np.savez(file, **head, sha256=np.array(_checksum(arrays)), **arrays)
-
-
-def _checksum(arrays: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of arrays with their names, types and shapes."""
-    digest = hashlib.sha256()
-    for name in sorted(arrays):
-        array = np.ascontiguousarray(arrays[name])
-        digest.update(f"{name} {array.dtype.str} {np.shape(arrays[name])}".encode())
-        digest.update(array.tobytes())
-    return digest.hexdigest()
+    np.savez(file, **arrays)
 
 
 def read_npz(path: Path) -> HeightMap:
@@ -134,16 +120,11 @@ def read_npz(path: Path) -> HeightMap:
     found = tr("The file is not a height map in npz format, or is damaged ({error})")
     with refusing(found, path, advice=advice):
         try:
-            stored = read_arrays(path, (*NPZ_NAMES, "format", "version", "sha256"))
+            stored = read_arrays(path, NPZ_NAMES)
         except FileNotFoundError as error:
             raise InputError(
                 tr("The file does not exist"), where=str(path), advice=advice
             ) from error
-        head = {key: stored.pop(key).item() for key in ("format", "version") if key in stored}
-        if head:  # files of the first programs have none
-            check_version(head, FORMAT, VERSION, path)
-            if stored.pop("sha256").item() != _checksum(stored):
-                raise ValueError("the checksum is wrong")
         texts = {name: stored[name].tolist() for name in NPZ_TEXTS if name in stored}
         # Files of one earlier state of the program have the faults under another name.
         faults = [*texts.pop("faults", ()), *texts.pop("doubts", ())]
