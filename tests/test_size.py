@@ -27,7 +27,7 @@ NO_CODE = {
 MOST = {
     "app/.": 171,
     "app/bench": 252,
-    "app/calibrate": 6502,
+    "app/calibrate": 6496,
     "app/cameras": 606,
     "app/command_line": 2042,
     "app/context": 407,
@@ -70,7 +70,7 @@ MOST = {
     "gelpolight_core/simulation": 2098,
     "gelpolight_core/studies": 1175,
     "tests/.": 1415,
-    "tests/app": 10630,
+    "tests/app": 10632,
     "tests/batch": 408,
     "tests/calibration": 1606,
     "tests/command_line": 1029,

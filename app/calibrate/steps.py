@@ -24,9 +24,7 @@ from app.calibrate.step_data import Step
 from app.calibrate.top_pose import TopPoseStep
 from app.calibrate.validation import ValidationStep
 from gelpolight_core.calibration import ball_stage, in_place, open_sensor
-from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipe import Stage
-from gelpolight_core.calibration.recipes import FULL
 
 Route = tuple[type[StepPresenter], ...]
 
@@ -48,17 +46,8 @@ PANELS: Mapping[Stage[Any], Route] = {
 """The steps of a stage; another stage with images has one that only captures them."""
 
 
-def route_of(project: Project) -> Route:
-    """Return the route of a session: what is known, the stages of its recipe, and the result."""
-    return _route(project.recipe.of(project.session))
-
-
-def full_route() -> Route:
-    """Return all steps of a sensor that can be opened."""
-    return _route(FULL.stages)
-
-
-def _route(stages: Iterable[Stage[Any]]) -> Route:
+def route_of(stages: Iterable[Stage[Any]]) -> Route:
+    """Return the route through stages of a recipe: what is known, the stages, and the result."""
     made = [PANELS.get(stage, (plain_step(stage),) if stage.folder else ()) for stage in stages]
     return (*FIRST, *chain.from_iterable(made), *LAST)
 

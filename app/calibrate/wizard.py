@@ -62,7 +62,7 @@ class Wizard(QMainWindow):
         self.live = self.model.live
         self.outside = OutsideBar(self.model)
         self.area, self.panel = ImageArea(), StepPanel()
-        route = route_of(project)
+        route = route_of(project.recipe.of(project.session))
         steps = steps_of(route, self.model.statuses)
         self.step_list = StepList(steps)
         self._lay_out()

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pytestqt.qtbot import QtBot
 
 from app.calibrate.step_panel import StepPanel
-from app.calibrate.steps import full_route, steps_of
+from app.calibrate.steps import route_of, steps_of
+from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.finding import Finding, QualityTable, Verdict
 
 
@@ -14,7 +15,7 @@ def test_a_step_in_computation_does_not_show_figures_of_another_step(
 ) -> None:
     panel = StepPanel()
     qtbot.addWidget(panel)
-    first, second = steps_of(full_route())[:2]
+    first, second = steps_of(route_of(FULL.stages))[:2]
     figure = Finding("k", "Reprojection error", 0.2, "px", 0.3, 1.0, Verdict.PASS, "")
     panel.show_step(first, following=second.title)
     panel.show_state("pass", "Good.", [QualityTable((figure,))], recompute=False, finished=True)

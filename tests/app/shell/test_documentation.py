@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.calibrate.steps import full_route, steps_of
+from app.calibrate.steps import route_of, steps_of
 from app.context.context import AppContext
 from app.shell import documentation
 from app.shell import main_window as main_window_module
 from app.shell.documentation import find_documentation
 from app.shell.guide_window import OF_PAGE, PAGES, GuideWindow
 from app.shell.main_window import MainWindow
+from gelpolight_core.calibration.recipes import FULL
 
 
 def test_a_checkout_has_its_documentation() -> None:
@@ -41,7 +42,7 @@ def test_every_step_and_page_has_its_section(qtbot: QtBot) -> None:
     known = {name for name, _ in PAGES}
     assert set(OF_PAGE.values()) <= known
     window.show_page("guide/calibrate")
-    for step in steps_of(full_route()):
+    for step in steps_of(route_of(FULL.stages)):
         page = "guide/validate" if step.key == "validation" else "guide/calibrate"
         window.show_page(page)
         title = "Validate" if step.key == "validation" else step.title
