@@ -61,8 +61,8 @@ OTHER_PROCESSOR = Tolerance(0.01, 0.002, 0.05, 100, 1e-4)
 0.022 %, 0.4 um of depth and one flag of 73728. For a closer comparison, record the outputs of the
 commit before on the same machine."""
 
-OWN = ("id", "calibration_id", "calibration")
-"""Keys whose values follow from the exact bits of a calibration."""
+OWN = ("id", "calibration_id", "calibration", "format", "version", "sha256")
+"""Keys whose values follow from the exact bits of a calibration, or name the form of a file."""
 TEXTS = ("/label", "/advice", "/reason")
 """Texts for people, whose wording is not recorded, as that of any text with a space."""
 
