@@ -50,7 +50,7 @@ MOST = {
     "gelpolight_core/calibration": 3313,
     "gelpolight_core/design": 295,
     "gelpolight_core/design_check": 316,
-    "gelpolight_core/export": 615,
+    "gelpolight_core/export": 614,
     "gelpolight_core/factors": 192,
     "gelpolight_core/health": 1094,
     "gelpolight_core/image": 391,

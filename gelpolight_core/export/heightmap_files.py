@@ -24,8 +24,15 @@ from gelpolight_core.translation import tr
 
 Writer = Callable[[BinaryIO], object]
 
-RASTER_FORMATS = ("npz", "tif", "png", "gsf", "csv", "xyz")
-MESH_FORMATS = ("vtp", "ply", "stl", "glb")
+RASTER_FORMATS = {
+    "npz": write_npz,
+    "tif": write_tiff,
+    "png": write_png16,
+    "gsf": write_gsf,
+    "csv": write_csv,
+    "xyz": write_xyz,
+}
+MESH_FORMATS = {"vtp": write_vtp, "ply": write_ply, "stl": write_stl, "glb": write_gltf}
 FORMATS = (*RASTER_FORMATS, *MESH_FORMATS)
 
 
@@ -73,9 +80,7 @@ def write_heightmap(
                 where=tr("export"),
                 advice=tr("Choose from {names}").format(names=", ".join(FORMATS)),
             )
-    surface = None
-    if set(formats) & set(MESH_FORMATS):
-        surface = mesh_of(heightmap, stride=stride)
+    surface = mesh_of(heightmap, stride=stride) if MESH_FORMATS.keys() & formats else None
     make_folder(folder)
     stem = PurePath(heightmap.source).stem or "heightmap"
     paths = [folder / f"{stem}.{ending(name)}" for name in formats]
@@ -86,16 +91,7 @@ def write_heightmap(
 
 def _writer(name: str, heightmap: HeightMap, surface: Mesh | None, stride: int) -> Writer:
     if surface is None or name in RASTER_FORMATS:
-        writers = {
-            "npz": write_npz,
-            "tif": write_tiff,
-            "png": write_png16,
-            "gsf": write_gsf,
-            "csv": write_csv,
-            "xyz": write_xyz,
-        }
-        return partial(writers[name], heightmap)
-    if name == "vtp":
-        pitch_mm = heightmap.pitch_mm * stride
-        return partial(write_vtp, surface, pitch_mm=pitch_mm, about=describe(heightmap))
-    return partial({"ply": write_ply, "stl": write_stl, "glb": write_gltf}[name], surface)
+        return partial(RASTER_FORMATS[name], heightmap)
+    pitch_mm = heightmap.pitch_mm * stride
+    about = {"pitch_mm": pitch_mm, "about": describe(heightmap)} if name == "vtp" else {}
+    return partial(MESH_FORMATS[name], surface, **about)

@@ -72,15 +72,18 @@ def unpack(parts: Sequence[bytes]) -> tuple[dict[str, Any], dict[str, NDArray[An
     """
     try:
         header = json.loads(parts[1])
-        known = header["format"] == FORMAT and header["version"] == VERSION
+        if (header["format"], header["version"]) != (FORMAT, VERSION):
+            raise ValueError("another format or version")
         arrays = {
             part["name"]: np.frombuffer(data, part["dtype"]).reshape(part["shape"])
             for part, data in zip(header["parts"], parts[2:], strict=True)
         }
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise _no_message() from error
-    if not known:
-        raise _no_message()
+        raise InputError(
+            tr("it is not a height map message that this program can read"),
+            where=tr("stream"),
+            advice=tr("Subscribe to a stream of the same version of the program"),
+        ) from error
     return header, arrays
 
 
@@ -94,11 +97,3 @@ def _health(heightmap: HeightMap) -> dict[str, Any]:
         "unknown": list(health.unknown),
         "untouched": float(health.untouched),
     }
-
-
-def _no_message() -> InputError:
-    return InputError(
-        tr("it is not a height map message that this program can read"),
-        where=tr("stream"),
-        advice=tr("Subscribe to a stream of the same version of the program"),
-    )

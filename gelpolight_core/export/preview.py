@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -86,8 +87,4 @@ def write_preview(heightmap: HeightMap, frame: NDArray[np.floating[Any]], path: 
         If the file cannot be written.
     """
     figure = preview_figure(heightmap, frame)
-
-    def write(stream: BinaryIO) -> None:
-        figure.savefig(stream, format="png", dpi=100)
-
-    write_atomically(path, write)
+    write_atomically(path, partial(figure.savefig, format="png", dpi=100))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import struct
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.io.npy import read_arrays
-from gelpolight_core.io.reading import refusing
+from gelpolight_core.io.reading import check_version, refusing
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
@@ -33,6 +35,8 @@ NPZ_MAPS = ("depth_mm", "normals", *SD_MAPS)
 NPZ_NUMBERS = ("pitch_mm", "lateral_per_mm", *SENSOR_NUMBERS)
 NPZ_TEXTS = ("calibration_id", "model", "source", "notes", "faults", "doubts", "flag_names")
 NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags")
+HEAD = ("format", "version", "sha256")
+FORMAT, VERSION = "gelpolight-height-map", 1
 LEAST_STEP_MM = 1e-6
 """Step for a map with constant depth."""
 
@@ -78,29 +82,30 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         Open for writing.
     """
     arrays: dict[str, Any] = {
-        "depth_mm": heightmap.depth_mm.astype(np.float32, copy=False),
-        "x_mm": np.asarray(heightmap.x_mm),
-        "y_mm": np.asarray(heightmap.y_mm),
-        "flags": heightmap.flags.astype(np.uint8, copy=False),
-        "flag_names": np.array(flag_names()),
-        "pitch_mm": np.float64(heightmap.pitch_mm),
-        "calibration_id": np.array(heightmap.calibration_id),
-        "model": np.array(heightmap.model),
-        "source": np.array(heightmap.source),
-        "notes": np.array(list(map(_note, heightmap.findings)), dtype=np.str_),
-        "faults": np.array([english(found.text) for found in heightmap.doubts], dtype=np.str_),
-        "lateral_per_mm": np.float64(heightmap.lateral_per_mm),
+        name: np.asarray(values, kind)
+        for names, kind in ((NPZ_MAPS, np.float32), (NPZ_NUMBERS, np.float64))
+        for name in names
+        if (values := getattr(heightmap, name)) is not None
     }
-    if heightmap.normals is not None:
-        arrays["normals"] = heightmap.normals.astype(np.float32, copy=False)
-    for name in SD_MAPS:
-        values = getattr(heightmap, name)
-        if values is not None:
-            arrays[name] = values.astype(np.float32, copy=False)
-    for name in SENSOR_NUMBERS:
-        if getattr(heightmap, name) is not None:
-            arrays[name] = np.float64(getattr(heightmap, name))
-    np.savez(file, **arrays)
+    arrays |= {
+        name: np.array(getattr(heightmap, name)) for name in (*NPZ_TEXTS[:3], "x_mm", "y_mm")
+    }
+    arrays["flags"] = heightmap.flags.astype(np.uint8, copy=False)
+    arrays["flag_names"] = np.array(flag_names())
+    arrays["notes"] = np.array(list(map(_note, heightmap.findings)), dtype=np.str_)
+    doubts = [english(found.text) for found in heightmap.doubts]
+    arrays["faults"] = np.array(doubts, dtype=np.str_)
+    np.savez(file, **arrays, format=FORMAT, version=VERSION, sha256=_checksum(arrays))
+
+
+def _checksum(arrays: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of arrays with their names, types and shapes."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {np.shape(arrays[name])}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def read_npz(path: Path) -> HeightMap:
@@ -120,11 +125,16 @@ def read_npz(path: Path) -> HeightMap:
     found = tr("The file is not a height map in npz format, or is damaged ({error})")
     with refusing(found, path, advice=advice):
         try:
-            stored = read_arrays(path, NPZ_NAMES)
+            stored = read_arrays(path, (*NPZ_NAMES, *HEAD))
         except FileNotFoundError as error:
             raise InputError(
                 tr("The file does not exist"), where=str(path), advice=advice
             ) from error
+        head = {key: stored.pop(key).item() for key in HEAD if key in stored}
+        if head:  # files of earlier programs have none
+            check_version(head, FORMAT, VERSION, path)
+            if head["sha256"] != _checksum(stored):
+                raise ValueError("the checksum is wrong")
         texts = {name: stored[name].tolist() for name in NPZ_TEXTS if name in stored}
         # Files of one earlier state of the program have the faults under another name.
         faults = [*texts.pop("faults", ()), *texts.pop("doubts", ())]

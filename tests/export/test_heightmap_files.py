@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
 import zlib
 from dataclasses import replace
@@ -58,10 +57,9 @@ def write_one(heightmap: HeightMap, folder: Path, name: str, **options: int) -> 
 
 def test_one_file_per_format_named_after_the_image(tmp_path: Path, heightmap: HeightMap) -> None:
     folder = tmp_path / "new" / "folder"
-    paths = write_heightmap(heightmap, folder, formats=["tif", "npz"])
-    assert paths == [folder / "press_03.tif", folder / "press_03.npz"]
-    write_heightmap(heightmap, folder, formats=FORMATS)
-    assert sorted(os.listdir(folder)) == sorted(f"press_03.{ending(name)}" for name in FORMATS)
+    paths = write_heightmap(heightmap, folder, formats=FORMATS)
+    assert paths == [folder / f"press_03.{ending(name)}" for name in FORMATS]
+    assert all(map(Path.is_file, paths))
 
 
 def test_npz_contains_standard_deviations_if_there_are_any(
@@ -350,7 +348,7 @@ def test_an_unknown_format_is_refused_before_anything_is_written(
 ) -> None:
     with pytest.raises(InputError, match=r"'docx'.*npz"):
         write_heightmap(heightmap, tmp_path / "out", formats=["npz", "docx"])
-    assert os.listdir(tmp_path) == []
+    assert not list(tmp_path.iterdir())
 
 
 def test_csv_is_a_table_with_its_places_and_gaps(tmp_path: Path, heightmap: HeightMap) -> None:
