@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -242,7 +242,14 @@ BALLS = Stage(
     share=30,
     colour=True,
     lit=True,
-    tables=(Table("balls", tr("Ball presses"), lambda balls: balls.left_out),),
+    tables=(
+        Table(
+            "balls",
+            tr("Ball presses"),
+            lambda balls: balls.left_out,
+            tr("Finds the pressed balls, whose slopes are known"),
+        ),
+    ),
     require=_require_balls,
 )
 
@@ -274,6 +281,32 @@ def _run_reflectance(work: Work) -> Reflectance:
     return Reflectance(second, calibrate_factors(bare, table, leds_mm, radiance, second.table))
 
 
+def _reflectance_entries(results: Results) -> dict[str, Any]:
+    found = results[REFLECTANCE].table
+    return {
+        "balls": [
+            {
+                "file": Path(press.name).name,
+                "radius_mm": press.pose.radius_mm,
+                "centre_mm": list(press.pose.centre_mm),
+                "depth_mm": press.pose.depth_mm,
+                "contact_radius_mm": press.contact_radius_mm,
+                "centre_sd_mm": press.centre_sd_mm,
+            }
+            for press in found.presses
+        ],
+        "reflectance": [
+            {
+                "cosines": fit.cosines.tolist(),
+                "values": fit.values.tolist(),
+                "coverage": fit.coverage.tolist(),
+                "scatter": fit.spread,
+            }
+            for fit in found.fits
+        ],
+    }
+
+
 REFLECTANCE = Stage(
     "reflectance",
     tr("Reflectance"),
@@ -281,7 +314,18 @@ REFLECTANCE = Stage(
     (BALLS,),
     share=5,
     tables=(
-        Table("reflectance", tr("Reflectance"), lambda made: made.table.quality),
-        Table("factors", tr("Reflectance factors"), lambda made: made.factors.quality),
+        Table(
+            "reflectance",
+            tr("Reflectance"),
+            lambda made: made.table.quality,
+            tr("Measures the reflectance of the membrane with balls of known radius"),
+        ),
+        Table(
+            "factors",
+            tr("Reflectance factors"),
+            lambda made: made.factors.quality,
+            tr("Compares the brightness of the untouched membrane with the model, pixel by pixel"),
+        ),
     ),
+    entries=_reflectance_entries,
 )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from gelpolight_core.calibration.recipe import Recipe, Results, Stage, Table, Work
+from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Table, Work
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.translation import tr
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from gelpolight_core.calibration.in_place_session import PixelScale, Slopes
     from gelpolight_core.image.linear import LinearImage
+    from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
     from gelpolight_core.sensor_calibration import Calibration, Provenance
     from gelpolight_core.session.session import Session
 
@@ -103,6 +105,16 @@ def _stated(session: Session) -> object:
     return (radii, circles, scale, *(() if stated.region_px is None else (stated.region_px,)))
 
 
+def _ball_facts(c: ClosedSensor) -> Facts:
+    shown = tr("{n}, slopes up to {deg:.1f} deg")
+    shown = shown.format(n=len(c.balls), deg=math.degrees(math.atan(c.in_place.steepest)))
+    return ((tr("Balls"), shown),)
+
+
+def _ball_entries(results: Results) -> dict[str, Any]:
+    return results[BALLS].entries
+
+
 BALLS = Stage(
     "balls",
     tr("Ball presses"),
@@ -115,14 +127,38 @@ BALLS = Stage(
     colour=True,
     lit=True,
     tables=(
-        Table("scale", tr("Scale"), lambda slopes: slopes.tables["scale"]),
-        Table("balls", tr("Ball presses"), lambda slopes: slopes.tables["balls"]),
         Table(
-            "in_place", tr("Slopes of presses left out"), lambda slopes: slopes.tables["in_place"]
+            "scale",
+            tr("Scale"),
+            lambda slopes: slopes.tables["scale"],
+            tr("Size of a camera pixel on the membrane, stated or measured"),
+        ),
+        Table(
+            "balls",
+            tr("Ball presses"),
+            lambda slopes: slopes.tables["balls"],
+            tr("Finds the pressed balls, whose slopes are known"),
+            _ball_facts,
+        ),
+        Table(
+            "in_place",
+            tr("Slopes of presses left out"),
+            lambda slopes: slopes.tables["in_place"],
+            tr(
+                "Fits the slope as a function of colour change and position. Each press "
+                "is compared with the result of the other presses"
+            ),
         ),
         # A calibration gets this one when its background is replaced.
-        Table("gel", tr("Gel change"), lambda _slopes: QualityTable()),
+        Table(
+            "gel",
+            tr("Gel change"),
+            lambda _slopes: QualityTable(),
+            tr("Keeps the slopes of an earlier gel with the background of this one"),
+        ),
     ),
+    entries=_ball_entries,
+    lines=lambda slopes: slopes.lines,
 )
 
 
@@ -134,10 +170,27 @@ def _finish(
     return in_place_calibration(session, results[BALLS], quality, made)
 
 
+def _facts(c: ClosedSensor) -> Facts:
+    """Return the known and the unknown quantities of a closed sensor."""
+    grid, errors = c.in_place.grid, c.in_place.errors
+    error = tr("{share:.2g} % of it, and {floor:.2g} mm").format(
+        share=100.0 * errors.depth_share, floor=errors.depth_floor_mm
+    )
+    scale = f"{grid.mm_per_px:.5f} mm/px \N{PLUS-MINUS SIGN} {100.0 * c.in_place.scale_sd:.2g} %"
+    return (
+        (tr("Image"), f"{c.camera.width} \N{MULTIPLICATION SIGN} {c.camera.height} px"),
+        (tr("Scale"), scale),
+        (tr("Error of a depth"), error),
+        (tr("Not known"), tr("optics, refraction, temperature")),
+    )
+
+
 IN_PLACE = Recipe(
     "in-place",
+    tr("in place, closed sensor"),
     (BACKGROUND, SCALE, BALLS),
     _finish,
+    _facts,
     closed=True,
     depends_on=lambda session, inputs: (inputs[BALLS.key], session.serial),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ from gelpolight_core.in_place.calibrate import (
 from gelpolight_core.in_place.roundness import judge_stretch
 from gelpolight_core.in_place.scale import MeasuredScale, scale_from_pins, scale_from_punch
 from gelpolight_core.io.reading import as_text
-from gelpolight_core.reconstruction.in_place.calibration import MODEL, ClosedSensor
+from gelpolight_core.reconstruction.in_place.calibration import MODEL, UNKNOWN, ClosedSensor
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.sensor_calibration import Calibration, HandEdit, Provenance
@@ -70,6 +71,54 @@ class Slopes:
         """Name, x and y of the centre, contact radius and ball radius of each press, in mm."""
         grid = self.result.model.grid
         return tuple(_ball_entry(press.name, press.ball, grid) for press in self.result.presses)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The chosen model, its unknown quantities, and the presses that were left out."""
+        found = self.result
+        x, y = found.next_position_mm
+        return (
+            tr("model: in-place (closed sensor: background and balls only)"),
+            tr("not known: {what}").format(what=", ".join(UNKNOWN)),
+            tr("balls: {n} used, {m} left out; slopes seen up to {deg:.0f} deg").format(
+                n=len(found.presses),
+                m=len(found.refused),
+                deg=np.degrees(np.arctan(found.model.steepest)),
+            ),
+            *(tr("left out: {fault}").format(fault=fault) for fault in found.refused.values()),
+            tr("another ball helps most at ({x:.1f}, {y:.1f}) mm").format(x=x, y=y),
+        )
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """The results as plain values, lengths in mm."""
+        found = self.result
+        return {
+            "mm_per_px": found.model.grid.mm_per_px,
+            "unknown": list(UNKNOWN),
+            "steepest_slope": found.model.steepest,
+            "balls": [
+                {
+                    "file": name,
+                    "centre_mm": [x, y],
+                    "contact_radius_mm": contact,
+                    "radius_mm": radius,
+                    "held_out_normal_deg": press.held_out.normal_deg,
+                    "held_out_cap_ratio": _finite(press.held_out.cap_ratio),
+                    "held_out_diameter_ratio": _finite(press.held_out.diameter_ratio),
+                }
+                for (name, x, y, contact, radius), press in zip(
+                    self.balls, found.presses, strict=True
+                )
+            ],
+            "left_out": {name: str(fault) for name, fault in found.refused.items()},
+            "error_by_balls": [list(point) for point in found.learning],
+            "next_ball_mm": list(found.next_position_mm),
+        }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def find_slopes(

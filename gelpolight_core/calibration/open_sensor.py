@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gelpolight_core.calibration.recipe import Results, Stage, Table, Work
+from gelpolight_core.calibration.recipe import Facts, Results, Stage, Table, Work
+from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
 from gelpolight_core.translation import tr
@@ -27,7 +28,10 @@ if TYPE_CHECKING:
     from gelpolight_core.optics.resampling import ResamplingTable
     from gelpolight_core.radiance.whiteboard import RadianceResult
     from gelpolight_core.response.stage import ResponseResult
+    from gelpolight_core.sensor_calibration import OpenSensor
     from gelpolight_core.session.session import Session
+
+    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +111,21 @@ def _run_response(work: Work) -> ResponseResult:
     return declare_response(session.declared_response)
 
 
+def _response_facts(c: OpenSensor) -> Facts:
+    shown = tr("linear")
+    if c.response is not None:
+        shown = tr("up to {x:.1f} % of full scale from linear")
+        shown = shown.format(x=100.0 * c.response.departure)
+    return ((tr("Camera response"), shown),)
+
+
+def _response_entries(results: Results) -> dict[str, Any]:
+    found = results[RESPONSE]
+    curves = None if found.response is None else found.response.curves.tolist()
+    known = {"source": found.source, "linear": curves is None, "light_of_even_values": curves}
+    return {"response": known}
+
+
 RESPONSE = Stage(
     "response",
     tr("Camera response"),
@@ -114,6 +133,10 @@ RESPONSE = Stage(
     optional=lambda _session: ("response",),
     stated=lambda s: (s.declared_response, sorted(s.exposures_ms.items())),
     share=2,
+    about=tr("Measures how pixel values depend on light, from several exposures"),
+    facts=_response_facts,
+    entries=_response_entries,
+    lines=lambda found: (tr("camera response: {what}").format(what=found.summary),),
 )
 
 
@@ -122,6 +145,23 @@ def _run_lens(work: Work) -> LensResult:
 
     images, refused = linear(work.session, work.results).usable_images(LENS.folder)
     return calibrate_lens(images, work.session.checkerboard, refused=refused)
+
+
+def _lens_facts(c: OpenSensor) -> Facts:
+    camera = c.camera
+    distortion = ", ".join(f"{value:.5g}" for value in camera.distortion)
+    return (
+        (tr("Image"), f"{camera.width} \N{MULTIPLICATION SIGN} {camera.height} px"),
+        (tr("Focal length fx, fy"), f"{camera.fx:.2f}, {camera.fy:.2f} px"),
+        (tr("Principal point cx, cy"), f"{camera.cx:.2f}, {camera.cy:.2f} px"),
+        (tr("Distortion k1, k2, p1, p2, k3"), distortion),
+    )
+
+
+def _lens_entries(results: Results) -> dict[str, Any]:
+    camera = results[LENS].camera
+    numbers = {key: getattr(camera, key) for key in ("fx", "fy", "cx", "cy")}
+    return {"camera": {**numbers, "distortion_k1_k2_p1_p2_k3": list(camera.distortion)}}
 
 
 LENS = Stage(
@@ -133,6 +173,9 @@ LENS = Stage(
     "view",
     stated=lambda s: s.checkerboard,
     share=28,
+    about=tr("Finds focal length, principal point and distortion from tilted checkerboards"),
+    facts=_lens_facts,
+    entries=_lens_entries,
 )
 
 
@@ -159,6 +202,26 @@ def _run_top_pose(work: Work) -> TopSurface:
     return TopSurface(pose, table)
 
 
+def _top_pose_facts(c: OpenSensor) -> Facts:
+    plane, grid = c.plane, c.table.grid
+    tilt_deg = np.degrees(np.arccos(min(plane.normal_camera[2], 1.0)))
+    nodes = tr("{columns} \N{MULTIPLICATION SIGN} {rows} nodes, {pitch:.2f} \N{MICRO SIGN}m")
+    nodes = nodes.format(columns=grid.shape[1], rows=grid.shape[0], pitch=1e3 * grid.pitch_mm)
+    normal = "({:.5f}, {:.5f}, {:.5f})".format(*plane.normal_camera)
+    return (
+        (tr("Distance from the optical centre"), f"{plane.distance_mm:.3f} mm"),
+        (tr("Normal in the camera frame"), normal),
+        (tr("Tilt"), f"{tilt_deg:.3f}\N{DEGREE SIGN}"),
+        (tr("Grid on the membrane"), nodes),
+    )
+
+
+def _top_pose_entries(results: Results) -> dict[str, Any]:
+    plane = results[TOP_POSE].pose.plane
+    normal = list(plane.normal_camera)
+    return {"top_plane": {"normal_camera": normal, "distance_mm": plane.distance_mm}}
+
+
 TOP_POSE = Stage(
     "top_pose",
     tr("Top surface"),
@@ -175,6 +238,9 @@ TOP_POSE = Stage(
         s.sensor.working_diameter_mm,
     ),
     share=10,
+    about=tr("Finds the top surface from a checkerboard that lies on it"),
+    facts=_top_pose_facts,
+    entries=_top_pose_entries,
 )
 
 
@@ -215,6 +281,36 @@ def _single_led(work: Work) -> tuple[LinearImage, ...]:
     return images
 
 
+def led_facts(leds_mm: Array, sd_mm: Array) -> Facts:
+    """Return the position of each LED, (3, 3) in the sensor frame, with standard deviations."""
+    lines = [
+        ", ".join(f"{x:.3f} \N{PLUS-MINUS SIGN} {s:.3f}" for x, s in zip(led, sd, strict=True))
+        for led, sd in zip(leds_mm, sd_mm, strict=True)
+    ]
+    return tuple(
+        (tr("{name} LED").format(name=channel_name(k)), f"{line} mm")
+        for k, line in enumerate(lines)
+    )
+
+
+def _sd_mm(covariance_mm2: Array) -> Array:
+    return np.asarray(np.sqrt(np.diagonal(covariance_mm2, axis1=1, axis2=2)))
+
+
+def _light_entries(results: Results) -> dict[str, Any]:
+    leds, crosstalk = results[LIGHTS].leds, results[LIGHTS].crosstalk
+    positions_mm = leds.led_positions_mm
+    camera_mm = results[TOP_POSE].pose.plane.to_camera(positions_mm)
+    return {
+        "mirror_spots_px": leds.spots.centres_px.tolist(),
+        "led_positions_mm": positions_mm.tolist(),
+        "led_positions_camera_mm": camera_mm.tolist(),
+        "led_sd_mm": _sd_mm(leds.led_covariance_mm2).tolist(),
+        "crosstalk": crosstalk.matrix.tolist(),
+        "crosstalk_source": crosstalk.source,
+    }
+
+
 LIGHTS = Stage(
     "lights",
     tr("Lights"),
@@ -227,9 +323,21 @@ LIGHTS = Stage(
     one_image=True,
     colour=True,
     tables=(
-        Table("lights", tr("Lights"), lambda lights: lights.leds.quality),
-        Table("crosstalk", tr("Crosstalk"), lambda lights: lights.crosstalk.quality),
+        Table(
+            "lights",
+            tr("Lights"),
+            lambda lights: lights.leds.quality,
+            tr("Finds the LED positions from their reflections in a mirror"),
+            lambda c: led_facts(c.led_positions_mm, _sd_mm(c.led_covariance_mm2)),
+        ),
+        Table(
+            "crosstalk",
+            tr("Crosstalk"),
+            lambda lights: lights.crosstalk.quality,
+            tr("Removes the light of each LED that the other channels see"),
+        ),
     ),
+    entries=_light_entries,
 )
 
 
@@ -250,6 +358,7 @@ RADIANCE = Stage(
     one_image=True,
     colour=True,
     lit=True,
+    about=tr("Measures the light of each LED on the membrane with a white diffuse board"),
 )
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from gelpolight_core.session.session import Session
 
 Progress = Callable[[float], None]
+Facts = tuple[tuple[str, str], ...]
+"""Labels and values."""
 
 
 class Result(Protocol):
@@ -80,7 +82,7 @@ class StageInputs:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of figures in the finished calibration.
+    """A table of figures in the finished calibration, with its section of the report.
 
     Attributes
     ----------
@@ -88,11 +90,17 @@ class Table:
         For files, and for people.
     of : callable
         Takes the stage's result and returns the table; an empty one is left out.
+    about : str
+        What the stage does, as a sentence without a full stop.
+    facts : callable
+        Takes the data of the calibration and returns results as labels and values.
     """
 
     key: str
     title: str
     of: Callable[[Any], QualityTable] = lambda result: result.quality
+    about: str = ""
+    facts: Callable[[Any], Facts] = lambda _data: ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +139,12 @@ class Stage(Generic[R]):
         What a person does to capture its images.
     tables : tuple of Table or None
         Its tables in the finished calibration; by default one, with the figures of the result.
+    about, facts
+        Of that one table, as in :class:`Table`.
+    entries : callable
+        Takes all results and returns its results as plain values, lengths in mm, sensor frame.
+    lines : callable
+        Takes its result and returns what the command ``calibrate`` prints of it.
     require : callable
         Takes all results and raises InputError if the one of this stage is of no use.
     """
@@ -150,12 +164,18 @@ class Stage(Generic[R]):
     lit: bool = False
     task: str = ""
     tables: tuple[Table, ...] | None = None
+    about: str = ""
+    facts: Callable[[Any], Facts] = lambda _data: ()
+    entries: Callable[[Results], dict[str, Any]] = lambda _results: {}
+    lines: Callable[[R], tuple[str, ...]] = lambda _result: ()
     require: Callable[[Results], None] = lambda _results: None
 
     @property
     def all_tables(self) -> tuple[Table, ...]:
         """Its tables in the finished calibration."""
-        return (Table(self.key, self.title),) if self.tables is None else self.tables
+        if self.tables is not None:
+            return self.tables
+        return (Table(self.key, self.title, about=self.about, facts=self.facts),)
 
     def folders(self, session: Session) -> tuple[str, ...]:
         """Return the folders of its images."""
@@ -227,12 +247,14 @@ class Recipe:
 
     Attributes
     ----------
-    key : str
-        Name of the model that the calibration is for.
+    key, title : str
+        Name of the model that the calibration is for, in files, and for people.
     stages : tuple of Stage
         In their order.
     finish : callable
         Takes session, results, tables of figures and provenance, and returns the calibration.
+    facts : callable
+        Takes the data of the calibration and returns what is known of the sensor.
     closed : bool
         Whether it is for sensors that cannot be opened.
     depends_on : callable
@@ -241,8 +263,10 @@ class Recipe:
     """
 
     key: str
+    title: str
     stages: tuple[Stage[Any], ...]
     finish: Callable[[Session, Results, dict[str, QualityTable], Provenance], Any]
+    facts: Callable[[Any], Facts]
     closed: bool = False
     depends_on: Callable[[Session, dict[str, str]], object] = field(
         default=lambda session, inputs: (list(inputs.values()), session.serial)
@@ -251,6 +275,11 @@ class Recipe:
     def __getitem__(self, key: str) -> Stage[Any]:
         """Return a stage by its key."""
         return next(stage for stage in self.stages if stage.key == key)
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """The tables of all stages, by their keys."""
+        return {table.key: table for stage in self.stages for table in stage.all_tables}
 
     def fits(self, session: Session) -> bool:
         """Return whether the recipe is for the kind of sensor of a session."""

@@ -16,16 +16,18 @@ from gelpolight_core.calibration.open_sensor import (
     RADIANCE,
     RESPONSE,
     TOP_POSE,
+    led_facts,
     linear,
 )
-from gelpolight_core.calibration.recipe import Recipe, Results, Stage, Work
+from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Work
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable
+from gelpolight_core.labels import label
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.calibration.refinement import Joint
-    from gelpolight_core.sensor_calibration import Calibration, Provenance
+    from gelpolight_core.sensor_calibration import Calibration, OpenSensor, Provenance
     from gelpolight_core.session.session import Session
 
 
@@ -35,7 +37,59 @@ def _run_joint(work: Work) -> Joint:
     return refine(linear(work.session, work.results), work.results)
 
 
-JOINT = Stage("joint", tr("Joint refinement"), _run_joint, (REFLECTANCE,), share=15)
+def _joint_facts(c: OpenSensor) -> Facts:
+    full = c.full
+    if full is None:
+        return ()
+    membrane, (before, after) = full.membrane, full.held_out
+    compared = before > 0.0  # otherwise no press was held out, and no loss measured
+    kept = {
+        "refined": tr("refined: they fit held-out presses better"),
+        "mirror": tr("from the mirror: refinement did not improve held-out presses")
+        if compared
+        else tr("from the mirror: there were too few presses to leave any out"),
+    }.get(full.kept, full.kept)
+    loss = tr("{before:.3g} with the LEDs from the mirror, {after:.3g} refined")
+    parameters = tr("gloss {a:.3f}, roughness {b:.3f}, interreflection {c:.3f}").format(
+        a=membrane.gloss, b=membrane.roughness, c=membrane.interreflection
+    )
+    moved_mm = full.led_positions_mm - c.led_positions_mm
+    shifts = ["{:+.3f}, {:+.3f}, {:+.3f} mm".format(*moved) for moved in moved_mm.tolist()]
+    leds = led_facts(full.led_positions_mm, full.led_sd_mm)
+    facts = (
+        (tr("LEDs used"), kept),
+        *(
+            (name, tr("{led}, shifted by {shift}").format(led=led, shift=shift))
+            for (name, led), shift in zip(leds, shifts, strict=True)
+        ),
+        (tr("Membrane ({form})").format(form=label(full.membrane_kept)), parameters),
+        (tr("Loss on held-out presses"), loss.format(before=before, after=after)),
+    )
+    return facts if compared else facts[:-1]
+
+
+JOINT = Stage(
+    "joint",
+    tr("Joint refinement"),
+    _run_joint,
+    (REFLECTANCE,),
+    share=15,
+    about=tr("Fits LEDs, membrane and balls together to all ball presses"),
+    facts=_joint_facts,
+)
+
+
+def _facts(c: OpenSensor) -> Facts:
+    """Return what is stated of an open sensor."""
+    s = c.sensor
+    elastomer = f"{s.elastomer_thickness_mm:g} mm, n {s.elastomer_refractive_index:g}"
+    window = f"{s.window_thickness_mm:g} mm, n {s.window_refractive_index:g}"
+    return (
+        (tr("Elastomer thickness"), elastomer),
+        (tr("Window"), window if s.window_thickness_mm > 0.0 else tr("none")),
+        (tr("LED height Z1"), f"{s.led_height_mm:g} mm"),
+        (tr("Working diameter"), f"{s.working_diameter_mm:g} mm"),
+    )
 
 
 def _finish(
@@ -58,8 +112,10 @@ def _finish(
 
 FULL = Recipe(
     "full",
+    tr("full"),
     (RESPONSE, LENS, TOP_POSE, LIGHTS, RADIANCE, BACKGROUND, BALLS, REFLECTANCE, JOINT),
     _finish,
+    _facts,
     depends_on=lambda session, inputs: (
         list(inputs.values()),
         session.serial,
@@ -67,7 +123,7 @@ FULL = Recipe(
     ),
 )
 """The full model."""
-PAPER = replace(FULL, key="paper", stages=FULL.stages[:-1])
+PAPER = replace(FULL, key="paper", title=tr("paper"), stages=FULL.stages[:-1])
 """The paper's model."""
 RECIPES = (FULL, PAPER, IN_PLACE)
 """The first one that fits a session is used unless another one is asked for."""
@@ -100,8 +156,14 @@ def recipe_of(session: Session, model: str | None = None) -> Recipe:
     )
 
 
+def recipe_named(model: str) -> Recipe:
+    """Return the recipe of a calibration by its model."""
+    return next(recipe for recipe in RECIPES if recipe.key == model)
+
+
 def stage_title(key: str) -> str:
     """Return the name of a stage or of one of its tables; an unknown one is shown by its key."""
-    stages = [stage for recipe in RECIPES for stage in recipe.stages]
-    titles = {table.key: table.title for stage in stages for table in stage.all_tables}
-    return {**titles, **{stage.key: stage.title for stage in stages}}.get(key, key)
+    stages = {stage.key: stage for recipe in RECIPES for stage in recipe.stages}
+    tables = {key: table for recipe in RECIPES for key, table in recipe.tables.items()}
+    found = stages.get(key) or tables.get(key)
+    return key if found is None else found.title

@@ -32,7 +32,12 @@ RASTER_FORMATS = {
     "csv": write_csv,
     "xyz": write_xyz,
 }
-MESH_FORMATS = {"vtp": write_vtp, "ply": write_ply, "stl": write_stl, "glb": write_gltf}
+MESH_FORMATS: dict[str, Callable[..., object]] = {
+    "vtp": write_vtp,
+    "ply": write_ply,
+    "stl": write_stl,
+    "glb": write_gltf,
+}
 FORMATS = (*RASTER_FORMATS, *MESH_FORMATS)
 
 

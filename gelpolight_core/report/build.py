@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Any
-
-import numpy as np
 
 from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.file import contents_of
 from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, RADIANCE, TOP_POSE
 from gelpolight_core.calibration.project import Run
-from gelpolight_core.calibration.recipes import JOINT, stage_title
+from gelpolight_core.calibration.recipe import Stage
+from gelpolight_core.calibration.recipes import JOINT, recipe_named, stage_title
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.finding import Verdict
-from gelpolight_core.in_place.calibrate import InPlaceResult
-from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.report import drawings, tables
 from gelpolight_core.report.document import Listing, Parts, Report, Section, Validation
 from gelpolight_core.report.drawing import Map
-from gelpolight_core.report.facts import head_facts, stage_facts, stage_intro
-from gelpolight_core.sensor_calibration import MODELS, Calibration, OpenSensor
+from gelpolight_core.report.facts import head_facts, stage_facts
+from gelpolight_core.sensor_calibration import Calibration, OpenSensor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -42,9 +38,7 @@ def calibration_report(calibration: Calibration, *, validation: Validation | Non
     validation : Validation, optional
         Results on objects of known size; by default none.
     """
-    c = calibration
-    parts = PARTS[c.model](c.data)
-    return _assemble(c, parts, validation)
+    return _assemble(calibration, None, validation)
 
 
 def run_report(
@@ -66,54 +60,64 @@ def run_report(
     InputError
         If an image can no longer be read.
     """
-    return _assemble(run.calibration, RUN_PARTS[run.calibration.model](run), validation)
+    return _assemble(run.calibration, run, validation)
 
 
-def _open_parts(c: OpenSensor) -> dict[str, Parts]:
-    return {
-        "lights": ((drawings.led_plan(c),), (_mirror_leds(c),)),
-        "crosstalk": ((), (tables.crosstalk_shares(c.crosstalk),)),
-        "radiance": ((drawings.radiance(c),), ()),
-        "reflectance": ((drawings.curves(c.reflectance),), ()),
-        "factors": ((drawings.factors(c),), ()),
-        "joint": ((), _refined_leds(c)),
-    }
+def _lens(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+    if run is None:
+        return {}
+    lens, images = run.results[LENS], _named(run.session, LENS.folder)
+    shown = drawings.lens_views(lens, images), drawings.lens_residuals(lens)
+    return {"lens": (shown, (tables.left_out_views(lens),))}
 
 
-def _run_parts(run: Run) -> dict[str, Parts]:
-    c, session, results = run.calibration.open_sensor, run.session, run.results
-    lens, lights, made = results[LENS], results[LIGHTS].leds, results[REFLECTANCE].table
-    presses, spots, joint = made.presses, lights.spots, results.get(JOINT)
-    mirror = drawings.mirror_spots(spots, session.averaged("mirror").rgb)
-    files = [read_image(session.folder / p.name, response=c.response) for p in presses]
-    balls = drawings.balls(presses, [c.table.apply(file.rgb) for file in files], c.table)
+def _top_pose(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+    if run is None:
+        return {}
+    images = _named(run.session, TOP_POSE.folder)
+    return {"top_pose": (drawings.top_pose(run.results[TOP_POSE].pose, images), ())}
+
+
+def _lights(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+    parts: dict[str, Parts] = {"crosstalk": ((), (tables.crosstalk_shares(c.crosstalk),))}
+    if run is None:
+        return {"lights": ((drawings.led_plan(c),), ()), **parts}
+    found = run.results[LIGHTS].leds
+    mirror = drawings.mirror_spots(found.spots, run.session.averaged(LIGHTS.folder).rgb)
+    plan = drawings.led_plan(c, found.bright_points_mm)
+    return {"lights": ((mirror, plan), (tables.rejected_glints(found.spots),)), **parts}
+
+
+def _radiance(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+    found = None if run is None else run.results[RADIANCE]
+    return {"radiance": ((drawings.radiance(c, found),), ())}
+
+
+def _reflectance(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+    parts: dict[str, Parts] = {"factors": ((drawings.factors(c),), ())}
+    if run is None:
+        return {"reflectance": ((drawings.curves(c.reflectance),), ()), **parts}
+    made = run.results[REFLECTANCE].table
+    paths = [run.session.folder / press.name for press in made.presses]
+    images = [c.table.apply(read_image(path, response=c.response).rgb) for path in paths]
+    balls = drawings.balls(made.presses, images, c.table)
     curves = drawings.curves(made.table, gather_scatter(run))
-    moved = () if joint is None else (tables.refined_presses(presses, joint.refined),)
-    return {
-        "lens": (
-            (
-                drawings.lens_views(lens, _named(session, "checkerboard")),
-                drawings.lens_residuals(lens),
-            ),
-            (tables.left_out_views(lens),),
-        ),
-        "top_pose": (drawings.top_pose(results[TOP_POSE].pose, _named(session, "top_pose")), ()),
-        "lights": (
-            (mirror, drawings.led_plan(c, lights.bright_points_mm)),
-            (_mirror_leds(c), tables.rejected_glints(spots)),
-        ),
-        "crosstalk": ((), (tables.crosstalk_shares(c.crosstalk),)),
-        "radiance": ((drawings.radiance(c, results[RADIANCE]),), ()),
-        "reflectance": ((balls, curves), (tables.ball_presses(presses),)),
-        "factors": ((drawings.factors(c),), ()),
-        "joint": ((), (*_refined_leds(c), *moved)),
-    }
+    return {"reflectance": ((balls, curves), (tables.ball_presses(made.presses),)), **parts}
 
 
-def _closed_parts(c: ClosedSensor, result: InPlaceResult | None = None) -> dict[str, Parts]:
+def _joint(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
+    joint = None if run is None else run.results.get(JOINT)
+    if run is None or joint is None:
+        return {}
+    presses = run.results[REFLECTANCE].table.presses
+    return {"joint": ((), (tables.refined_presses(presses, joint.refined),))}
+
+
+def _closed(c: ClosedSensor, run: Run | None) -> dict[str, Parts]:
     contacts, errors = drawings.contacts(c), drawings.slope_errors(c)
-    if result is None:
+    if run is None:
         return {"balls": ((contacts,), ()), "in_place": ((errors,), ())}
+    result = run.results[in_place.BALLS].result
     learning = (drawings.learning(result.learning),) if len(result.learning) > 1 else ()
     return {
         "balls": ((contacts,), (tables.refused_presses(result),)),
@@ -121,35 +125,35 @@ def _closed_parts(c: ClosedSensor, result: InPlaceResult | None = None) -> dict[
     }
 
 
-def _closed_run_parts(run: Run) -> dict[str, Parts]:
-    result = run.results[in_place.BALLS].result
-    return _closed_parts(run.calibration.data_of(ClosedSensor), result)
+SHOWN: dict[Stage[Any], Callable[[Any, Run | None], dict[str, Parts]]] = {
+    LENS: _lens,
+    TOP_POSE: _top_pose,
+    LIGHTS: _lights,
+    RADIANCE: _radiance,
+    REFLECTANCE: _reflectance,
+    JOINT: _joint,
+    in_place.BALLS: _closed,
+}
+"""Drawings and listings of the tables of a stage: of a calibration, and of a run if there is one.
+"""
 
 
 def _named(session: Session, stage: str) -> Mapping[str, Map]:
     return {image.name: image.rgb for image in session.images(stage)}
 
 
-def _mirror_leds(c: OpenSensor) -> Listing:
-    sd_mm = np.sqrt(np.diagonal(c.led_covariance_mm2, axis1=1, axis2=2))
-    return tables.leds(c.led_positions_mm, sd_mm)
-
-
-def _refined_leds(c: OpenSensor) -> tuple[Listing, ...]:
-    if c.full is None:
-        return ()
-    leds_mm = c.full.led_positions_mm
-    return (tables.leds(leds_mm, c.full.led_sd_mm, leds_mm - c.led_positions_mm),)
-
-
-def _assemble(c: Calibration, parts: Mapping[str, Parts], validation: Validation | None) -> Report:
-    facts = stage_facts(c)
+def _assemble(c: Calibration, run: Run | None, validation: Validation | None) -> Report:
+    recipe, facts = recipe_named(c.model), stage_facts(c)
+    parts: dict[str, Parts] = {}
+    for stage in recipe.stages:
+        if show := SHOWN.get(stage):
+            parts |= show(c.data, run)
     validation = validation or _not_validated()
     sections = tuple(
         Section(
             key,
             stage_title(key),
-            stage_intro(key),
+            recipe.tables[key].about if key in recipe.tables else "",
             quality,
             facts.get(key, ()),
             *parts.get(key, ((), ())),
@@ -186,13 +190,3 @@ def _not_validated() -> Validation:
         "radius, square size or scale makes every result wrong, and no image can show this"
     )
     return Validation(sentence, Verdict.WARN)
-
-
-PARTS: Mapping[str, Callable[[Any], dict[str, Parts]]] = MappingProxyType(
-    {**dict.fromkeys(MODELS, _open_parts), IN_PLACE: _closed_parts}
-)
-"""Drawings and tables of the calibration of each model."""
-RUN_PARTS: Mapping[str, Callable[[Run], dict[str, Parts]]] = MappingProxyType(
-    {**dict.fromkeys(MODELS, _run_parts), IN_PLACE: _closed_run_parts}
-)
-"""The same of a run, with its images."""

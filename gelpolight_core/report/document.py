@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.finding import QualityTable, Verdict
 
 T = TypeVar("T")
@@ -64,8 +65,6 @@ def listing(title: str, items: Iterable[T], *columns: tuple[str, Callable[[T], s
     return Listing(title, heads, tuple(tuple(cell(item) for cell in cells) for item in items))
 
 
-Facts = tuple[tuple[str, str], ...]
-"""Labels and values."""
 Parts = tuple[tuple[Drawing, ...], tuple[Listing, ...]]
 """Drawings and tables of a stage."""
 

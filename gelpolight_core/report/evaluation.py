@@ -7,9 +7,11 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.table import csv_text
+from gelpolight_core.labels import label
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
@@ -23,7 +25,6 @@ from gelpolight_core.measurement.evaluation_report import (
 )
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
 from gelpolight_core.report.document import (
-    Facts,
     Listing,
     Report,
     Section,
@@ -33,7 +34,6 @@ from gelpolight_core.report.document import (
 from gelpolight_core.report.drawing import drawing
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.report.file import write_report
-from gelpolight_core.report.labels import label
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 

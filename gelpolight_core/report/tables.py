@@ -21,31 +21,6 @@ from gelpolight_core.report.drawing import Array
 from gelpolight_core.translation import tr
 
 
-def leds(leds_mm: Array, sd_mm: Array, moved_mm: Array | None = None) -> Listing:
-    """Return the positions of the LEDs, and how far a refinement moved them.
-
-    Parameters
-    ----------
-    leds_mm, sd_mm : (3, 3)
-        Positions in the sensor frame, row k is LED k, with standard deviations.
-    moved_mm : (3, 3), optional
-        Distance from the positions before.
-    """
-    heads: tuple[str, ...] = (tr("LED"), "x", "y", "z")
-    rows: list[tuple[str, ...]] = []
-    for k, (led, sd) in enumerate(zip(leds_mm, sd_mm, strict=True)):
-        position = (f"{x:.3f} \N{PLUS-MINUS SIGN} {s:.3f}" for x, s in zip(led, sd, strict=True))
-        rows.append((channel_name(k), *position))
-    title = tr("LED positions in the sensor frame (mm)")
-    if moved_mm is not None:
-        title = tr("LED positions in the sensor frame, and their shift by the refinement (mm)")
-        heads += tuple(tr("shift in {axis}").format(axis=axis) for axis in "xyz")
-        rows = [
-            (*row, *(f"{x:+.3f}" for x in moved)) for row, moved in zip(rows, moved_mm, strict=True)
-        ]
-    return Listing(title, heads, tuple(rows))
-
-
 def crosstalk_shares(crosstalk: Array) -> Listing:
     """Return the share of each LED's light that the other channels see.
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -18,7 +18,6 @@ from app.command_line import calibrate
 from app.command_line.calibrate import run_as_json
 from app.command_line.main import main
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.open_sensor import RESPONSE
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.finding import Verdict
@@ -52,7 +51,7 @@ def test_inspect_shows_provenance_and_quality(
 ) -> None:
     assert main(["inspect", str(calibration)]) == 0
     shown = capsys.readouterr().out
-    for word in ("calibration", "verdict", "created", "focal length", "top_pose", "reflectance"):
+    for word in ("Calibration", "Verdict", "Created", "Focal length", "top_pose", "reflectance"):
         assert word in shown
 
 
@@ -96,6 +95,7 @@ def test_a_press_is_measured_against_its_truth(
 
 
 def test_a_calibration_that_failed_is_reported_by_every_command(
+    virtual_run: Run,
     session: Path,
     calibration: Path,
     press: Path,
@@ -122,9 +122,8 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
     assert main(["inspect", str(file)]) == 0
     assert "for teaching" in capsys.readouterr().out
 
-    run = SimpleNamespace(calibration=failed, results={RESPONSE: SimpleNamespace(summary="")})
+    run = replace(virtual_run, calibration=failed)
     monkeypatch.setattr(calibrate, "calibrate", lambda *_given, **_named: run)
-    monkeypatch.setattr(calibrate, "run_as_json", lambda run: {"verdict": run.calibration.verdict})
     out = ["-o", str(tmp_path / "again.gplcal"), "--json", str(result)]
     assert main(["calibrate", str(session), *out]) == 0
     assert "FAIL: the calibration failed" in capsys.readouterr().err

@@ -40,7 +40,7 @@ def test_a_closed_session_becomes_a_calibration_by_itself(
     assert len(content["balls"]) >= 8
     assert content["error_by_balls"][-1][1] < content["error_by_balls"][0][1]
     assert main(["inspect", str(path)]) == 0
-    assert "mm per px" in capsys.readouterr().out
+    assert "mm/px" in capsys.readouterr().out
 
 
 def test_images_are_reconstructed_measured_and_timed(
