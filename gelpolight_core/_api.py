@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import calibrate as calibrate_session
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -22,7 +23,6 @@ from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
-from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.translation import tr
 
@@ -112,7 +112,7 @@ def calibrate(
     >>> calibration.model
     'paper'
     """
-    found = read_session(Path(session))
+    found = session_to_calibrate(Path(session))
     recipe = recipe_of(found, model)
     return calibrate_session(found, recipe, progress=progress).calibration
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.calibrate.setup_values import new_session
+from gelpolight_core.calibration.missing import needs_only_open_sensor
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.missing import CLOSED_STAGES, missing_stages
 from gelpolight_core.session.session import (
     IN_PLACE,
     SensorData,
@@ -25,10 +25,10 @@ def closed_offer(folder: Path) -> Session | None:
     None if it has no background and ball presses, if nothing of an open sensor is missing, or if
     its description is damaged or already that of a closed sensor.
     """
-    missing, path = missing_stages(folder), folder / "session.toml"
-    if not missing or any(stage in missing for stage in CLOSED_STAGES):
-        return None
     offer = replace(new_session(optics=False), folder=folder)
+    path = folder / "session.toml"
+    if not needs_only_open_sensor(offer):
+        return None
     try:
         content = read_description(folder) if path.exists() else {}
     except InputError:

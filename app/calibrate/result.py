@@ -37,10 +37,10 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from app.workspace.report import stated_validation
+from gelpolight_core.calibration.missing import OPEN_FOLDERS
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.finding import QualityTable
-from gelpolight_core.session.missing import OPEN_STAGES
 from gelpolight_core.translation import tr
 
 FAIL = StageState.FAIL
@@ -171,7 +171,7 @@ class ResultView(QWidget):
         closed = [
             row.step.title
             for stage, row in self._rows.items()
-            if row.step.folder in OPEN_STAGES and statuses[stage].state is StageState.EMPTY
+            if row.step.folder in OPEN_FOLDERS and statuses[stage].state is StageState.EMPTY
         ]
         if closed:
             text += " " + tr(

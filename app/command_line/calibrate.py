@@ -11,10 +11,10 @@ from app.command_line.reconstructing import add_model, report_failure
 from app.command_line.sessions import session_files
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.calibration.recipes import recipe_named, recipe_of
 from gelpolight_core.io.atomic import write_json
-from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
-    session = read_session(options.session)
+    session = session_to_calibrate(options.session)
     recipe = recipe_of(session, options.model)
     check_outputs([options.output, options.json], session_files(session))
     with stage_progress() as progress:

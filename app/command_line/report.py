@@ -12,6 +12,7 @@ from app.command_line.terminal import say
 from app.workspace.entries import read_entry
 from app.workspace.report import stated_validation
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.errors import InputError
@@ -24,7 +25,6 @@ from gelpolight_core.report.document import Report, Validation
 from gelpolight_core.report.evaluation import validation_of
 from gelpolight_core.report.file import refuse_other_endings, write_report
 from gelpolight_core.sensor_calibration import MODELS, Calibration
-from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
@@ -96,7 +96,7 @@ def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report
 
 
 def _of_session(options: argparse.Namespace, presses: Path | None) -> Report:
-    session = read_session(options.source)
+    session = session_to_calibrate(options.source)
     recipe = recipe_of(session, options.model)
     refuse_overwriting([options.output], session_files(session))
     refuse_unwritable(options.output)

@@ -8,23 +8,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from app.workspace.entries import Entry
+from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import NAME_LIMIT, parse_toml, plain_text, read_file
-
-DESCRIPTION = "session.toml"
-# Key of the stage of each image folder, in the order of the captures.
-STAGES = {
-    "checkerboard": "lens",
-    "top_pose": "top_pose",
-    "mirror": "lights",
-    "whiteboard": "radiance",
-    "background": "background",
-    "balls": "balls",
-}
-# Of a closed sensor, and the table in the description that makes it one.
-IN_PLACE = "in_place"
-CLOSED_STAGES = ("background", "balls")
-IMAGES = (".png", ".tif", ".tiff")
+from gelpolight_core.session.description import FILE_NAME
+from gelpolight_core.session.images import SUFFIXES
+from gelpolight_core.session.session import IN_PLACE, InPlace, SensorData, Session
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +32,8 @@ class SessionEntry:
         Time of the last change.
     newest : Path or None
         The image that was added last.
-    stages : tuple of str
-        Keys of the stages that have images.
-    closed : bool
-        Whether the session is of a closed sensor, which has fewer stages.
+    next_stage : str
+        Key of the first stage without images. Empty if every stage has some.
     """
 
     folder: Path
@@ -54,14 +41,7 @@ class SessionEntry:
     images: int
     changed: datetime
     newest: Path | None = None
-    stages: tuple[str, ...] = ()
-    closed: bool = False
-
-    @property
-    def next_stage(self) -> str:
-        """Key of the first stage without images. Empty if every stage has some."""
-        needed = CLOSED_STAGES if self.closed else STAGES.values()
-        return next((key for key in needed if key not in self.stages), "")
+    next_stage: str = ""
 
 
 def read_session_entry(folder: Path) -> SessionEntry:
@@ -77,20 +57,18 @@ def read_session_entry(folder: Path) -> SessionEntry:
         path
         for stage in folders
         for path in stage.iterdir()
-        if path.suffix.lower() in IMAGES and not path.name.startswith(".")
+        if path.suffix.lower() in SUFFIXES and not path.name.startswith(".")
     ]
-    serial, closed = _description(folder)
-    changed = max(path.stat().st_mtime for path in (folder / DESCRIPTION, *folders))
+    session = _described(folder)
+    recipe = recipe_of(session)
+    missing = recipe.missing(session)
     return SessionEntry(
         folder,
-        serial,
+        session.serial,
         len(images),
-        file_time(changed),
+        file_time(max(path.stat().st_mtime for path in (folder / FILE_NAME, *folders))),
         newest=max(images, key=lambda path: path.stat().st_mtime, default=None),
-        stages=tuple(
-            dict.fromkeys(STAGES[p.parent.name] for p in images if p.parent.name in STAGES)
-        ),
-        closed=closed,
+        next_stage=next((stage.key for stage in recipe.stages if stage.folder in missing), ""),
     )
 
 
@@ -110,10 +88,13 @@ def file_time(seconds: float) -> datetime:
         return (datetime.max if seconds > 0.0 else datetime.min).replace(tzinfo=UTC)
 
 
-def _description(folder: Path) -> tuple[str, bool]:
-    """Return the serial of the sensor, and whether it is closed."""
+def _described(folder: Path) -> Session:
+    """Return serial and kind of the sensor, also if the description lacks the rest."""
     try:
-        content = parse_toml(read_file(folder / DESCRIPTION))
-        return plain_text(content["sensor"]["serial"], NAME_LIMIT), IN_PLACE in content
-    except (InputError, FileNotFoundError, ValueError, KeyError, TypeError):
-        return folder.parent.parent.name, False
+        content = parse_toml(read_file(folder / FILE_NAME))
+        serial = plain_text(content["sensor"]["serial"], NAME_LIMIT)
+        stated = content.get(IN_PLACE)
+        in_place = None if stated is None else InPlace(stated.get("mm_per_px"))
+    except (InputError, FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
+        return Session(folder, SensorData(folder.parent.parent.name))
+    return Session(folder, SensorData(serial), in_place=in_place)

@@ -17,6 +17,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.image_checks import refuse_other_size, refuse_unfit
+from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.recipe import Recipe, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import read_image_file
@@ -33,7 +34,7 @@ from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.session.images import average_frames, write_image
-from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 Frame = NDArray[Any]
@@ -73,7 +74,7 @@ class EditableSession:
         self._dropped = 0  # counts removed images that a running computation may have used
 
     def _read(self, folder: Path) -> Session:
-        session = read_session(folder)
+        session = session_to_calibrate(folder)
         if not self.recipe.fits(session):
             raise InputError(
                 tr("The session is now of another kind of sensor"),

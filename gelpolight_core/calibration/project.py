@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gelpolight_core.calibration.editable_session import EditableSession
+from gelpolight_core.calibration.missing import refuse_missing, session_to_calibrate
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.calibration.recipe import Progress, Recipe, Results, Stage, StageInputs
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
-from gelpolight_core.session.missing import refuse_missing_stages
-from gelpolight_core.session.session import Session, read_session
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def calibrate(
         If a stage is missing or cannot be used; the message names the file.
     """
     recipe, show = recipe or recipe_of(session), progress or (lambda _title, _share: None)
-    refuse_missing_stages(session.folder, recipe.missing(session))
+    refuse_missing(session.folder, recipe.missing(session))
     refuse_copies(recipe.files(session))
     results, inputs, begin = Results(), recipe.inputs(session), 0.0
     whole = sum(stage.share for stage in recipe.of(session))
@@ -155,7 +155,7 @@ class Project(EditableSession):
     """
 
     def __init__(self, folder: Path, recipe: Recipe | None = None) -> None:
-        super().__init__(folder, recipe or recipe_of(read_session(folder)))
+        super().__init__(folder, recipe or recipe_of(session_to_calibrate(folder)))
         self._hashes = CachedHashes()
         self._results = Results()
         self._outcomes: dict[str, Outcome] = {}

@@ -281,6 +281,11 @@ class Recipe:
         """The tables of all stages, by their keys."""
         return {table.key: table for stage in self.stages for table in stage.all_tables}
 
+    @property
+    def own_folders(self) -> tuple[str, ...]:
+        """The folders of images of all stages, without additional ones."""
+        return tuple(stage.folder for stage in self.stages if stage.folder)
+
     def fits(self, session: Session) -> bool:
         """Return whether the recipe is for the kind of sensor of a session."""
         return self.closed == (session.in_place is not None)

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from gelpolight_core.errors import InputError
@@ -45,7 +44,7 @@ def is_complete_image(data: bytes) -> bool:
     return False
 
 
-def decode_image(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[Any, Any] | None:
+def decode_image(path: Path, flags: int | None = None) -> np.ndarray[Any, Any] | None:
     """Return the values of an image file in OpenCV's order; None if the file is not complete.
 
     Parameters
@@ -60,6 +59,9 @@ def decode_image(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[An
     InputError
         If the file is missing, cannot be read, or declares more pixels than any camera has.
     """
+    import cv2
+
+    flags = cv2.IMREAD_UNCHANGED if flags is None else flags
     data = read_image_file(path)
     _check_declared_size(path, data)
     if not is_complete_image(data):

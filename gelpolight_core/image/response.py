@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,6 +67,8 @@ class CameraResponse:
     def linearise(self, frame: NDArray[Any]) -> Map:
         """Return the linear light (rows, columns, 3), 0..1, of a raw uint8 or uint16 RGB frame."""
         if frame.dtype == np.uint8:
+            import cv2
+
             table = self._of_8_bit[None]
             return np.asarray(cv2.LUT(np.ascontiguousarray(frame), table), np.float32)
         light = np.empty(frame.shape, np.float32)

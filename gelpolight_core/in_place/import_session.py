@@ -15,7 +15,6 @@ from gelpolight_core.io.reading import read_file
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.images import SUFFIXES, read_raw_image
-from gelpolight_core.session.missing import CLOSED_STAGES
 from gelpolight_core.session.session import InPlace, SensorData, Session
 from gelpolight_core.translation import tr
 
@@ -93,8 +92,6 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
     made = not out.exists()
     try:
         create_session(session)
-        for stage in CLOSED_STAGES:
-            make_folder(out / stage)
         _copy(background, out / "background" / f"background{background.suffix.lower()}")
         for name, press in pairs:
             _copy(press.image, out / "balls" / files[name])
@@ -150,4 +147,5 @@ def _copy(source: Path, target: Path) -> None:
         )
     read_raw_image(source)
     data = read_file(source, FILE_LIMIT)
+    make_folder(target.parent)
     write_atomically(target, lambda stream: stream.write(data))

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -327,6 +326,8 @@ def write_image(rgb: Frame, path: Path, *, new: bool = False, inside: Path | Non
     InputError
         If the file cannot be written.
     """
+    import cv2
+
     make_folder(path.parent)
     done, data = cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]))
     if not done:

@@ -19,7 +19,6 @@ from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
-from gelpolight_core.session.missing import refuse_undescribed
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 
@@ -219,13 +218,9 @@ def read_session(folder: Path) -> Session:
     ------
     InputError
         If the folder or file is missing, is not TOML, has another format or version, or has a key
-        that is unknown, missing, of the wrong type or out of range. Where tables of an open sensor
-        are missing, one message lists everything that is missing and offers the closed route.
+        that is unknown, missing, of the wrong type or out of range.
     """
-    content = read_description(folder)
-    if IN_PLACE not in content:
-        refuse_undescribed(content, folder)
-    return parse_session(content, folder / "session.toml")
+    return parse_session(read_description(folder), folder / "session.toml")
 
 
 def read_description(folder: Path) -> dict[str, Any]:

@@ -81,10 +81,10 @@ def test_the_last_calibration_leads_straight_to_inspect(
 
 def test_a_closed_sensor_goes_on_with_its_own_stages(context: AppContext) -> None:
     folder = session_of(context, "S-1", "today", "background")
-    (folder / "session.toml").write_text('[sensor]\nserial = "S-1"\n[in_place]\nmm_per_px = 0.06\n')
-    assert read_session_entry(folder).next_stage == "balls"
-    (folder / "session.toml").write_text('[sensor]\nserial = "S-1"\n')
-    assert read_session_entry(folder).next_stage == "lens"
+    known = "[in_place]\nmm_per_px = 0.06"
+    for stated, stage in ((known, "balls"), ("[in_place]", "scale"), ("", "lens")):
+        (folder / "session.toml").write_text(f'[sensor]\nserial = "S-1"\n{stated}')
+        assert read_session_entry(folder).next_stage == stage
 
 
 def test_a_damaged_image_leaves_the_sign(page: StartPage, context: AppContext) -> None:

@@ -1,0 +1,73 @@
+"""Sessions that are to be calibrated, with everything that they lack in one message."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+from gelpolight_core.calibration.recipes import FULL, IN_PLACE
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.session import IN_PLACE as CLOSED
+from gelpolight_core.session.session import (
+    SensorData,
+    Session,
+    parse_session,
+    read_description,
+)
+from gelpolight_core.translation import tr
+
+OPEN_FOLDERS = frozenset(FULL.own_folders).difference(IN_PLACE.own_folders)
+"""Folders of images that need the sensor open."""
+TABLES = ("checkerboard", "balls")
+"""Tables that session.toml of an open sensor must have, beside ``[sensor]``."""
+
+
+def session_to_calibrate(folder: Path) -> Session:
+    """Read a session folder, as :func:`~gelpolight_core.session.session.read_session`.
+
+    Raises
+    ------
+    InputError
+        As there. Where tables and images of an open sensor are missing, one message lists
+        everything that is missing and offers the closed route.
+    """
+    content = read_description(folder)
+    absent = [name for name in TABLES if name not in content]
+    if absent and CLOSED not in content:
+        refuse_missing(folder, FULL.missing(Session(folder, SensorData(""))), absent)
+    return parse_session(content, folder / "session.toml")
+
+
+def needs_only_open_sensor(session: Session) -> bool:
+    """Return whether a session lacks images of an open sensor, and nothing else."""
+    missing = FULL.missing(session)
+    return bool(missing) and OPEN_FOLDERS.issuperset(missing)
+
+
+def refuse_missing(
+    folder: Path, missing: Collection[str], absent_tables: Collection[str] = ()
+) -> None:
+    """Refuse a session without the images in some folders.
+
+    Raises
+    ------
+    InputError
+        If there are any such folders; it also lists the tables that are absent.
+    """
+    if not missing:
+        return
+    found = tr("the session has no images of: {stages}").format(stages=", ".join(missing))
+    if absent_tables:
+        found += tr("; session.toml lacks the tables {tables}").format(
+            tables=", ".join(f"[{name}]" for name in absent_tables)
+        )
+    advice = tr("Capture these stages, or copy their PNG or TIFF images there")
+    if opened := [name for name in missing if name in OPEN_FOLDERS]:
+        found += tr("; the sensor must be open for: {stages}").format(stages=", ".join(opened))
+        advice = tr(
+            "Capture these stages; or, if the sensor cannot be opened, calibrate it in place from "
+            "background and balls alone: replace [checkerboard] and [top_pose] in session.toml "
+            "with [in_place] mm_per_px = (size of a pixel on the membrane in mm) and keep only "
+            "the serial in [sensor]"
+        )
+    raise InputError(found, where=str(folder), advice=advice)
