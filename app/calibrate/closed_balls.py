@@ -250,8 +250,7 @@ class ClosedBallsStep(BallsStep):
             scale = self.model.project.results.get(SCALE)
             if scale is None:
                 return too_early
-            measured = scale.measured.mm_per_px
-            stated = replace(stated, mm_per_px=(measured, measured))
+            stated = replace(stated, mm_per_px=scale.mm_per_px)
         detect = partial(
             detect_closed_ball,
             untouched=Untouched(files[-1], stated, session.response),

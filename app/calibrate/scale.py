@@ -48,8 +48,9 @@ def detect_scale(
             pins = find_pins(seen, bare, where=tr("Image"))
             at = pins.pins_px + np.array([left, top])
             marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in at))
-            text = tr("{n} pins found: a pixel is {s:.4f} mm wide.")
-            said = text.format(n=len(at), s=pressed.pin_spacing_mm / pins.spacing_px)
+            x, y = pressed.pin_spacing_mm / pins.spacing_px
+            text = tr("{n} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high.")
+            said = text.format(n=len(at), x=x, y=y)
         else:
             disc = find_punch(seen, bare, where=tr("Image"))
             circle = Circle(left + disc.x, top + disc.y, disc.radius, "good")

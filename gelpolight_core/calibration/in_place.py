@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from gelpolight_core.calibration.in_place_session import PixelScale, Slopes
+    from gelpolight_core.calibration.in_place_session import Slopes
     from gelpolight_core.image.linear import LinearImage
+    from gelpolight_core.in_place.scale import MeasuredScale
     from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
     from gelpolight_core.sensor_calibration import Calibration, Provenance
     from gelpolight_core.session.session import Session
@@ -63,7 +64,7 @@ BACKGROUND = Stage(
 )
 
 
-def _run_scale(work: Work) -> PixelScale:
+def _run_scale(work: Work) -> MeasuredScale:
     from gelpolight_core.calibration.in_place_session import measured_scale
 
     return measured_scale(work.session, work[BACKGROUND].image)
@@ -176,7 +177,8 @@ def _facts(c: ClosedSensor) -> Facts:
     error = tr("{share:.2g} % of it, and {floor:.2g} mm").format(
         share=100.0 * errors.depth_share, floor=errors.depth_floor_mm
     )
-    scale = f"{grid.mm_per_px:.5f} mm/px \N{PLUS-MINUS SIGN} {100.0 * c.in_place.scale_sd:.2g} %"
+    sizes = " \N{MULTIPLICATION SIGN} ".join(f"{size:.5f}" for size in dict.fromkeys(grid.pixel_mm))
+    scale = f"{sizes} mm/px \N{PLUS-MINUS SIGN} {100.0 * c.in_place.scale_sd:.2g} %"
     return (
         (tr("Image"), f"{c.camera.width} \N{MULTIPLICATION SIGN} {c.camera.height} px"),
         (tr("Scale"), scale),

@@ -22,7 +22,12 @@ from gelpolight_core.in_place.calibrate import (
     calibrate_in_place,
 )
 from gelpolight_core.in_place.roundness import judge_stretch
-from gelpolight_core.in_place.scale import MeasuredScale, scale_from_pins, scale_from_punch
+from gelpolight_core.in_place.scale import (
+    MeasuredScale,
+    judge_scale,
+    scale_from_pins,
+    scale_from_punch,
+)
 from gelpolight_core.io.reading import as_text
 from gelpolight_core.reconstruction.in_place.calibration import MODEL, UNKNOWN, ClosedSensor
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
@@ -92,9 +97,9 @@ class Slopes:
     @property
     def entries(self) -> dict[str, Any]:
         """The results as plain values, lengths in mm."""
-        found = self.result
+        found, grid = self.result, self.result.model.grid
         return {
-            "mm_per_px": found.model.grid.mm_per_px,
+            "mm_per_px": grid.mm_per_px if grid.aspect == 1.0 else grid.pixel_mm.tolist(),
             "unknown": list(UNKNOWN),
             "steepest_slope": found.model.steepest,
             "balls": [
@@ -124,7 +129,7 @@ def _finite(value: float) -> float | None:
 def find_slopes(
     session: Session,
     background: LinearImage,
-    scale: PixelScale | None = None,
+    scale: MeasuredScale | None = None,
     *,
     towards: NDArray[np.float64] | None = None,
     progress: Callable[[float], None] = lambda _share: None,
@@ -137,7 +142,7 @@ def find_slopes(
         Ball presses, what is stated of the scale, and the decisions of the user.
     background : LinearImage
         The untouched membrane.
-    scale : PixelScale, optional
+    scale : MeasuredScale, optional
         As measured; by default as stated.
     towards : (terms, 2), optional
         Coefficients of an earlier calibration that these presses are to correct.
@@ -150,14 +155,12 @@ def find_slopes(
         If the images cannot be used.
     """
     stated = session.in_place or InPlace()
-    grid = stated_grid(stated, background.size)
     if scale is not None:
-        mm_per_px, scale_sd = scale.measured.mm_per_px, scale.relative_sd
-    else:
-        assert stated.mm_per_px is not None
-        mm_per_px, sd = stated.mm_per_px[0], stated.mm_per_px_sd
-        scale_sd = STATED_SCALE_SD if sd is None else sd / mm_per_px
-    grid = replace(grid, mm_per_px=mm_per_px)
+        stated = replace(stated, mm_per_px=scale.mm_per_px)
+    grid, sd = stated_grid(stated, background.size), stated.mm_per_px_sd
+    scale_sd = STATED_SCALE_SD if sd is None else sd / grid.mm_per_px
+    if scale is not None:
+        scale_sd = scale.relative_sd
     presses, unreadable = _presses(session, background)
     result = calibrate_in_place(
         background.rgb, presses, grid, scale_sd=scale_sd, towards=towards, progress=progress
@@ -180,30 +183,6 @@ def in_place_calibration(
     return Calibration(MODEL, data, quality, made)
 
 
-@dataclass(frozen=True, slots=True)
-class PixelScale:
-    """The size of a pixel on the membrane, from images of a pressed object.
-
-    Attributes
-    ----------
-    measured : MeasuredScale
-        With its standard deviation.
-    """
-
-    measured: MeasuredScale
-
-    @property
-    def quality(self) -> QualityTable:
-        """The scale and its uncertainty."""
-        more = tr("Add images of the pressed object, at other places")
-        return judge_scale(self.measured.mm_per_px, self.relative_sd, more)
-
-    @property
-    def relative_sd(self) -> float:
-        """Relative standard deviation."""
-        return self.measured.sd_mm_per_px / self.measured.mm_per_px
-
-
 def stated_grid(stated: InPlace, size: tuple[int, int]) -> WorkingGrid:
     """Return the grid of the images of a session; of scale 1 where that is to be measured.
 
@@ -223,7 +202,7 @@ def stated_grid(stated: InPlace, size: tuple[int, int]) -> WorkingGrid:
     return WorkingGrid(ImageSize(*size), x, y / x, stated.region_px)
 
 
-def measured_scale(session: Session, background: LinearImage) -> PixelScale:
+def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
     """Return the scale by the images of ``scale/``.
 
     Parameters
@@ -245,17 +224,9 @@ def measured_scale(session: Session, background: LinearImage) -> PixelScale:
     where = str(session.folder / "scale")
     require_size(images[0].size, background.size, where=where)
     if pressed.pin_spacing_mm is not None:
-        found = scale_from_pins(
-            rgb,
-            bare,
-            spacing_mm=pressed.pin_spacing_mm,
-            where=where,
-        )
-    else:
-        assert pressed.punch_diameter_mm is not None
-        diameter_mm = pressed.punch_diameter_mm
-        found = scale_from_punch(rgb, bare, diameter_mm=diameter_mm, where=where)
-    return PixelScale(found)
+        return scale_from_pins(rgb, bare, spacing_mm=pressed.pin_spacing_mm, where=where)
+    assert pressed.punch_diameter_mm is not None
+    return scale_from_punch(rgb, bare, diameter_mm=pressed.punch_diameter_mm, where=where)
 
 
 def _presses(
@@ -298,21 +269,6 @@ def _noise(rgb: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.asarray(1.4826 * spread, np.float64)
 
 
-def judge_scale(mm_per_px: float, scale_sd: float, advice: str = "") -> QualityTable:
-    """Judge a scale by its relative standard deviation; `advice` says how to lower it."""
-    scale = judge("mm_per_px", tr("Scale"), mm_per_px, "mm/px")
-    uncertainty = judge(
-        "scale_sd_percent",
-        tr("Uncertainty of the scale"),
-        100.0 * scale_sd,
-        "%",
-        warn=2.0,
-        fail=10.0,
-        remedy=advice or tr("Measure the scale with a pin grid or a flat punch"),
-    )
-    return QualityTable((scale, uncertainty))
-
-
 def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityTable]:
     """Judge a calibration in place by the presses that were left out."""
     held_out = [press.held_out for press in result.presses]
@@ -323,7 +279,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
     more = tr("Press more balls at more positions")
     sizes = tr("Check the ball radii and the scale (mm per pixel)")
     grid = result.model.grid
-    scale = judge_scale(grid.mm_per_px, scale_sd).figures
+    scale = judge_scale(grid.pixel_mm.tolist(), scale_sd).figures
     return {
         "scale": QualityTable((*scale, *judge_stretch(result.stretch, grid))),
         "balls": QualityTable(

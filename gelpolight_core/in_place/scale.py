@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.translation import tr
 
@@ -21,6 +23,9 @@ BLURS_PX = (2.0, 3.0, 4.5, 7.0)
 """Smoothing of the images for the detection of pins: about half a pin's radius."""
 LEAST_PEAK = 0.25
 """Least strength of a pin as a share of the strongest one."""
+ACROSS = 0.8
+"""Least sine of the angle between the directions to the two neighbours that span the grid: more
+than that of a diagonal."""
 OFF_LATTICE = 0.2
 """Largest distance of a pin from the grid, as a share of the spacing."""
 LEAST_ON_LATTICE = 0.7
@@ -30,21 +35,59 @@ EDGE_SD_PX = 1.0
 
 @dataclass(frozen=True, slots=True)
 class MeasuredScale:
-    """Size of a camera pixel on the membrane.
+    """Size of a camera pixel on the membrane, from images of a pressed object.
 
     Attributes
     ----------
-    mm_per_px : float
-        Mean over the images.
-    sd_mm_per_px : float
-        Standard deviation of that mean.
+    mm_per_px, sd_mm_per_px : (x, y)
+        Mean over the images, and its standard deviation. Both axes have the same where they do not
+        differ by more than the standard deviations allow.
     pins : int
         That were used; 0 for a punch.
     """
 
-    mm_per_px: float
-    sd_mm_per_px: float
+    mm_per_px: tuple[float, float]
+    sd_mm_per_px: tuple[float, float]
     pins: int = 0
+
+    @property
+    def relative_sd(self) -> float:
+        """Relative standard deviation, the larger one of both axes."""
+        return float(np.divide(self.sd_mm_per_px, self.mm_per_px).max())
+
+    @property
+    def quality(self) -> QualityTable:
+        """The scale and its uncertainty, and whether pixels are square."""
+        more = tr("Add images of the pressed object, at other places")
+        return judge_scale(self.mm_per_px, self.relative_sd, more)
+
+
+def judge_scale(mm_per_px: Sequence[float], scale_sd: float, advice: str = "") -> QualityTable:
+    """Judge a scale along x and y by its relative standard deviation.
+
+    Parameters
+    ----------
+    mm_per_px : (x, y)
+        Size of a pixel.
+    scale_sd : float
+        Relative standard deviation.
+    advice : str, optional
+        How to lower it.
+    """
+    x, y = mm_per_px
+    scale = [judge("mm_per_px", tr("Scale"), x, "mm/px")]
+    if x != y:
+        scale.append(judge("mm_per_px_y", tr("Scale along y (pixels are not square)"), y, "mm/px"))
+    uncertainty = judge(
+        "scale_sd_percent",
+        tr("Uncertainty of the scale"),
+        100.0 * scale_sd,
+        "%",
+        warn=2.0,
+        fail=10.0,
+        remedy=advice or tr("Measure the scale with a pin grid or a flat punch"),
+    )
+    return QualityTable((*scale, uncertainty))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,14 +96,15 @@ class PinGrid:
 
     Attributes
     ----------
-    spacing_px, sd_px : float
-        Between neighbouring pins, and its standard deviation.
+    spacing_px, sd_px : (2,) float64
+        Pixels along x and along y in the distance of neighbouring pins, and the standard
+        deviations.
     pins_px : (N, 2) float64
         Their centres (u, v).
     """
 
-    spacing_px: float
-    sd_px: float
+    spacing_px: Array
+    sd_px: Array
     pins_px: Array
 
 
@@ -86,13 +130,16 @@ def scale_from_pins(
         If an image shows no regular grid of at least 9 pins.
     """
     grids = [find_pins(image, background, where=where) for image in images]
-    spacings = [grid.spacing_px for grid in grids]
-    spacing = float(np.mean(spacings))
-    between = float(np.std(spacings)) / np.sqrt(len(grids))
-    within = np.mean([grid.sd_px for grid in grids]) / np.sqrt(len(grids))
-    sd = float(np.hypot(between, within)) / spacing
-    count = sum(len(grid.pins_px) for grid in grids)
-    return MeasuredScale(spacing_mm / spacing, sd * spacing_mm / spacing, count)
+    spacings = np.array([grid.spacing_px for grid in grids])
+    within = np.mean([grid.sd_px for grid in grids], axis=0)
+    mm_per_px = spacing_mm / spacings.mean(axis=0)
+    sd_px = np.hypot(spacings.std(axis=0) / np.sqrt(len(grids)), within)
+    relative_sd = sd_px * mm_per_px / spacing_mm
+    both = float(np.hypot(*relative_sd))
+    if abs(np.log(mm_per_px[1] / mm_per_px[0])) <= DOUBTFUL_SIGMAS * both:
+        mm_per_px, relative_sd = np.full(2, mm_per_px.mean()), np.full(2, 0.5 * both)
+    (x, y), (sd_x, sd_y) = mm_per_px.tolist(), (relative_sd * mm_per_px).tolist()
+    return MeasuredScale((x, y), (sd_x, sd_y), sum(len(grid.pins_px) for grid in grids))
 
 
 def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
@@ -116,7 +163,11 @@ def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
             where=where,
             advice=tr("Press the pin grid evenly, 3 x 3 pins or more, or state mm_per_px"),
         )
-    return found
+    # Where a pin's spot is cut off on one side, its centre depends on the smoothing. The error
+    # follows from the other smoothing with the nearest result, as that of one of two values.
+    others = [fit.spacing_px for fit in fits if fit is not found and len(fit.pins_px)]
+    off = np.abs(np.array(others or [found.spacing_px]) - found.spacing_px).min(axis=0)
+    return replace(found, sd_px=np.hypot(found.sd_px, off / np.sqrt(2.0)))
 
 
 def scale_from_punch(
@@ -140,7 +191,8 @@ def scale_from_punch(
     widths = np.array([2.0 * edge.radius for edge in edges])
     width = float(widths.mean())
     sd_px = float(max(widths.std(), 2.0 * EDGE_SD_PX) / np.sqrt(len(widths)))
-    return MeasuredScale(diameter_mm / width, diameter_mm / width * sd_px / width)
+    mm_per_px = diameter_mm / width
+    return MeasuredScale((mm_per_px,) * 2, (mm_per_px * sd_px / width,) * 2)
 
 
 def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
@@ -216,36 +268,37 @@ def _offset(before: Map, at: Map, after: Map) -> Array:
 
 def _lattice(pins: Array) -> PinGrid:
     """Return the best square grid through pins; one without pins if there is none."""
-    none = PinGrid(1.0, 1.0, np.empty((0, 2)))
+    none = PinGrid(np.ones(2), np.ones(2), np.empty((0, 2)))
     if len(pins) < LEAST_PINS:
         return none
-    gaps = np.linalg.norm(pins[:, None] - pins[None], axis=2)
-    np.fill_diagonal(gaps, np.inf)
-    nearest = gaps.argmin(axis=1)
-    middle = pins[int(gaps.min(axis=1).argmin())]
     start = int(np.linalg.norm(pins - np.median(pins, axis=0), axis=1).argmin())
-    middle, first = pins[start], pins[nearest[start]] - pins[start]
-    axes = np.stack([first, [-first[1], first[0]]])
-    on = np.zeros(len(pins), np.bool_)
+    steps = np.delete(pins, start, axis=0) - pins[start]
+    lengths = np.linalg.norm(steps, axis=1)
+    first = steps[lengths.argmin()]
+    # The nearest pin in another direction: along y pixels may have another size.
+    across = np.abs(steps @ [-first[1], first[0]]) / (lengths * lengths.min())
+    second = steps[np.where(across > ACROSS, lengths, np.inf).argmin()]
+    axes, middle = np.stack([first, second]), pins[start]
     for reach in (1.6, 3.2, 6.4, 100.0):
+        if np.linalg.matrix_rank(axes) < 2:
+            return none
         index = (pins - middle) @ np.linalg.inv(axes)
         whole = np.rint(index)
         near = np.abs(whole).max(axis=1) < reach
         on = near & (np.abs(index - whole).max(axis=1) < OFF_LATTICE)
-        if np.count_nonzero(on) < 4 or np.linalg.matrix_rank(whole[on]) < 2:
+        design = np.column_stack([whole[on], np.ones(np.count_nonzero(on))])
+        if len(design) < 4 or np.linalg.matrix_rank(design) < 3:
             return none
-        # One spacing and direction for both axes, and an origin: a similarity.
-        a, b = whole[on].T
-        one, zero = np.ones_like(a), np.zeros_like(a)
-        design = np.concatenate(
-            [np.stack([a, -b, one, zero], axis=1), np.stack([b, a, zero, one], axis=1)]
-        )
-        target = np.concatenate([pins[on, 0], pins[on, 1]])
-        (c, s, x, y), *_ = np.linalg.lstsq(design, target, rcond=None)
-        axes, middle = np.array([[c, s], [-s, c]]), np.array([x, y])
-    if np.count_nonzero(on) < LEAST_ON_LATTICE * len(pins):
+        found = np.linalg.lstsq(design, pins[on], rcond=None)[0]
+        axes, middle = found[:2], found[2]
+    # A square grid turns both axes by the same angle: the columns are perpendicular, and as long as
+    # the spacing along x and y, for pixels of any height.
+    spacing = np.linalg.norm(axes, axis=0)
+    along = axes / spacing
+    square = abs(float(along[:, 0] @ along[:, 1])) < OFF_LATTICE
+    if not square or np.count_nonzero(on) < LEAST_ON_LATTICE * len(pins):
         return none
-    spacing = float(np.hypot(*axes[0]))
-    left = design @ np.array([c, s, x, y]) - target
-    covariance = np.linalg.inv(design.T @ design) * float(left @ left) / max(len(target) - 4, 1)
-    return PinGrid(spacing, float(np.sqrt(covariance[0, 0])), pins[on])
+    scatter = ((pins[on] - design @ found) ** 2).sum(axis=0) / max(len(design) - 3, 1)
+    spread = np.linalg.inv(design.T @ design)[:2, :2]
+    sd = np.sqrt(scatter * np.einsum("ik,ij,jk->k", along, spread, along))
+    return PinGrid(spacing, sd, pins[on])

@@ -157,26 +157,29 @@ def test_a_flat_punch_gives_the_scale() -> None:
     image = background + 0.15 * slope[..., None] * np.stack(lights, axis=-1)
     image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
     found = scale_from_punch([image.astype(np.float32)], background, diameter_mm=5.0)
-    assert found.mm_per_px == pytest.approx(5.0 / 86.0, rel=0.02)
-    assert abs(found.mm_per_px - 5.0 / 86.0) < 2.0 * found.sd_mm_per_px
+    assert found.mm_per_px[0] == found.mm_per_px[1] == pytest.approx(5.0 / 86.0, rel=0.02)
+    assert abs(found.mm_per_px[0] - 5.0 / 86.0) < 2.0 * found.sd_mm_per_px[0]
     noise = background + np.random.default_rng(4).normal(0.0, 0.004, image.shape)
     with pytest.raises(InputError, match="no round edge"):
         scale_from_punch([noise.astype(np.float32)], background, diameter_mm=5.0)
 
 
-def test_a_pin_grid_gives_the_scale() -> None:
-    spacing_px, turn = 23.7, 0.07
+@pytest.mark.parametrize(("aspect", "turn"), [(1.0, 0.6), (1.03, 0.07), (1.25, 0.3)])
+def test_a_pin_grid_gives_the_scale(aspect: float, turn: float) -> None:
+    spacing_px = 23.7
     background = np.full((240, 320, 3), 0.4, np.float32)
-    image = background.copy()
-    y, x = np.mgrid[:240, :320]
+    image, (y, x) = background.copy(), np.mgrid[:240, :320]
     for i, j in product(range(-4, 5), range(-3, 4)):
         u = 160.0 + spacing_px * (i * np.cos(turn) - j * np.sin(turn))
-        v = 120.0 + spacing_px * (i * np.sin(turn) + j * np.cos(turn))
+        v = 120.0 + spacing_px / aspect * (i * np.sin(turn) + j * np.cos(turn))
         image += (0.2 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 3.0**2)))[..., None]
     image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
     found = scale_from_pins([image.astype(np.float32)], background, spacing_mm=2.0)
-    assert found.mm_per_px == pytest.approx(2.0 / spacing_px, rel=2e-3)
-    assert abs(found.mm_per_px - 2.0 / spacing_px) < 4.0 * found.sd_mm_per_px
+    truth = np.array([1.0, aspect]) * 2.0 / spacing_px
+    assert (np.abs(found.mm_per_px - truth) < 4.0 * np.array(found.sd_mm_per_px)).all()
+    assert found.relative_sd < 1e-3
+    assert len(set(found.mm_per_px)) == (1 if aspect == 1.0 else 2)
+    assert ("not square" in found.quality.figures[1].text) is (aspect != 1.0)
     with pytest.raises(InputError, match="no regular grid"):
         scale_from_pins([background], background, spacing_mm=2.0)
 
@@ -211,12 +214,8 @@ def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states
 @pytest.mark.parametrize(
     "region", [(300, 10, 21, 100), (0, 200, 100, 41), (10, 10, 31, 100), (-1, 0, 100, 100)]
 )
-def test_a_region_that_cannot_hold_a_press_is_refused(
-    region: tuple[int, int, int, int],
-) -> None:
-    with pytest.raises(
-        InputError, match=r"is not inside the image of 320 x 240 pixels or too small"
-    ):
+def test_a_region_that_cannot_hold_a_press_is_refused(region: tuple[int, int, int, int]) -> None:
+    with pytest.raises(InputError, match=r"is not inside the image of 320 x 240 pixels or too"):
         WorkingGrid(ImageSize(320, 240), 0.1, region_px=region)
 
 

@@ -154,8 +154,8 @@ def test_the_scale_is_measured_on_a_pressed_pin_grid(
     technician.wizard.open.import_files([with_pins(background, tmp_path / "pins.png")])
     technician.rest()
     technician.until(lambda: technician.state("scale") == "pass")
-    measured = project.results[in_place.SCALE].measured
-    assert measured.mm_per_px == pytest.approx(3.0 / PINS_PX, rel=0.01)
+    measured = project.results[in_place.SCALE]
+    assert measured.mm_per_px == pytest.approx([3.0 / PINS_PX] * 2, rel=0.01)
     name = project.session.found("scale")[0].name
     technician.wizard.show_capture(name)
     said = technician.see("calibrate.live")
