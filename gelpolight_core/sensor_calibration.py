@@ -523,11 +523,6 @@ class Calibration:
         return self.data.table
 
     @property
-    def bad_pixels(self) -> BadPixels:
-        """Dead and hot pixels of the camera."""
-        return self.data.bad_pixels
-
-    @property
     def open_sensor(self) -> OpenSensor:
         """Optics, lights and membrane.
 

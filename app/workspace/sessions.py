@@ -6,14 +6,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.workspace.entries import Entry
-from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import NAME_LIMIT, parse_toml, plain_text, read_file
-from gelpolight_core.session.description import FILE_NAME
-from gelpolight_core.session.images import SUFFIXES
-from gelpolight_core.session.session import IN_PLACE, InPlace, SensorData, Session
+
+if TYPE_CHECKING:
+    from gelpolight_core.session.session import Session
+
+DESCRIPTION = "session.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,9 @@ def read_session_entry(folder: Path) -> SessionEntry:
     OSError
         If the folder cannot be read.
     """
+    from gelpolight_core.calibration.recipes import recipe_of
+    from gelpolight_core.session.images import SUFFIXES
+
     folders = [path for path in folder.iterdir() if path.is_dir()]
     images = [
         path
@@ -66,7 +71,7 @@ def read_session_entry(folder: Path) -> SessionEntry:
         folder,
         session.serial,
         len(images),
-        file_time(max(path.stat().st_mtime for path in (folder / FILE_NAME, *folders))),
+        file_time(max(path.stat().st_mtime for path in (folder / DESCRIPTION, *folders))),
         newest=max(images, key=lambda path: path.stat().st_mtime, default=None),
         next_stage=next((stage.key for stage in recipe.stages if stage.folder in missing), ""),
     )
@@ -90,8 +95,10 @@ def file_time(seconds: float) -> datetime:
 
 def _described(folder: Path) -> Session:
     """Return serial and kind of the sensor, also if the description lacks the rest."""
+    from gelpolight_core.session.session import IN_PLACE, InPlace, SensorData, Session
+
     try:
-        content = parse_toml(read_file(folder / FILE_NAME))
+        content = parse_toml(read_file(folder / DESCRIPTION))
         serial = plain_text(content["sensor"]["serial"], NAME_LIMIT)
         stated = content.get(IN_PLACE)
         in_place = None if stated is None else InPlace(stated.get("mm_per_px"))

@@ -24,14 +24,13 @@ import platformdirs
 
 from app.workspace.entries import Entry, read_entry
 from app.workspace.files import copy_file, copy_new, free_path
-from app.workspace.sessions import SessionEntry, read_session_entry
+from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.trash import Removal, put_into_trash, removals_in, take_from_trash
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_json
 from gelpolight_core.io.reading import parse_json, read_file
-from gelpolight_core.session.description import FILE_NAME
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -213,7 +212,7 @@ class Workspace:
             If the workspace exists but cannot be read.
         """
         try:
-            found = self.sensors_folder.glob(f"*/sessions/[!.]*/{FILE_NAME}")
+            found = self.sensors_folder.glob(f"*/sessions/[!.]*/{DESCRIPTION}")
             entries = [read_session_entry(path.parent) for path in found]
         except OSError as error:
             raise self._unreadable(error) from error

@@ -9,19 +9,18 @@ from __future__ import annotations
 import hashlib
 import math
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.io.reading import (
     brief,
     check_version,
-    open_file,
+    missing_file,
+    opened_zip,
     parse_json,
     read_member,
     refuse_bomb,
@@ -246,21 +245,14 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
         If the file does not exist or cannot be read, or if an error of damaged archives, texts or
         values is raised while it is open.
     """
-    try:
-        stream = open_file(path)
-    except FileNotFoundError as error:
-        raise InputError(
-            tr("The file does not exist"),
-            where=str(path),
-            advice=tr("Create it with gelpolight calibrate"),
-        ) from error
-    with refusing(
-        tr("The file is damaged, or is not a calibration ({error})"),
-        path,
-        advice=tr("Use a backup copy, or calibrate again from the session"),
+    if not path.is_file():
+        raise missing_file(path, tr("Create it with gelpolight calibrate"))
+    with (
+        refusing(
+            tr("The file is damaged, or is not a calibration ({error})"),
+            path,
+            advice=tr("Use a backup copy, or calibrate again from the session"),
+        ),
+        opened_zip(path) as archive,
     ):
-        try:
-            with stream, zipfile.ZipFile(stream) as archive:
-                yield archive
-        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
-            raise ValueError(str(error) or type(error).__name__) from error
+        yield archive

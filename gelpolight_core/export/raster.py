@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import check_version, refusing
@@ -124,12 +123,7 @@ def read_npz(path: Path) -> HeightMap:
     advice = tr("Choose an .npz file exported by this program")
     found = tr("The file is not a height map in npz format, or is damaged ({error})")
     with refusing(found, path, advice=advice):
-        try:
-            stored = read_arrays(path, (*NPZ_NAMES, *HEAD))
-        except FileNotFoundError as error:
-            raise InputError(
-                tr("The file does not exist"), where=str(path), advice=advice
-            ) from error
+        stored = read_arrays(path, (*NPZ_NAMES, *HEAD))
         head = {key: stored.pop(key).item() for key in HEAD if key in stored}
         if head:  # files of earlier programs have none
             check_version(head, FORMAT, VERSION, path)

@@ -138,10 +138,7 @@ def solve(sums: Iterable[PressSums], ridge: Ridge, *, towards: Array | None = No
         Coefficients towards which the ridge regularises, such as those of another gel; by default
         0.
     """
-    chosen = list(sums)
-    squares = sum((press.squares for press in chosen), np.zeros_like(chosen[0].squares))
-    products = sum((press.products for press in chosen), np.zeros_like(chosen[0].products))
-    return _solved(squares, products, sum(press.nodes for press in chosen), ridge, towards)
+    return _solved(*_totals(list(sums)), ridge, towards)
 
 
 def _solved(
@@ -177,17 +174,20 @@ def left_out(
 ) -> list[Array]:
     """Return for each press the coefficients of a fit without it."""
     found: list[Array] = [np.empty(0)] * len(sums)
-    whole = _totals(sums)
-    for fold in folds(len(sums)):
-        out = _totals([sums[i] for i in fold])
-        coefficients = _solved(*_without(whole, out), ridge, towards)
+    for fold, rest in _without_folds(sums):
+        coefficients = _solved(*rest, ridge, towards)
         for i in fold:
             found[i] = coefficients
     return found
 
 
-def _without(whole: _Totals, out: _Totals) -> _Totals:
-    return whole[0] - out[0], whole[1] - out[1], whole[2] - out[2]
+def _without_folds(sums: Sequence[PressSums]) -> list[tuple[list[int], _Totals]]:
+    """Return each group of presses that is left out, with the totals of the others."""
+    whole, parts = _totals(sums), []
+    for fold in folds(len(sums)):
+        out = _totals([sums[i] for i in fold])
+        parts.append((fold, (whole[0] - out[0], whole[1] - out[1], whole[2] - out[2])))
+    return parts
 
 
 def _totals(sums: Sequence[PressSums]) -> _Totals:
@@ -198,18 +198,14 @@ def _totals(sums: Sequence[PressSums]) -> _Totals:
 
 def choose_ridge(sums: Sequence[PressSums], *, towards: Array | None = None) -> Ridge:
     """Return the ridge with the smallest error of presses that were left out."""
-    whole = _totals(sums)
-    parts = []
-    for fold in folds(len(sums)):
-        out = _totals([sums[i] for i in fold])
-        parts.append((fold, _without(whole, out)))
+    parts = _without_folds(sums)
     best, least = FIRST_RIDGE, np.inf
     for growths in product(GROWTHS, GROWTHS):
         for strength in RIDGES:
             ridge = Ridge(strength, *growths)
             loss = 0.0
-            for fold, (squares, products, nodes) in parts:
-                coefficients = _solved(squares, products, nodes, ridge, towards)
+            for fold, rest in parts:
+                coefficients = _solved(*rest, ridge, towards)
                 loss += sum(min(mean_squared_error(sums[i], coefficients), LOSS_CAP) for i in fold)
                 if loss > least:
                     break

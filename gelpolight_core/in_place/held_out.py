@@ -69,10 +69,7 @@ def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldO
         Fitted without it.
     """
     slope_x, slope_y = evaluate(coefficients, seen.change)
-    from_x, from_y, rho = distances(slope_x.shape, ball)
-    inside = (rho < INSIDE * ball.contact) & seen.usable
-    dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
-    wanted = ball_slopes(dx, dy, ball.radius)
+    rho, inside, dx, dy, wanted = _inside(seen, ball)
     weight = seen.usable.astype(np.float32)
     depth = depth_of(slope_x, slope_y, pitch_mm=1.0, weight=weight)[0]
     found_x, found_y = surface_slopes(depth, 1.0)
@@ -94,6 +91,15 @@ def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldO
         np.sqrt(0.5 * ((found - wanted) ** 2).sum(axis=1)),
         float(np.sqrt(np.mean(far**2))) if far.size else np.nan,
     )
+
+
+def _inside(seen: ColourChange, ball: Ball) -> tuple[Map, NDArray[np.bool_], Array, Array, Array]:
+    """Return distances, nodes inside the contact, their x and y, and the ball's slopes there."""
+    rows, columns = seen.usable.shape
+    from_x, from_y, rho = distances((rows, columns), ball)
+    inside = (rho < INSIDE * ball.contact) & seen.usable
+    dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
+    return rho, inside, dx, dy, ball_slopes(dx, dy, ball.radius)
 
 
 def _angles(a: Array, b: Array) -> Array:
@@ -138,10 +144,7 @@ def amplitude_of(
     def share(item: tuple[ColourChange, Ball, Array]) -> float:
         change, ball, fitted = item
         found_x, found_y = evaluate(fitted, change.change)
-        from_x, from_y, rho = distances(found_x.shape, ball)
-        inside = (rho < INSIDE * ball.contact) & change.usable
-        dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
-        wanted = ball_slopes(dx, dy, ball.radius)
+        _, inside, _, _, wanted = _inside(change, ball)
         total = (found_x[inside] * wanted[:, 0] + found_y[inside] * wanted[:, 1]).sum()
         return float(total / max((wanted**2).sum(), 1e-12))
 

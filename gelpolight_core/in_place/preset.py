@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.reading import brief, read_toml
@@ -134,16 +133,8 @@ def read_preset(path: Path) -> Preset:
         If the file is missing, is not TOML, or has a key that is unknown, missing, of the wrong
         kind or out of range.
     """
-    content = read_toml(path)
-    return _parse(content, path)
-
-
-def _parse(content: dict[str, Any], path: Path) -> Preset:
-    top = Table(content, "", path)
-    if top.text("format") != FORMAT:
-        raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))
-    if top.whole("version") != VERSION:
-        raise top.wrong("version", tr("is unknown"))
+    top = Table(read_toml(path), "", path)
+    top.check_version(FORMAT, VERSION)
     camera, image, area, markers = (
         top.table(name) for name in ("camera", "image", "working_area", "markers")
     )
@@ -154,7 +145,7 @@ def _parse(content: dict[str, Any], path: Path) -> Preset:
     image.no_more("width_px", "height_px", "mm_per_px", "mm_per_px_sd")
     area.no_more("width_mm", "height_mm")
     markers.no_more("pitch_mm")
-    left, above, right, below = _numbers(camera, "cropped", 0.0, 0.45, count=4)
+    left, above, right, below = camera.numbers("cropped", 0.0, 0.45, count=4)
     return Preset(
         path.stem,
         top.text("name"),
@@ -165,22 +156,9 @@ def _parse(content: dict[str, Any], path: Path) -> Preset:
         image.number("mm_per_px", *SCALE_RANGE),
         image.number("mm_per_px_sd", 0.0, SCALE_RANGE[1]),
         (area.number("width_mm", 0.1, 1000.0), area.number("height_mm", 0.1, 1000.0)),
-        _numbers(markers, "pitch_mm", 0.0, 100.0),
+        markers.numbers("pitch_mm", 0.0, 100.0),
     )
 
 
 def _size(table: Table) -> tuple[int, int]:
     return int(table.number("width_px", 32, MOST_PX)), int(table.number("height_px", 32, MOST_PX))
-
-
-def _numbers(
-    table: Table, key: str, low: float, high: float, count: int | None = None
-) -> tuple[float, ...]:
-    """Return a list of numbers within a range."""
-    values = table.content.get(key)
-    if not isinstance(values, list) or not values or (count is not None and len(values) != count):
-        what = tr("is not a list of {n} numbers").format(n=count) if count else tr("is not a list")
-        raise table.wrong(key, what)
-    return tuple(
-        Table({key: value}, table.name, table.path).number(key, low, high) for value in values
-    )

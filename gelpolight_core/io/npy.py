@@ -6,8 +6,6 @@ import io
 import math
 import re
 import tokenize
-import zipfile
-import zlib
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from gelpolight_core.io.reading import open_file, read_member, refuse_bomb
+from gelpolight_core.io.reading import opened_zip, read_member, refuse_bomb
 
 HEAD_LIMIT = 10_000
 KINDS = re.compile(r"<[fi][48]|\|u1|<U\d{1,5}")
@@ -34,19 +32,14 @@ def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
     ValueError
         If it is not such a file, is damaged, or declares more than a file of its size can contain.
     """
-    try:
-        with open_file(path) as stream, zipfile.ZipFile(stream) as archive:
-            stored = {info.filename: info for info in archive.infolist()}
-            members = {name: stored[f"{name}.npy"] for name in names if f"{name}.npy" in stored}
-            refuse_bomb(members.values())
-            return {
-                name: array_of(read_member(archive, info.filename, info.file_size))
-                for name, info in members.items()
-            }
-    except FileNotFoundError:
-        raise
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
-        raise ValueError("the archive is damaged") from error
+    with opened_zip(path) as archive:
+        stored = {info.filename: info for info in archive.infolist()}
+        members = {name: stored[f"{name}.npy"] for name in names if f"{name}.npy" in stored}
+        refuse_bomb(members.values())
+        return {
+            name: array_of(read_member(archive, info.filename, info.file_size))
+            for name, info in members.items()
+        }
 
 
 def array_of(data: bytes) -> NDArray[Any]:

@@ -14,6 +14,7 @@ import re
 import stat
 import tomllib
 import zipfile
+import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from io import BufferedReader
@@ -105,6 +106,25 @@ def refuse_bomb(members: Collection[zipfile.ZipInfo]) -> None:
     declared = sum(info.file_size for info in members)
     if declared > max(DECLARED_LIMIT, DECLARED_TIMES * sum(i.compress_size for i in members)):
         raise ValueError(f"its arrays declare {declared} bytes")
+
+
+@contextmanager
+def opened_zip(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open a zip archive for reading.
+
+    Raises
+    ------
+    FileNotFoundError, InputError
+        See :func:`open_file`.
+    ValueError
+        If it is not a zip archive, or is found to be damaged while it is open.
+    """
+    stream = open_file(path)
+    try:
+        with stream, zipfile.ZipFile(stream) as archive:
+            yield archive
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
+        raise ValueError(str(error) or type(error).__name__) from error
 
 
 def read_member(archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
@@ -245,10 +265,13 @@ def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
     Raises
     ------
     InputError
-        If the content raises one of the errors that wrong keys, types and values raise.
+        If the content raises one of the errors that wrong keys, types and values raise, or there
+        is no such file.
     """
     try:
         yield
+    except FileNotFoundError as error:
+        raise missing_file(path, advice) from error
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
         raise InputError(found.format(error=reason), where=str(path), advice=advice) from error
@@ -306,11 +329,10 @@ def brief(value: Any, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def missing_file(path: Path) -> InputError:
+def missing_file(path: Path, advice: str = "") -> InputError:
     """Return the error for a file that does not exist."""
-    return InputError(
-        tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
-    )
+    advice = advice or tr("Check the file name")
+    return InputError(tr("The file does not exist"), where=str(path), advice=advice)
 
 
 def unreadable(error: OSError, path: Path) -> InputError:

@@ -328,4 +328,4 @@ class Reconstructor:
                 where=name or tr("image"),
                 advice=tr("Use the calibration of this sensor at this image size"),
             )
-        return self.calibration.bad_pixels.left_out(accepted(frame, name=name))
+        return self.calibration.data.bad_pixels.left_out(accepted(frame, name=name))

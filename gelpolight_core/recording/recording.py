@@ -34,7 +34,7 @@ ms and 1.9 MB.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
 from typing import Any
 
@@ -42,7 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.io.reading import written_text
+from gelpolight_core.io.codec import pack, unpack
 
 ENDING = ".gplrec"
 FORMAT = "gelpolight-recording"
@@ -102,8 +102,7 @@ class RecordingHeader:
 
     def as_json(self) -> dict[str, Any]:
         """Return the description as plain values."""
-        texts = {name: getattr(self, name) for name in _TEXTS}
-        return {"format": FORMAT, **texts, "settings": dict(self.settings)}
+        return {"format": FORMAT, **pack(self, {}, "header")}
 
     @classmethod
     def from_json(cls, content: Any) -> RecordingHeader:
@@ -116,19 +115,5 @@ class RecordingHeader:
         """
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise ValueError("not the description of a recording")
-        settings = content.get("settings")
-        texts: dict[str, Any] = {name: content.get(name) for name in _TEXTS}
-        for text in texts.values():
-            written_text(text)
-        if not isinstance(settings, dict):
-            raise ValueError("the settings are missing")
-        for key, value in settings.items():
-            written_text(key)
-            if isinstance(value, str):
-                written_text(value)
-            elif not isinstance(value, float | int):
-                raise ValueError("a setting is neither a number nor a text")
-        return cls(settings=settings, **texts)
-
-
-_TEXTS = ("serial", "calibration_id", "source", "kind", "started", "program", "note")
+        known = {field.name: content.get(field.name) for field in fields(cls)}
+        return unpack(cls, known, {}, "header")

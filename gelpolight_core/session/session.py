@@ -312,10 +312,9 @@ def _parse_in_place(top: Table) -> dict[str, Any]:
 
 def _parse_scale(table: Table) -> tuple[float, float] | None:
     """Return the size of a pixel, one number or [x, y]."""
-    stated = table.content.get("mm_per_px")
-    if isinstance(stated, list) and len(stated) == 2:
-        x, y = (Table({"mm_per_px": n}, table.name, table.path) for n in stated)
-        return x.number("mm_per_px", *SCALE_RANGE), y.number("mm_per_px", *SCALE_RANGE)
+    if isinstance(table.content.get("mm_per_px"), list):
+        x, y = table.numbers("mm_per_px", *SCALE_RANGE, count=2)
+        return x, y
     one = _optional(table, "mm_per_px", SCALE_RANGE)
     return None if one is None else (one, one)
 

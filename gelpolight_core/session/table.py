@@ -76,6 +76,16 @@ class Table:
             raise self.wrong(key, text.format(value=brief(value, 40), low=low, high=high))
         return float(value)  # type: ignore[arg-type]
 
+    def numbers(
+        self, key: str, low: float, high: float, *, count: int | None = None
+    ) -> tuple[float, ...]:
+        """Return a list of numbers within a range, of any length or of `count` numbers."""
+        values = self.content.get(key)
+        if not isinstance(values, list) or not values or count not in (None, len(values)):
+            what = tr("is not a list") if count is None else tr("is not a list of {n} numbers")
+            raise self.wrong(key, what.format(n=count))
+        return tuple(Table({key: v}, self.name, self.path).number(key, low, high) for v in values)
+
     def table(self, key: str) -> Table:
         """Return a sub-table."""
         value = self.content.get(key)
