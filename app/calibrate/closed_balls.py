@@ -40,8 +40,7 @@ from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.in_place.calibrate import LEAST_PRESSES
-from gelpolight_core.in_place.press import find_contact
+from gelpolight_core.in_place.calibrate import LEAST_PRESSES, contact_in
 from gelpolight_core.reconstruction.in_place.change import Reference, reference
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.session.session import InPlace
@@ -113,7 +112,7 @@ def detect_closed_ball(
         refuse_size(rgb, (grid.image.width, grid.image.height))
         seen = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
         radius = radius_mm / grid.pitch_mm
-        found, _ = find_contact(seen, untouched.base, ball_radius=radius, name=tr("Image"))
+        found = contact_in(seen, untouched.base, radius=radius, name=tr("Image")).circle
         contact = Circle(*astuple(grid.in_image(found)), "good", handle="ball" if editable else "")
         text = tr("Ball found: contact radius {c:.2f} mm.")
         return Detection(

@@ -24,6 +24,8 @@ Mask = NDArray[np.bool_]
 REPEATABILITY = 0.01
 # Noise by rounding two 8-bit images, for any camera.
 ROUNDING = float(np.sqrt(2.0 / 12.0) / 255.0)
+BACKGROUND = "background"
+"""Name of the image without contact in messages."""
 # Below this brightness a ratio of two images is mostly rounding.
 DARK = 4.0 / 255.0
 # Above a quarter, the exposure or a light was changed; warming changes it less.
@@ -73,7 +75,6 @@ def prepare_pair(
     valid: Mask | None,
     *,
     name: str = "press",
-    background_name: str = "background",
 ) -> tuple[Array, Array, Mask]:
     """Return two images without holes, and the area in which they can be compared.
 
@@ -83,8 +84,8 @@ def prepare_pair(
         Images; pixels that are not finite are left out of the area and set to 0.
     valid : (rows, columns) bool or None
         The working area; without it, the lit part of `background`.
-    name, background_name : str, optional
-        Names of the images in messages.
+    name : str, optional
+        Name of `press` in messages.
 
     Returns
     -------
@@ -98,26 +99,24 @@ def prepare_pair(
     InputError
         If the shapes do not fit or an image is black or saturated.
     """
-    _check_shapes(press, background, valid, name, background_name)
+    _check_shapes(press, background, valid, name)
     # One sum is finite only where all six values are.
     with np.errstate(invalid="ignore", over="ignore"):
         finite = np.asarray(np.isfinite((press + background) @ np.ones(3, np.float32)))
     press, background = _without_holes(press, finite), _without_holes(background, finite)
-    area = finite & (lit_area(background, background_name) if valid is None else valid)
-    _check_exposure(background, area, background_name)
+    area = finite & (lit_area(background) if valid is None else valid)
+    _check_exposure(background, area, BACKGROUND)
     _check_exposure(press, area, name)
     return press, background, area
 
 
-def lit_area(background: Array, name: str = "background") -> Mask:
+def lit_area(background: Array) -> Mask:
     """Return the lit part of an image without contact: its largest bright region, holes filled.
 
     Parameters
     ----------
     background : (rows, columns, 3)
         Image without contact, finite.
-    name : str, optional
-        Its name in messages.
 
     Raises
     ------
@@ -132,7 +131,7 @@ def lit_area(background: Array, name: str = "background") -> Mask:
     if not regions:
         raise InputError(
             tr("the image is all black"),
-            where=name,
+            where=BACKGROUND,
             advice=tr("Switch the lights on and check the exposure"),
         )
     filled = np.zeros(bright.shape, np.uint8)
@@ -140,17 +139,15 @@ def lit_area(background: Array, name: str = "background") -> Mask:
     return filled > 0
 
 
-def _check_shapes(
-    press: Array, background: Array, valid: Mask | None, name: str, background_name: str
-) -> None:
-    for image, what in ((press, name), (background, background_name)):
+def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str) -> None:
+    for image, what in ((press, name), (background, BACKGROUND)):
         if image.ndim != 3 or image.shape[2] != 3 or min(image.shape[:2]) < 32:
             raise InputError(
                 tr("the array has shape {shape}").format(shape=image.shape),
                 where=what,
                 advice=tr("Give a colour image of at least 32x32 pixels"),
             )
-    for other, what in ((background, background_name), (valid, tr("working area"))):
+    for other, what in ((background, BACKGROUND), (valid, tr("working area"))):
         if other is not None and other.shape[:2] != press.shape[:2]:
             raise InputError(
                 tr("the image is {w}x{h} pixels and {other} is {ow}x{oh}").format(

@@ -38,7 +38,6 @@ from gelpolight_core.in_place.held_out import (
     held_out_presses,
 )
 from gelpolight_core.in_place.next_ball import learning_curve, next_position
-from gelpolight_core.in_place.press import find_contact
 from gelpolight_core.in_place.roundness import Stretch, stretch_of
 from gelpolight_core.in_place.same_view import refuse_other_view
 from gelpolight_core.parallel import in_parallel
@@ -56,7 +55,9 @@ from gelpolight_core.reconstruction.in_place.model import (
     colour_cells,
     evaluate,
 )
+from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.contour import Circle
+from gelpolight_core.reflectance.indentation import Indentation
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -147,23 +148,15 @@ class InPlaceResult:
     stretch: Stretch | None = None
 
 
-@dataclass(slots=True)
-class _Work:
-    """The presses during the refinement of positions and polynomial."""
+@dataclass(frozen=True, slots=True)
+class _Press:
+    """A press during the refinement: its colours, its contact as found first, and as it is now."""
 
-    names: list[str]
-    seen: list[ColourChange]
-    start: list[Ball]
-    balls: list[Ball]
-    refused: dict[str, InputError]
-    stretches: list[tuple[float, ...]]
-
-    def keep(self, kept: Sequence[bool]) -> None:
-        """Keep only these presses."""
-        self.names = list(compress(self.names, kept))
-        self.seen = list(compress(self.seen, kept))
-        self.start = list(compress(self.start, kept))
-        self.balls = list(compress(self.balls, kept))
+    name: str
+    seen: ColourChange
+    start: Ball
+    ball: Ball
+    stretches: tuple[float, ...]
 
 
 def calibrate_in_place(
@@ -204,40 +197,67 @@ def calibrate_in_place(
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
     refuse_other_view(images, reduced)
     refuse_dead_channel(images, reduced)
-    work = _begin(presses, images, base, grid, say)
-    sums, ridge = _sums(work), FIRST_RIDGE
+    found, refused = _begin(presses, images, base, grid, say)
+    stretch = stretch_of([press.stretches for press in found])
+    sums, ridge = _sums(found), FIRST_RIDGE
     for turn in range(ROUNDS):
         if turn == 0:
             ridge = choose_ridge(sums, towards=towards)
         else:
-            sums = _explained(work, sums, left_out(sums, ridge, towards=towards))
+            without = left_out(sums, ridge, towards=towards)
+            found, sums = _explained(found, refused, sums, without)
         say(0.35 + 0.15 * turn)
-        _place(work, left_out(sums, ridge, towards=towards))
-        sums = _sums(work)
+        found = _placed(found, left_out(sums, ridge, towards=towards))
+        sums = _sums(found)
     ridge = choose_ridge(sums, towards=towards)
-    sums = _explained(work, sums, left_out(sums, ridge, towards=towards))
+    found, sums = _explained(found, refused, sums, left_out(sums, ridge, towards=towards))
     say(0.85)
     without = left_out(sums, ridge, towards=towards)
-    share = amplitude_of(work.seen, work.balls, without)
-    held_out = held_out_presses(work.seen, work.balls, [c / share for c in without])
+    seen, balls = [press.seen for press in found], [press.ball for press in found]
+    share = amplitude_of(seen, balls, without)
+    held_out = held_out_presses(seen, balls, [c / share for c in without])
     model = InPlaceModel(
         grid,
         reduced,
         solve(sums, ridge, towards=towards) / share,
-        _seen_colours(work),
-        max(_steepest(ball) for ball in work.balls),
+        _seen_colours(found),
+        max(map(_steepest, balls)),
         error_curve(held_out, pitch_mm=grid.pitch_mm),
         scale_sd=scale_sd,
     )
     say(1.0)
     return InPlaceResult(
         model,
-        tuple(FoundPress(*item) for item in zip(work.names, work.balls, held_out, strict=True)),
-        work.refused,
+        tuple(FoundPress(p.name, p.ball, own) for p, own in zip(found, held_out, strict=True)),
+        refused,
         ridge,
         learning_curve(sums, ridge),
-        next_position(work.balls, grid, base.known),
-        stretch_of(work.stretches),
+        next_position(balls, grid, base.known),
+        stretch,
+    )
+
+
+def contact_in(image: Map, base: Reference, *, radius: float, name: str) -> Indentation:
+    """Return the contact of a ball in an image, also where the border cuts it; lengths in nodes.
+
+    Parameters
+    ----------
+    image : (rows, columns, 3) float32
+        Linear light on the working grid.
+    base : Reference
+        The untouched membrane.
+    radius : float
+        Of the ball.
+    name : str
+        Name of the image in messages.
+
+    Raises
+    ------
+    InputError
+        If the image shows no ball.
+    """
+    return find_indentation(
+        image, base.background, markers=base.markers, ball_radius_px=radius, cut=True, name=name
     )
 
 
@@ -247,12 +267,10 @@ def _begin(
     base: Reference,
     grid: WorkingGrid,
     say: Callable[[float], None],
-) -> _Work:
-    """Find the contact in each reduced image."""
+) -> tuple[list[_Press], dict[str, InputError]]:
+    """Find the contact in each reduced image; return the presses, and why others are refused."""
 
-    def find(
-        item: tuple[PressImage, Map],
-    ) -> tuple[ColourChange, Ball, tuple[float, ...]] | InputError:
+    def find(item: tuple[PressImage, Map]) -> _Press | InputError:
         press, image = item
         radius = press.radius_mm / grid.pitch_mm
         stretches: tuple[float, ...] = ()
@@ -260,98 +278,98 @@ def _begin(
             if press.placed is not None:
                 edge = grid.on_nodes(press.placed)
             else:
-                edge, stretches = find_contact(image, base, ball_radius=radius, name=press.name)
+                contact = contact_in(image, base, radius=radius, name=press.name)
+                edge, stretches = contact.circle, contact.stretches
         except InputError as fault:
             return fault
-        seen = colour_change(image, base)
-        return seen, Ball(edge.x, edge.y, edge.radius, radius).limited(), stretches
+        ball = Ball(edge.x, edge.y, edge.radius, radius).limited()
+        return _Press(press.name, colour_change(image, base), ball, ball, stretches)
 
-    work = _Work([], [], [], [], {}, [])
+    found: list[_Press] = []
+    refused: dict[str, InputError] = {}
     with closing(in_parallel(find, list(zip(presses, images, strict=True)))) as contacts:
-        for index, (press, found) in enumerate(zip(presses, contacts, strict=True)):
+        for index, (press, contact) in enumerate(zip(presses, contacts, strict=True)):
             say(0.3 * (index + 1) / len(presses))
-            if isinstance(found, InputError):
-                work.refused[press.name] = found
-                continue
-            work.names.append(press.name)
-            work.seen.append(found[0])
-            work.start.append(found[1])
-            work.balls.append(found[1])
-            work.stretches.append(found[2])
-    _require_presses(work)
-    return work
+            if isinstance(contact, InputError):
+                refused[press.name] = contact
+            else:
+                found.append(contact)
+    _require_presses(found, refused)
+    return found, refused
 
 
-def _require_presses(work: _Work) -> None:
-    if len(work.names) >= LEAST_PRESSES:
+def _require_presses(found: Sequence[_Press], refused: Mapping[str, InputError]) -> None:
+    if len(found) >= LEAST_PRESSES:
         return
-    total = len(work.names) + len(work.refused)
-    reasons = sorted({fault.found for fault in work.refused.values()})
-    found = tr("{n} of {total} images show a pressed ball, {least} are needed").format(
-        n=len(work.names), total=total, least=LEAST_PRESSES
+    reasons = sorted({fault.found for fault in refused.values()})
+    sentence = tr("{n} of {total} images show a pressed ball, {least} are needed").format(
+        n=len(found), total=len(found) + len(refused), least=LEAST_PRESSES
     )
     raise InputError(
-        f"{found} ({'; '.join(reasons[:2])})" if reasons else found,
+        f"{sentence} ({'; '.join(reasons[:2])})" if reasons else sentence,
         where="balls",
         advice=tr("Press a ball of known size at different places, and check the background"),
     )
 
 
-def _sums(work: _Work) -> list[PressSums]:
-    return list(
-        in_parallel(lambda item: press_sums(*item), list(zip(work.seen, work.balls, strict=True)))
-    )
+def _sums(presses: Sequence[_Press]) -> list[PressSums]:
+    return list(in_parallel(lambda press: press_sums(press.seen, press.ball), presses))
 
 
-def _place(work: _Work, coefficients: Sequence[Array]) -> None:
+def _placed(presses: Sequence[_Press], coefficients: Sequence[Array]) -> list[_Press]:
     """Move each ball halfway to the position that follows from the slopes of the others."""
-    trust = TRUST_SLOPES * min(1.0, len(work.balls) / MANY_PRESSES)
+    trust = TRUST_SLOPES * min(1.0, len(presses) / MANY_PRESSES)
 
-    def moved(item: tuple[ColourChange, Ball, Ball, Array]) -> Ball:
-        seen, ball, start, coefficient = item
-        slope_x, slope_y = evaluate(coefficient, seen.change)
-        by_slopes = placed_by_slopes(slope_x, slope_y, ball)
+    def moved(item: tuple[_Press, Array]) -> _Press:
+        press, coefficient = item
+        start = press.start
+        slope_x, slope_y = evaluate(coefficient, press.seen.change)
+        by_slopes = placed_by_slopes(slope_x, slope_y, press.ball)
         away = float(np.hypot(by_slopes.x - start.x, by_slopes.y - start.y))
         edge = (1.0 - trust) / (1.0 + (away / (DISAGREES * start.contact)) ** 2)
         x, y = (
             edge * a + (1.0 - edge) * b for a, b in ((start.x, by_slopes.x), (start.y, by_slopes.y))
         )
-        placed = replace(ball, x=x, y=y)
+        placed = replace(press.ball, x=x, y=y)
         contact = contact_by_slopes(slope_x, slope_y, placed, smoothing=SMOOTHING_NODES)
-        return replace(placed, contact=0.5 * (start.contact + contact)).limited()
+        ball = replace(placed, contact=0.5 * (start.contact + contact)).limited()
+        return replace(press, ball=ball)
 
-    items = list(zip(work.seen, work.balls, work.start, coefficients, strict=True))
-    work.balls = list(in_parallel(moved, items))
+    return list(in_parallel(moved, list(zip(presses, coefficients, strict=True))))
 
 
 def _explained(
-    work: _Work, sums: Sequence[PressSums], coefficients: Sequence[Array]
-) -> list[PressSums]:
-    """Leave out presses whose slopes disagree with the others; return the sums of the rest."""
+    presses: Sequence[_Press],
+    refused: dict[str, InputError],
+    sums: Sequence[PressSums],
+    coefficients: Sequence[Array],
+) -> tuple[list[_Press], list[PressSums]]:
+    """Refuse presses whose slopes disagree with the others; return the rest with their sums."""
     errors = np.sqrt(
         [mean_squared_error(press, c) for press, c in zip(sums, coefficients, strict=True)]
     )
     limit = max(OUTLIER * float(np.median(errors)), LEAST_OUTLIER)
     kept = [bool(error <= limit) for error in errors]
-    for name, stays, error in zip(work.names, kept, errors, strict=True):
+    for press, stays, error in zip(presses, kept, errors, strict=True):
         if not stays:
-            work.refused[name] = InputError(
+            refused[press.name] = InputError(
                 tr(
                     "its shading does not fit a ball of the stated radius, compared with the "
                     "other presses (slope error {e:.2f}, other presses {m:.2f})"
                 ).format(e=error, m=float(np.median(errors))),
-                where=name,
+                where=press.name,
                 advice=tr("Check the ball's radius and that one clean ball is pressed straight"),
             )
-    work.keep(kept)
-    _require_presses(work)
-    return list(compress(sums, kept))
+    rest = list(compress(presses, kept))
+    _require_presses(rest, refused)
+    return rest, list(compress(sums, kept))
 
 
-def _seen_colours(work: _Work) -> Map:
+def _seen_colours(presses: Sequence[_Press]) -> Map:
     """Return which changes of colour occur on the presses and the flat membrane."""
     cells = np.zeros((COLOUR_CELLS,) * 3, np.float32)
-    for seen, ball in zip(work.seen, work.balls, strict=True):
+    for press in presses:
+        seen, ball = press.seen, press.ball
         rho = distances((seen.usable.shape[0], seen.usable.shape[1]), ball)[2]
         shown = seen.change[seen.usable & ((rho < ball.contact) | (rho > 1.4 * ball.contact))]
         cell = colour_cells(shown)

@@ -126,7 +126,6 @@ def detect_ball(
     ball_radius_px: float | None = None,
     valid: Mask | None = None,
     name: str = "press",
-    background_name: str = "background",
 ) -> BallDetection:
     """Find the one ball indentation in an image, or the reason why there is none.
 
@@ -144,16 +143,14 @@ def detect_ball(
         Radius of the ball over the pixel's size, if both are known; a contact cannot be larger.
     valid : (rows, columns) bool, optional
         The working area; without it, the lit part of `background`.
-    name, background_name : str, optional
-        Names of the images in messages, such as their files.
+    name : str, optional
+        Name of `image` in messages, such as its file.
     """
     known = markers
     try:
-        image, background, area = prepare_pair(
-            image, background, valid, name=name, background_name=background_name
-        )
+        image, background, area = prepare_pair(image, background, valid, name=name)
         known = find_markers(background, area) if markers is None else markers
-        found, cut = _detect(image, background, area, known, ball_radius_px, name, background_name)
+        found, cut = _detect(image, background, area, known, ball_radius_px, name)
     except InputError as error:
         reason = error.reason if isinstance(error, BallRefusal) else Reason.UNUSABLE_IMAGE
         return BallDetection(None, reason, error, known or no_markers(image.shape[:2]))
@@ -166,35 +163,39 @@ def find_indentation(
     *,
     markers: Markers | None = None,
     valid: Mask | None = None,
+    ball_radius_px: float | None = None,
+    cut: bool = False,
     name: str = "press",
-    background_name: str = "background",
 ) -> Indentation:
-    """Find the one whole ball indentation in an image, or refuse the image.
+    """Find the one ball indentation in an image, or refuse the image.
 
     Parameters
     ----------
-    press, background, markers, valid, name, background_name
+    press, background, markers, valid, ball_radius_px, name
         As in :func:`detect_ball`.
+    cut : bool, optional
+        Whether the border may cut it.
 
     Raises
     ------
     InputError
         If the images differ in size, are black or saturated; if the light changed between them
         or they are swapped; if there is no indentation, more than one, one that is cut by the
-        border, or one that is not that of a ball.
+        border although it may not be, or one that is not that of a ball.
     """
     detection = detect_ball(
         press,
         background,
         markers=markers,
         valid=valid,
+        ball_radius_px=ball_radius_px,
         name=name,
-        background_name=background_name,
     )
-    if detection.refusal is not None:
+    found = detection.indentation
+    if detection.refusal is not None and not (cut and found):
         raise detection.refusal
-    assert detection.indentation is not None
-    return detection.indentation
+    assert found is not None
+    return found
 
 
 def _detect(
@@ -204,7 +205,6 @@ def _detect(
     markers: Markers,
     ball_radius_px: float | None,
     name: str,
-    background_name: str,
 ) -> tuple[Indentation, BallRefusal | None]:
     covered = markers.covered(image) & area
     image, background = fill(image, covered), fill(background, covered)
@@ -226,7 +226,7 @@ def _detect(
     if found_by == "edge":
         check_round(contour, name)
     check_shading(shading, circle, ball_radius_px, hidden, name)
-    check_order(image, background, area, circle, name, background_name)
+    check_order(image, background, area, circle, name)
     reaches = reaches_border(region, change.valid_small)
     found = describe_indentation(image, change, contour, region, reaches, light_change, found_by)
     try:

@@ -98,6 +98,11 @@ class Indentation:
     touches_border: bool
     quality: QualityTable
 
+    @property
+    def circle(self) -> Circle:
+        """The contact's edge, in pixels."""
+        return Circle(*self.centre, self.contact_radius_px)
+
 
 def indentation_at(
     press: Array,
@@ -106,13 +111,12 @@ def indentation_at(
     *,
     valid: Mask | None = None,
     name: str = "press",
-    background_name: str = "background",
 ) -> Indentation:
     """Describe an indentation whose contact the user has placed.
 
     Parameters
     ----------
-    press, background, valid, name, background_name
+    press, background, valid, name
         As in :func:`~gelpolight_core.reflectance.ball_detection.find_indentation`.
     circle : Circle
         The contact's edge as placed, pixels.
@@ -127,9 +131,7 @@ def indentation_at(
     InputError
         If the images cannot be compared, or the circle reaches beyond the working area.
     """
-    press, background, area = prepare_pair(
-        press, background, valid, name=name, background_name=background_name
-    )
+    press, background, area = prepare_pair(press, background, valid, name=name)
     change = scale_difference(press, background, area)
     within = distance_in_radii(area.shape, circle) < 1.0
     if not within.any() or np.count_nonzero(within & area) < LEAST_PLACED_INSIDE * np.pi * (

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.noise import ScaledDifference
+from gelpolight_core.image.noise import BACKGROUND, ScaledDifference
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit
 from gelpolight_core.reflectance.contour import (
     Circle,
@@ -337,14 +337,7 @@ def check_round(contour: Contour, name: str) -> None:
         _refuse_small(radius, name)
 
 
-def check_order(
-    press: Array,
-    background: Array,
-    area: Mask,
-    circle: Circle,
-    name: str,
-    background_name: str,
-) -> None:
+def check_order(press: Array, background: Array, area: Mask, circle: Circle, name: str) -> None:
     """Refuse the images when the kink lies in the background.
 
     Parameters
@@ -355,8 +348,8 @@ def check_order(
         The working area.
     circle : Circle
         The contact's edge.
-    name, background_name : str
-        The images' names.
+    name : str
+        Name of `press`.
 
     Raises
     ------
@@ -370,7 +363,7 @@ def check_order(
         raise BallRefusal(
             Reason.SWAPPED,
             tr("the indentation is in the background, not in the press"),
-            where=f"{name}, {background_name}",
+            where=f"{name}, {BACKGROUND}",
             advice=tr("Swap the two images, or capture the background again without contact"),
         )
 
