@@ -47,7 +47,7 @@ MOST = {
     "app/workspace": 718,
     "gelpolight_core/.": 1131,
     "gelpolight_core/batch": 641,
-    "gelpolight_core/calibration": 3619,
+    "gelpolight_core/calibration": 3606,
     "gelpolight_core/design": 295,
     "gelpolight_core/design_check": 316,
     "gelpolight_core/export": 613,

@@ -204,38 +204,25 @@ class EditableSession:
             kept = {name: radii[name] for name in radii if name not in names}
             self._describe(replace(self._session, ball_radii_mm=kept))
 
-    def _keep(
-        self,
-        stage: Stage[Any],
-        suffix: str,
-        radius_mm: float | None,
-        write: Write,
-    ) -> str:
+    def _keep(self, stage: Stage[Any], suffix: str, radius_mm: float | None, write: Write) -> str:
         """Write an image under the next free name, and return that name.
 
         Another program that captures into the same session may use that name at the same moment.
+        The radius is written first, so that no press ever has another one's radius.
         """
         while True:
-            name = self._next_name(stage, suffix)
-            folder = self._session.folder
-            save = partial(write, folder, folder / stage.folder / name)
-            try:
-                self._keep_as(name, radius_mm, save)
-            except NameTakenError:
-                continue
-            return name
-
-    def _keep_as(self, name: str, radius_mm: float | None, write: Callable[[], None]) -> None:
-        """Write an image; its radius first, so that no press ever has another one's radius."""
-        before = self._session.ball_radii_mm.get(name)
-        if radius_mm is not None:
-            self.set_ball_radius(name, radius_mm)
-        try:
-            write()
-        except InputError:
+            name, folder = self._next_name(stage, suffix), self._session.folder
+            before = self._session.ball_radii_mm.get(name)
             if radius_mm is not None:
-                self.set_ball_radius(name, before)
-            raise
+                self.set_ball_radius(name, radius_mm)
+            try:
+                write(folder, folder / stage.folder / name)
+                return name
+            except InputError as error:
+                if radius_mm is not None:
+                    self.set_ball_radius(name, before)
+                if not isinstance(error, NameTakenError):
+                    raise
 
     def decide(self, decisions: Decisions) -> None:
         """Replace the present decisions by new ones, on disk first."""

@@ -53,18 +53,15 @@ class Slopes:
         Presses, model and ridge.
     noise : (3,)
         Standard deviation of a pixel of a single image, per channel.
-    scale_sd : float
-        Relative standard deviation of the scale.
     """
 
     result: InPlaceResult
     noise: NDArray[np.float64]
-    scale_sd: float
 
     @property
     def tables(self) -> dict[str, QualityTable]:
         """The tables of figures by their keys."""
-        return judge_in_place(self.result, self.scale_sd)
+        return judge_in_place(self.result)
 
     @property
     def quality(self) -> QualityTable:
@@ -156,17 +153,16 @@ def find_slopes(
     """
     stated = session.in_place or InPlace()
     if scale is not None:
-        stated = replace(stated, mm_per_px=scale.mm_per_px)
+        sd_mm = scale.relative_sd * scale.mm_per_px[0]
+        stated = replace(stated, mm_per_px=scale.mm_per_px, mm_per_px_sd=sd_mm)
     grid, sd = stated_grid(stated, background.size), stated.mm_per_px_sd
     scale_sd = STATED_SCALE_SD if sd is None else sd / grid.mm_per_px
-    if scale is not None:
-        scale_sd = scale.relative_sd
     presses, unreadable = _presses(session, background)
     result = calibrate_in_place(
         background.rgb, presses, grid, scale_sd=scale_sd, towards=towards, progress=progress
     )
     result = replace(result, refused={**result.refused, **unreadable})
-    return Slopes(result, _noise(grid.cut(background.rgb)), scale_sd)
+    return Slopes(result, _noise(grid.cut(background.rgb)))
 
 
 def in_place_calibration(
@@ -269,7 +265,7 @@ def _noise(rgb: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.asarray(1.4826 * spread, np.float64)
 
 
-def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityTable]:
+def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
     """Judge a calibration in place by the presses that were left out."""
     held_out = [press.held_out for press in result.presses]
     caps = np.array([press.cap_ratio for press in held_out])
@@ -279,7 +275,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
     more = tr("Press more balls at more positions")
     sizes = tr("Check the ball radii and the scale (mm per pixel)")
     grid = result.model.grid
-    scale = judge_scale(grid.pixel_mm.tolist(), scale_sd).figures
+    scale = judge_scale(grid.pixel_mm.tolist(), result.model.scale_sd).figures
     return {
         "scale": QualityTable((*scale, *judge_stretch(result.stretch, grid))),
         "balls": QualityTable(

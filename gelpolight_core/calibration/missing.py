@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-from gelpolight_core.calibration.recipes import FULL, IN_PLACE
+from gelpolight_core.calibration.in_place import IN_PLACE
+from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import IN_PLACE as CLOSED
 from gelpolight_core.session.session import (
