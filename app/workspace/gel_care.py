@@ -7,14 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.io.atomic import make_folder, write_json
-from gelpolight_core.io.reading import (
-    brief,
-    check_version,
-    parse_json,
-    plain_text,
-    read_file,
-    refusing,
-)
+from gelpolight_core.io.reading import brief, plain_text, read_own
 from gelpolight_core.translation import tr
 
 FILE = "gel-care.json"
@@ -35,20 +28,17 @@ def read_presses(folder: Path) -> dict[str, int]:
     InputError
         If the file cannot be read, is damaged, or has a newer version.
     """
-    path = folder / FILE
-    try:
-        data = read_file(path, 4_000_000)
-    except FileNotFoundError:
-        return {}
-    with refusing(
-        tr("The list of presses cannot be read ({error})"),
-        path,
+    found = read_own(
+        folder / FILE,
+        (FORMAT, VERSION),
+        lambda content: {
+            plain_text(identity): _presses(row["presses"])
+            for identity, row in content["calibrations"].items()
+        },
+        found=tr("The list of presses cannot be read ({error})"),
         advice=tr("Repair the file, or delete it to count from 0"),
-    ):
-        content = parse_json(data)
-        check_version(content, FORMAT, VERSION, path)
-        rows = content["calibrations"].items()
-        return {plain_text(identity): _presses(row["presses"]) for identity, row in rows}
+    )
+    return found or {}
 
 
 def write_presses(presses: Mapping[str, int], folder: Path) -> None:

@@ -10,15 +10,7 @@ from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_json
-from gelpolight_core.io.reading import (
-    NAME_LIMIT,
-    brief,
-    check_version,
-    parse_json,
-    plain_text,
-    read_file,
-    refusing,
-)
+from gelpolight_core.io.reading import NAME_LIMIT, brief, plain_text, read_own
 from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.translation import tr
 
@@ -110,28 +102,27 @@ def read_indenters(folder: Path) -> tuple[Indenter, ...]:
     InputError
         If the file cannot be read, is damaged, or has a newer version.
     """
-    path = folder / FILE
-    try:
-        data = read_file(path, 1_000_000)
-    except FileNotFoundError:
-        return first_indenters()
-    with refusing(
-        tr("The list of indenters cannot be read ({error})"),
-        path,
+    found = read_own(
+        folder / FILE,
+        (FORMAT, VERSION),
+        _parse,
+        found=tr("The list of indenters cannot be read ({error})"),
         advice=tr("Repair the file, or delete it to start with the default list"),
-    ):
-        content = parse_json(data)
-        check_version(content, FORMAT, VERSION, path)
-        return tuple(
-            Indenter(
-                plain_text(row["name"], NAME_LIMIT),
-                plain_text(row["shape"], NAME_LIMIT),
-                _length(row["size_mm"]),
-                None if row.get("second_mm") is None else _length(row["second_mm"]),
-                None if row.get("height_mm") is None else _length(row["height_mm"]),
-            )
-            for row in content["indenters"]
+    )
+    return first_indenters() if found is None else found
+
+
+def _parse(content: Any) -> tuple[Indenter, ...]:
+    return tuple(
+        Indenter(
+            plain_text(row["name"], NAME_LIMIT),
+            plain_text(row["shape"], NAME_LIMIT),
+            _length(row["size_mm"]),
+            None if row.get("second_mm") is None else _length(row["second_mm"]),
+            None if row.get("height_mm") is None else _length(row["height_mm"]),
         )
+        for row in content["indenters"]
+    )
 
 
 def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:

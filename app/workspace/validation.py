@@ -12,14 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.io.atomic import write_json
-from gelpolight_core.io.reading import (
-    brief,
-    check_version,
-    parse_json,
-    plain_text,
-    read_file,
-    refusing,
-)
+from gelpolight_core.io.reading import brief, plain_text, read_own
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
@@ -119,19 +112,13 @@ def read_validation(calibration: Path) -> Validation | None:
     InputError
         If it is damaged, has a newer version, or its verdict does not match its lengths.
     """
-    path = validation_path(calibration)
-    try:
-        data = read_file(path, 1_000_000)
-    except FileNotFoundError:
-        return None
-    with refusing(
-        tr("The validation cannot be read ({error})"),
-        path,
+    return read_own(
+        validation_path(calibration),
+        (FORMAT, VERSION),
+        _parse,
+        found=tr("The validation cannot be read ({error})"),
         advice=tr("Validate the calibration again"),
-    ):
-        content = parse_json(data)
-        check_version(content, FORMAT, VERSION, path)
-        return _parse(content)
+    )
 
 
 def _parse(content: Any) -> Validation:

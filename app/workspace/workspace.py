@@ -15,7 +15,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -121,11 +122,9 @@ class Workspace:
         InputError
             If the workspace exists but cannot be read.
         """
-        try:
+        with self._reading():
             found = list(self.sensors_folder.glob("*/recordings/[!.]*.gplrec"))
             return tuple(sorted(found, key=lambda path: path.stat().st_mtime, reverse=True))
-        except OSError as error:
-            raise self._unreadable(error) from error
 
     def recording_path(self, serial: str) -> Path:
         """Return a path for a new recording, named after the time. Its folder is created."""
@@ -148,10 +147,8 @@ class Workspace:
         InputError
             If the workspace exists but cannot be read.
         """
-        try:
+        with self._reading():
             found = [p.parent for p in self.sensors_folder.glob("*/protocols/[!.]*/protocol.toml")]
-        except OSError as error:
-            raise self._unreadable(error) from error
         return tuple(sorted(found, key=lambda folder: folder.name, reverse=True))
 
     def calibration_path(self, serial: str, name: str) -> Path:
@@ -192,10 +189,8 @@ class Workspace:
             If the workspace exists but cannot be read.
         """
         in_use = self.in_use
-        try:
+        with self._reading():
             files = sorted(self.sensors_folder.glob(f"*/[!.]*{ENDING}"))
-        except OSError as error:
-            raise self._unreadable(error) from error
         return _in_order(read_entry(path, in_use=path == in_use) for path in files)
 
     def entry_of(self, identity: str) -> Entry | None:
@@ -211,11 +206,9 @@ class Workspace:
         InputError
             If the workspace exists but cannot be read.
         """
-        try:
+        with self._reading():
             found = self.sensors_folder.glob(f"*/sessions/[!.]*/{DESCRIPTION}")
             entries = [read_session_entry(path.parent) for path in found]
-        except OSError as error:
-            raise self._unreadable(error) from error
         return tuple(sorted(entries, key=lambda e: (e.serial, -e.changed.timestamp())))
 
     @property
@@ -332,12 +325,17 @@ class Workspace:
         if use and removal.was_in_use:
             self.use(removal.old_path)
 
-    def _unreadable(self, error: OSError) -> InputError:
-        return InputError(
-            tr("The workspace cannot be read ({reason})").format(reason=error.strerror),
-            where=str(self.folder),
-            advice=tr("Check its permissions, or choose another folder in the preferences"),
-        )
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        """Report that the workspace cannot be read."""
+        try:
+            yield
+        except OSError as error:
+            raise InputError(
+                tr("The workspace cannot be read ({reason})").format(reason=error.strerror),
+                where=str(self.folder),
+                advice=tr("Check its permissions, or choose another folder in the preferences"),
+            ) from error
 
     def _refuse_outside(self, path: Path) -> None:
         if not path.is_relative_to(self.sensors_folder):

@@ -15,16 +15,17 @@ import stat
 import tomllib
 import zipfile
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
-TEXT_LIMIT = 1_000_000
+T = TypeVar("T")
+TEXT_LIMIT, OWN_LIMIT = 1_000_000, 4_000_000
 # Parsing a key of n parts takes time proportional to n squared; real keys have at most three parts.
 MOST_PARTS = 20
 _LONG_TEXT = re.compile(r'"""|\'\'\'')
@@ -275,6 +276,37 @@ def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
         raise InputError(found.format(error=reason), where=str(path), advice=advice) from error
+
+
+def read_own(
+    path: Path, form: tuple[str, int], parse: Callable[[Any], T], *, found: str, advice: str
+) -> T | None:
+    """Return what a JSON file of this program contains; None if there is no such file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    form : (str, int)
+        Its format, and the newest version that this program reads.
+    parse : callable
+        Takes the content; wrong keys, types and values may raise any of their errors.
+    found, advice : str
+        As in :func:`refusing`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is damaged, or has a newer version.
+    """
+    try:
+        data = read_file(path, OWN_LIMIT)
+    except FileNotFoundError:
+        return None
+    with refusing(found, path, advice=advice):
+        content = parse_json(data)
+        check_version(content, *form, path)
+        return parse(content)
 
 
 def plain_text(value: Any, most: int = 10_000) -> str:
