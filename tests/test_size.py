@@ -66,7 +66,7 @@ MOST = {
     "gelpolight_core/reflectance": 2259,
     "gelpolight_core/report": 1054,
     "gelpolight_core/response": 413,
-    "gelpolight_core/session": 1008,
+    "gelpolight_core/session": 989,
     "gelpolight_core/simulation": 2098,
     "gelpolight_core/studies": 1175,
     "tests/.": 1415,

@@ -7,9 +7,8 @@ both use them: they give the same calibration.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,8 @@ import tomli_w
 
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.io.atomic import write_text
-from gelpolight_core.io.reading import brief, check_version, parse_toml, read_file, refusing
+from gelpolight_core.io.codec import pack, unpack
+from gelpolight_core.io.reading import check_version, parse_toml, read_file, refusing
 from gelpolight_core.translation import tr
 
 FILE_NAME = "decisions.toml"
@@ -99,66 +99,48 @@ def write_decisions(decisions: Decisions, folder: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "excluded": sorted(decisions.excluded),
-        "mirror_spots_px": {
-            CHANNEL_KEYS[led]: list(point) for led, point in sorted(decisions.spots_px.items())
-        },
-        "balls_px": {
-            name: [circle.u_px, circle.v_px, circle.radius_px]
-            for name, circle in sorted(decisions.balls.items())
-        },
-        "reflectance_nodes": {
-            CHANNEL_KEYS[channel]: [list(node) for node in nodes]
-            for channel, nodes in sorted(decisions.curves.items())
-        },
-    }
-
+    d, names = decisions, CHANNEL_KEYS
+    stored = _Stored(
+        tuple(sorted(d.excluded)),
+        {names[led]: point for led, point in sorted(d.spots_px.items())},
+        {name: (c.u_px, c.v_px, c.radius_px) for name, c in sorted(d.balls.items())},
+        {names[channel]: nodes for channel, nodes in sorted(d.curves.items())},
+    )
+    content = {"format": FORMAT, "version": VERSION, **pack(stored, {}, "decisions")}
     write_text(folder / FILE_NAME, tomli_w.dumps(content), inside=folder)
 
 
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """The decisions as they are laid out in the file."""
+
+    excluded: tuple[str, ...] = ()
+    mirror_spots_px: Mapping[str, Point] = field(default_factory=dict)
+    balls_px: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    reflectance_nodes: Mapping[str, tuple[Point, ...]] = field(default_factory=dict)
+
+
 def _parse(content: Mapping[str, Any]) -> Decisions:
-    excluded = content.get("excluded", [])
-    if not all(isinstance(name, str) for name in excluded):
-        raise ValueError("excluded is not a list of names")
+    known = {f.name: content[f.name] for f in fields(_Stored) if f.name in content}
+    found = unpack(_Stored, known, {}, "decisions")
+    channel = CHANNEL_KEYS.index
     return Decisions(
-        frozenset(excluded),
-        {
-            CHANNEL_KEYS.index(key): _numbers(point, 2)
-            for key, point in content.get("mirror_spots_px", {}).items()
-        },
-        {
-            str(name): PlacedCircle(*_circle(circle))
-            for name, circle in content.get("balls_px", {}).items()
-        },
-        {
-            CHANNEL_KEYS.index(key): _nodes(nodes)
-            for key, nodes in content.get("reflectance_nodes", {}).items()
-        },
+        frozenset(found.excluded),
+        {channel(key): point for key, point in found.mirror_spots_px.items()},
+        {name: _circle(*circle) for name, circle in found.balls_px.items()},
+        {channel(key): _nodes(nodes) for key, nodes in found.reflectance_nodes.items()},
     )
 
 
-def _numbers(values: Any, count: int) -> Any:
-    if not isinstance(values, list) or len(values) != count:
-        raise ValueError(f"{brief(values)} is not {count} numbers")
-    if not all(type(v) in (int, float) and math.isfinite(v) for v in values):
-        raise ValueError(f"{brief(values)} is not {count} numbers")
-    return tuple(float(v) for v in values)
-
-
-def _circle(values: Any) -> tuple[float, float, float]:
-    u, v, radius = _numbers(values, 3)
+def _circle(u: float, v: float, radius: float) -> PlacedCircle:
     if radius <= 0.0:
         raise ValueError(f"{radius:g} px is not a valid radius")
-    return u, v, radius
+    return PlacedCircle(u, v, radius)
 
 
-def _nodes(values: Any) -> tuple[Point, ...]:
-    if not isinstance(values, list) or not 2 <= len(values) <= MOST_NODES:
+def _nodes(nodes: tuple[Point, ...]) -> tuple[Point, ...]:
+    if not 2 <= len(nodes) <= MOST_NODES:
         raise ValueError(f"a curve needs 2 to {MOST_NODES} nodes")
-    nodes = tuple(_numbers(node, 2) for node in values)
     for (c0, v0), (c1, v1) in pairwise(nodes):
         if not (c1 > c0 and v1 >= v0):
             raise ValueError("the nodes of a curve are not increasing")
