@@ -253,7 +253,7 @@ def test_a_log_that_cannot_be_written_shows_no_traceback(
     def fail(_path: Path) -> None:
         raise ZeroDivisionError("the tests did it")
 
-    monkeypatch.setattr(calibrate, "read_session", fail)
+    monkeypatch.setattr(calibrate, "session_to_calibrate", fail)
     assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == OUR_FAULT
     (line,) = capsys.readouterr().err.splitlines()
     assert "the tests did it" in line
@@ -294,7 +294,7 @@ def test_warnings_of_libraries_go_to_the_log(
             warnings.warn("divide by zero", RuntimeWarning, stacklevel=1)
         raise InputError("stop", where="here", advice="Do")
 
-    monkeypatch.setattr(calibrate, "read_session", warn)
+    monkeypatch.setattr(calibrate, "session_to_calibrate", warn)
     assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == MENDABLE
     assert "divide" not in capsys.readouterr().err
     assert "divide by zero" in next(tmp_path.rglob("gelpolight-faults.log")).read_text()
@@ -318,7 +318,7 @@ def test_an_internal_error_is_one_line_and_a_log(
     def fail(_path: Path) -> None:
         raise ZeroDivisionError("the tests did it")
 
-    monkeypatch.setattr(calibrate, "read_session", fail)
+    monkeypatch.setattr(calibrate, "session_to_calibrate", fail)
     assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == OUR_FAULT
     shown = capsys.readouterr().err
     assert "the tests did it" in shown
