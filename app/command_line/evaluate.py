@@ -11,10 +11,9 @@ from app.command_line.terminal import say
 from gelpolight_core.batch.presses import measure_presses
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.measurement.evaluation_report import evaluation_table
 from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
 from gelpolight_core.measurement.protocol_run import presses_folder
-from gelpolight_core.report.evaluation import write_evaluation_files
+from gelpolight_core.report.evaluation import evaluation_table, write_evaluation_files
 from gelpolight_core.translation import tr
 
 

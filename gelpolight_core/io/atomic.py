@@ -9,6 +9,7 @@ import os
 import secrets
 import stat
 from collections.abc import Callable, Mapping, Sequence
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -82,6 +83,13 @@ def write_text(path: Path, text: str, *, inside: Path | None = None) -> None:
 def write_json(path: Path, content: Mapping[str, Any] | Sequence[Any]) -> None:
     """Write a JSON file, as :func:`write_atomically`."""
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Write files by their names into a folder, each as :func:`write_atomically`."""
+    for name, content in contents.items():
+        write_atomically(folder / name, methodcaller("write", content))
+    return tuple(folder / name for name in contents)
 
 
 def refuse_unwritable(path: Path) -> None:

@@ -19,6 +19,8 @@ from matplotlib.figure import Figure
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import write_files
+from gelpolight_core.io.table import csv_of
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.score import (
     TrueDepth,
@@ -28,11 +30,11 @@ from gelpolight_core.measurement.score import (
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.report.drawing import png
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.studies.files import drawn, write_results
 from gelpolight_core.studies.trial import truth_at
 from gelpolight_core.translation import tr
 
@@ -314,10 +316,10 @@ def point_table(points: Sequence[Point]) -> str:
 
 def figure_png(points: Sequence[Point]) -> bytes:
     """Return the figure as PNG: depth error and plateau height against time."""
-    return drawn(lambda figure: _paint(figure, points), 9.0, 4.0)
+    return png(lambda figure: _paint(figure, points), 9.0, 4.0)
 
 
-def write_work_precision(points: Sequence[Point], folder: Path) -> list[Path]:
+def write_work_precision(points: Sequence[Point], folder: Path) -> tuple[Path, ...]:
     """Write ``work-precision.csv`` and ``work-precision.png`` into a folder.
 
     Raises
@@ -327,7 +329,8 @@ def write_work_precision(points: Sequence[Point], folder: Path) -> list[Path]:
     """
     front = pareto_front(points)
     rows = [{**asdict(point), "on_front": point in front} for point in points]
-    return write_results(folder, "work-precision", rows, figure_png(points))
+    contents = {"csv": csv_of(rows).encode(), "png": figure_png(points)}
+    return write_files(folder, {f"work-precision.{end}": made for end, made in contents.items()})
 
 
 def _paint(figure: Figure, points: Sequence[Point]) -> None:
