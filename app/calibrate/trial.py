@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.typing import NDArray
 
-from app.workspace.validation import Comparison
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
-from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.result import Measurement, Quantity, Truth, compare
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -46,14 +46,14 @@ class Trial:
     ----------
     measurement : Measurement
         Measurement of the object.
-    comparisons : tuple of Comparison
-        Comparisons with the true values.
+    comparisons : tuple of Quantity
+        The lengths with their true values and limits.
     heightmap : HeightMap
         The depth it was measured in.
     """
 
     measurement: Measurement
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[Quantity, ...]
     heightmap: HeightMap
 
 
@@ -91,11 +91,14 @@ def run_trial(
     heightmap = measurable_depth(reconstructor, frame, name=name)
     progress(0.7)
     measured = measure_heightmap(heightmap, shape=known.shape)
-    quantity = tr("side") if known.shape == "cuboid" else tr("diameter")
-    comparisons = [Comparison(quantity, measured.size_mm, known.size_mm, size_limit_percent)]
-    if known.height_mm is not None:
-        comparisons.append(
-            Comparison(tr("height"), measured.height_mm, known.height_mm, height_limit_percent)
-        )
+    height_mm = math.nan if known.height_mm is None else known.height_mm
+    truth = Truth(known.shape, known.size_mm, height_mm)
+    both = compare(measured, truth, (size_limit_percent, height_limit_percent))
+    names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
+    comparisons = tuple(
+        replace(quantity, name=name)
+        for quantity, name in zip(both, names, strict=True)
+        if quantity.truth is not None
+    )
     measured = judged(measured, heightmap)
-    return Trial(measured, tuple(comparisons), heightmap)
+    return Trial(measured, comparisons, heightmap)

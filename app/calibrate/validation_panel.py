@@ -208,9 +208,9 @@ class ValidationPanel(QWidget):
                     "<b>{what}</b>: measured {m:.3f} mm, true {t:.3f} mm, error"
                     " <b>{e:+.2f} %</b>, {word} ±{limit:g} %"
                 ).format(
-                    what=escaped(c.quantity.capitalize()),
-                    m=c.measured_mm,
-                    t=c.true_mm,
+                    what=escaped(c.name.capitalize()),
+                    m=c.value,
+                    t=c.truth,
                     e=c.error_percent,
                     word=word,
                     limit=c.limit_percent,

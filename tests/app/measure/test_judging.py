@@ -59,21 +59,18 @@ def _record(
 def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
     found = compare(FIT, Truth("cylinder", size, height))
     rows = judge(PRESSED, Stated(size, height), Limits())
-    assert [row.error_percent for row in rows] == [
-        found.size_error_percent,
-        found.height_error_percent,
-    ]
+    assert [row.error_percent for row in rows] == [length.error_percent for length in found]
     record = _record(PRESSED, Stated(size, height))
     assert [q.error_percent for q in record.quantities] == [row.error_percent for row in rows]
-    assert record.details["error_percent"] == found.error_percent
+    assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
 
 
 def test_only_what_is_known_is_judged() -> None:
     assert judge(PRESSED, Stated(), Limits()) == ()
     (row,) = judge(PRESSED, Stated(size_mm=5.0), Limits())
-    assert (row.quantity, row.limit_percent) == ("size", 5.0)
+    assert (row.name, row.limit_percent) == ("diameter_mm", 5.0)
     (row,) = judge(PRESSED, Stated(height_mm=1.0), Limits())
-    assert (row.quantity, row.limit_percent) == ("height", 8.0)
+    assert (row.name, row.limit_percent) == ("height_mm", 8.0)
     (row,) = judge(APART, Stated(size_mm=2.0), Limits())
     assert row.error_percent == pytest.approx(50.0)
     assert not row.passed
