@@ -230,15 +230,15 @@ def refuse_newer(version: int, newest: int, path: Path) -> None:
 
 
 @contextmanager
-def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
+def refusing(found: str, where: Path | str, *, advice: str) -> Iterator[None]:
     """Refuse a file whose content turns out to be invalid.
 
     Parameters
     ----------
     found : str
         The sentence of the error, with a placeholder ``{error}`` for the reason.
-    path : Path
-        The file.
+    where : Path or str
+        The file, or the place in it.
     advice : str
         What to do about it.
 
@@ -251,7 +251,7 @@ def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
         yield
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
-        raise InputError(found.format(error=reason), where=str(path), advice=advice) from error
+        raise InputError(found.format(error=reason), where=str(where), advice=advice) from error
 
 
 def plain_text(value: Any, most: int = 10_000) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -132,13 +133,28 @@ def map_errors(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> MapErrors | No
     if noise is None or heightmap.depth_model_sd_mm is None:
         return None
     column, row = index_of(heightmap, x_mm, y_mm)
-    factor = round(heightmap.x_mm.size / noise.shape[2])
-    first = 0.5 * (factor - 1)
-    position = np.stack([row - first, column - first]) / factor
-    examples = np.array([map_coordinates(e, position, order=1, mode="nearest") for e in noise])
+    examples = noise_at(noise, row, column, round(heightmap.x_mm.size / noise.shape[2]))
     model_sd = value_at(heightmap, heightmap.depth_model_sd_mm, x_mm, y_mm)
     examples = examples + model_sd * _smooth_fields(len(noise), x_mm, y_mm)
     return MapErrors(examples, heightmap.depth_scale_sd or 0.0, heightmap.lateral_scale_sd or 0.0)
+
+
+def noise_at(noise_mm: NDArray[np.float32], row: Array, column: Array, factor: int) -> Array:
+    """Return examples (examples, N) of a map's noise at points.
+
+    Parameters
+    ----------
+    noise_mm : (examples, map rows / factor, map columns / factor)
+        Examples, averages over blocks of the map's nodes.
+    row, column : (N,)
+        Of the points in the map.
+    factor : int
+        Nodes along a side of a block.
+    """
+    first = 0.5 * (factor - 1)
+    position = np.stack([row - first, column - first]) / factor
+    read = partial(map_coordinates, coordinates=position, order=1, mode="nearest")
+    return np.array([read(example, output=np.float64) for example in noise_mm])
 
 
 def measured(
