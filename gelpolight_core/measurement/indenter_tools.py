@@ -154,4 +154,4 @@ def _fitted(tool: FittedIndenter, fit: Measurement) -> ToolResult:
         *turned,
         Measured(fit.drape_decay_mm, fit.sd["drape_decay_mm"], "mm", "drape_decay"),
     )
-    return ToolResult(tool, figures, (fit.outline_mm,), fit.verdict, fit.reason, measurement=fit)
+    return ToolResult(tool, figures, (fit.outline_mm,), fit.findings, measurement=fit)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import doubt
 from gelpolight_core.io.atomic import append_durably
 from gelpolight_core.io.reading import parse_json, plain_text, read_file
 from gelpolight_core.io.texts import text_of_file
@@ -138,8 +139,8 @@ def _as_json(measurement: Measurement) -> dict[str, Any]:
     """Return all fields; JSON writes numbers so that they are read back exactly."""
     plain = asdict(measurement)
     plain["outline_mm"] = measurement.outline_mm.tolist()
-    plain["reason"] = english(measurement.reason)
-    return plain
+    del plain["findings"]
+    return plain | {"verdict": measurement.verdict, "reason": english(measurement.reason)}
 
 
 def _measurement(content: dict[str, Any]) -> Measurement:
@@ -147,7 +148,9 @@ def _measurement(content: dict[str, Any]) -> Measurement:
     for part in ("sd", "noise_sd", "calibration_sd", "mode_sd"):
         if not isinstance(values.get(part), dict | None):
             raise TypeError(f"{part} is no table")
-    values["reason"] = text_of_file(content["reason"])
+    del values["verdict"]
+    reason = text_of_file(values.pop("reason"))
+    values["findings"] = (doubt("stored", reason),) if reason else ()
     values["outline_mm"] = np.array(content["outline_mm"], np.float64)
     return Measurement(**values)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.fit import (
     EdgePrior,
     FitResult,
@@ -18,7 +19,7 @@ from gelpolight_core.measurement.fit import (
     fit_indenter,
     near_wall,
 )
-from gelpolight_core.measurement.fit_checks import describe_fit_problems, no_anchor
+from gelpolight_core.measurement.fit_checks import fit_problems, no_anchor
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.segmentation import (
@@ -35,7 +36,7 @@ from gelpolight_core.measurement.spread import (
     noise_of_fit,
 )
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.translation import joined, tr
+from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -121,8 +122,8 @@ def measure_object(
     )
     model = MODELS[shape]
     fit = fit_indenter(model, window, model.start(region), edge=prior)
-    reasons = (describe_fit_problems(shape, fit, window, region, prior), no_anchor(flags, region))
-    reason = joined("; ", (found for found in reasons if found))
+    problems = (*fit_problems(shape, fit, window, region, prior), no_anchor(flags, region))
+    findings = tuple(finding for finding in problems if finding is not None)
     face = _face(shape, fit, window)
     noise = (
         {}
@@ -136,7 +137,7 @@ def measure_object(
         scale = calibration_sd(shape, fit.values, depth_scale_sd, lateral_scale_sd)
     of_mode = {} if mode is None else mode_sd(shape, fit.values, mode)
     parts = (noise, scale, of_mode)
-    return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, reason)
+    return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
 
 
 def find_object(
@@ -326,7 +327,7 @@ def _measurement(
     fit: FitResult,
     shift_mm: float,
     parts: tuple[dict[str, float], dict[str, float], dict[str, float]],
-    reason: str,
+    findings: tuple[Finding, ...],
 ) -> Measurement:
     values, (noise, scale, of_mode) = fit.values, parts
     # Edge and face differ by the shift: the height is not more accurate than half of it.
@@ -355,8 +356,7 @@ def _measurement(
         residual_rms_mm=fit.residual_rms_mm,
         correlated_pixels=fit.correlated_pixels,
         outline_mm=MODELS[shape].outline(values),
-        verdict="doubtful" if reason else "ok",
-        reason=reason,
+        findings=findings,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, reason_of
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -103,10 +104,8 @@ class Measurement:
         How many pixels have a common error; the standard deviations count such a group once.
     outline_mm : (N, 2)
         Contact region, (x, y), closed, for an overlay.
-    verdict : str
-        ``ok`` or ``doubtful``.
-    reason : str
-        Why doubtful; empty when ok.
+    findings : tuple of Finding
+        Why it is doubtful; empty when it is not.
     noise_sd : dict or None
         The part by noise, the scatter of repeated images; None if the map's noise is not known.
     calibration_sd : dict or None
@@ -140,12 +139,21 @@ class Measurement:
     residual_rms_mm: float
     correlated_pixels: float
     outline_mm: Array
-    verdict: str
-    reason: str
+    findings: tuple[Finding, ...] = ()
     noise_sd: dict[str, Any] | None = None
     calibration_sd: dict[str, Any] | None = None
     mode_sd: dict[str, Any] | None = None
     corner_rounding: float | None = None
+
+    @property
+    def verdict(self) -> str:
+        """``ok``, or ``doubtful`` where there are findings."""
+        return "doubtful" if self.findings else "ok"
+
+    @property
+    def reason(self) -> str:
+        """Why doubtful; empty when ok."""
+        return reason_of(self.findings)
 
     @property
     def size_mm(self) -> float:

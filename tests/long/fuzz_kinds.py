@@ -248,7 +248,7 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
     )
     write_validation(trial, folder / "c.gplcal")
     good = Measurement("ball", 3.0, None, 1.0, (0.0, 1.0), None, 0.5, {"height_mm": 0.1}, None, 0.1,
-                       0.0, 0.01, 9.0, np.zeros((4, 2)), "ok", "")  # fmt: skip
+                       0.0, 0.01, 9.0, np.zeros((4, 2)))  # fmt: skip
     Ledger(folder / "ledger.jsonl", "c").keep("k", good)
 
     def held(name: str) -> bytes:

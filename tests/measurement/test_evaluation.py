@@ -56,8 +56,6 @@ def measurement(shape: str, size: float, height: float) -> Measurement:
         residual_rms_mm=0.003,
         correlated_pixels=1.0,
         outline_mm=np.zeros((1, 2)),
-        verdict="ok",
-        reason="",
     )
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from app.measure.judging import Stated, judge, record_of
 from app.services.preferences import Limits
+from gelpolight_core.finding import doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
@@ -34,8 +35,6 @@ FIT = Measurement(
     residual_rms_mm=0.001,
     correlated_pixels=10.0,
     outline_mm=np.zeros((3, 2)),
-    verdict="ok",
-    reason="",
 )
 PRESSED = ToolResult(
     Cylinder((0.0, 0.0)), (Measured(5.1, 0.02, "mm", "diameter"),), (), measurement=FIT
@@ -81,7 +80,7 @@ def test_the_verdict_follows_the_limits() -> None:
     assert _record(PRESSED, stated).verdict == PASSED
     strict = Limits(size_percent=1.0)
     assert _record(PRESSED, stated, strict).verdict == FAILED
-    doubtful = replace(PRESSED, verdict="doubtful", reason="cut")
+    doubtful = replace(PRESSED, findings=(doubt("cut", "cut"),))
     assert _record(doubtful, stated).verdict == DOUBTFUL
     assert _record(PRESSED, Stated()).verdict == UNJUDGED
 

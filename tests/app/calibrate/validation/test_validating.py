@@ -18,6 +18,7 @@ from app.command_line.main import main
 from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.finding import doubt
 from gelpolight_core.measurement.result import Quantity
 
 Made = Callable[[], Project]
@@ -82,7 +83,7 @@ def test_a_doubtful_trial_cannot_be_recorded(
     technician.until(panel.keep.isEnabled)
     assert step._trial is not None
     trial = step._trial[0]
-    unsure = replace(trial.measurement, verdict="doubtful", reason="cut by the border")
+    unsure = replace(trial.measurement, findings=(doubt("cut", "cut by the border"),))
     panel.show_trial(replace(trial, measurement=unsure))
     assert not panel.keep.isEnabled()
     assert panel.result.property("meaning") == "warn"
