@@ -16,7 +16,6 @@ from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.recipes import JOINT, stage_title
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.finding import Verdict
-from gelpolight_core.in_place.calibrate import InPlaceResult
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.report import drawings, tables
@@ -42,9 +41,7 @@ def calibration_report(calibration: Calibration, *, validation: Validation | Non
     validation : Validation, optional
         Results on objects of known size; by default none.
     """
-    c = calibration
-    parts = PARTS[c.model](c.data)
-    return _assemble(c, parts, validation)
+    return _assemble(calibration, PARTS[calibration.model](calibration.data), validation)
 
 
 def run_report(
@@ -66,11 +63,12 @@ def run_report(
     InputError
         If an image can no longer be read.
     """
-    return _assemble(run.calibration, RUN_PARTS[run.calibration.model](run), validation)
+    c = run.calibration
+    return _assemble(c, PARTS[c.model](c.data, run), validation)
 
 
-def _open_parts(c: OpenSensor) -> dict[str, Parts]:
-    return {
+def _open_parts(c: OpenSensor, run: Run | None = None) -> dict[str, Parts]:
+    parts: dict[str, Parts] = {
         "lights": ((drawings.led_plan(c),), (_mirror_leds(c),)),
         "crosstalk": ((), (tables.crosstalk_shares(c.crosstalk),)),
         "radiance": ((drawings.radiance(c),), ()),
@@ -78,10 +76,11 @@ def _open_parts(c: OpenSensor) -> dict[str, Parts]:
         "factors": ((drawings.factors(c),), ()),
         "joint": ((), _refined_leds(c)),
     }
+    return parts if run is None else parts | _parts_with_images(c, run)
 
 
-def _run_parts(run: Run) -> dict[str, Parts]:
-    c, session, results = run.calibration.open_sensor, run.session, run.results
+def _parts_with_images(c: OpenSensor, run: Run) -> dict[str, Parts]:
+    session, results = run.session, run.results
     lens, lights, made = results[LENS], results[LIGHTS].leds, results[REFLECTANCE].table
     presses, spots, joint = made.presses, lights.spots, results.get(JOINT)
     mirror = drawings.mirror_spots(spots, session.averaged("mirror").rgb)
@@ -89,41 +88,30 @@ def _run_parts(run: Run) -> dict[str, Parts]:
     balls = drawings.balls(presses, [c.table.apply(file.rgb) for file in files], c.table)
     curves = drawings.curves(made.table, gather_scatter(run))
     moved = () if joint is None else (tables.refined_presses(presses, joint.refined),)
+    views = drawings.lens_views(lens, _named(session, "checkerboard"))
     return {
-        "lens": (
-            (
-                drawings.lens_views(lens, _named(session, "checkerboard")),
-                drawings.lens_residuals(lens),
-            ),
-            (tables.left_out_views(lens),),
-        ),
+        "lens": ((views, drawings.lens_residuals(lens)), (tables.left_out_views(lens),)),
         "top_pose": (drawings.top_pose(results[TOP_POSE].pose, _named(session, "top_pose")), ()),
         "lights": (
             (mirror, drawings.led_plan(c, lights.bright_points_mm)),
             (_mirror_leds(c), tables.rejected_glints(spots)),
         ),
-        "crosstalk": ((), (tables.crosstalk_shares(c.crosstalk),)),
         "radiance": ((drawings.radiance(c, results[RADIANCE]),), ()),
         "reflectance": ((balls, curves), (tables.ball_presses(presses),)),
-        "factors": ((drawings.factors(c),), ()),
         "joint": ((), (*_refined_leds(c), *moved)),
     }
 
 
-def _closed_parts(c: ClosedSensor, result: InPlaceResult | None = None) -> dict[str, Parts]:
+def _closed_parts(c: ClosedSensor, run: Run | None = None) -> dict[str, Parts]:
     contacts, errors = drawings.contacts(c), drawings.slope_errors(c)
-    if result is None:
+    if run is None:
         return {"balls": ((contacts,), ()), "in_place": ((errors,), ())}
+    result = run.results[in_place.BALLS].result
     learning = (drawings.learning(result.learning),) if len(result.learning) > 1 else ()
     return {
         "balls": ((contacts,), (tables.refused_presses(result),)),
         "in_place": ((errors, *learning), (tables.closed_presses(c, result),)),
     }
-
-
-def _closed_run_parts(run: Run) -> dict[str, Parts]:
-    result = run.results[in_place.BALLS].result
-    return _closed_parts(run.calibration.data_of(ClosedSensor), result)
 
 
 def _named(session: Session, stage: str) -> Mapping[str, Map]:
@@ -188,11 +176,7 @@ def _not_validated() -> Validation:
     return Validation(sentence, Verdict.WARN)
 
 
-PARTS: Mapping[str, Callable[[Any], dict[str, Parts]]] = MappingProxyType(
+PARTS: Mapping[str, Callable[..., dict[str, Parts]]] = MappingProxyType(
     {**dict.fromkeys(MODELS, _open_parts), IN_PLACE: _closed_parts}
 )
-"""Drawings and tables of the calibration of each model."""
-RUN_PARTS: Mapping[str, Callable[[Run], dict[str, Parts]]] = MappingProxyType(
-    {**dict.fromkeys(MODELS, _run_parts), IN_PLACE: _closed_run_parts}
-)
-"""The same of a run, with its images."""
+"""Drawings and tables of the calibration of each model; also of its run, with its images."""
