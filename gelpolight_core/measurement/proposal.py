@@ -51,13 +51,7 @@ def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None)
     region = _tallest(heightmap)
     if region is None or (seed_mm is None and region.cut):
         return None
-    window, region, edge = find_object(
-        heightmap.depth_mm,
-        heightmap.x_mm,
-        heightmap.y_mm,
-        seed_mm=seed_mm or _point_on(region, heightmap),
-        flags=heightmap.flags,
-    )
+    window, region, edge = find_object(heightmap, seed_mm or _point_on(region, heightmap))
     residual = residuals_of(MODELS, window, region, edge)
     best, second, _ = sorted(residual, key=lambda shape: residual[shape])
     if residual[best] > POOR_RESIDUAL * region.height_mm:

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.measurement.fit import FitResult, WindowData
 from gelpolight_core.measurement.measured import noise_at
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -83,12 +84,7 @@ where a ray meets that surface."""
 
 
 def noise_of_fit(
-    fit: FitResult,
-    window: WindowData,
-    face: Mask | None,
-    noise_mm: NDArray[np.float32],
-    x_mm: Array,
-    y_mm: Array,
+    fit: FitResult, window: WindowData, face: Mask | None, heightmap: HeightMap
 ) -> dict[str, float]:
     """Return the standard deviation of the fit's parameters from a map's noise.
 
@@ -101,18 +97,13 @@ def noise_of_fit(
     face : (rows, columns) bool or None
         Pixels of the window whose median is the height; None if the height does not come from a
         median.
-    noise_mm : (examples, map rows / factor, map columns / factor)
-        Examples of the map's noise, averages over blocks of pixels.
-    x_mm, y_mm : (map columns,), (map rows,)
-        The map's grid.
+    heightmap : HeightMap
+        The map, with examples of its noise.
     """
-    factor = round(x_mm.size / noise_mm.shape[2])
 
     def at(pixels: Mask) -> Array:
         """Return each example's values at pixels of the window."""
-        column = (window.x_mm[pixels] - x_mm[0]) / (x_mm[1] - x_mm[0])
-        row = (window.y_mm[pixels] - y_mm[0]) / (y_mm[1] - y_mm[0])
-        return noise_at(noise_mm, row, column, factor)
+        return noise_at(heightmap, window.x_mm[pixels], window.y_mm[pixels])
 
     moved = dict(zip(fit.values, (at(fit.chosen) @ fit.gain.T).T, strict=True))
     if face is not None and face.any():
