@@ -8,7 +8,7 @@ import json
 import os
 import secrets
 import stat
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import methodcaller
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -256,6 +256,12 @@ def append_durably(path: Path, content: bytes) -> None:
         raise cannot_write(error, path) from error
     if is_new:
         sync_folder(path.parent)
+
+
+def append_json(path: Path, rows: Iterable[Any]) -> None:
+    """Append plain values as lines of JSON, as :func:`append_durably`."""
+    lines = [json.dumps(row, separators=(",", ":")) + "\n" for row in rows]
+    append_durably(path, "".join(lines).encode())
 
 
 def _write_all(handle: int, content: bytes) -> None:

@@ -15,7 +15,7 @@ import stat
 import tomllib
 import zipfile
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -180,6 +180,31 @@ def parse_json(data: bytes | str) -> Any:
         return json.loads(data, parse_constant=_refused, parse_float=_finite)
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
+
+
+def json_lines(path: Path) -> Iterator[tuple[int, Any]]:
+    """Yield the position and the content of each line of JSON; none if there is no such file.
+
+    A line that a crash cut off, or that is not JSON, is left out.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    position = 0
+    try:
+        with open_file(path) as file:
+            for line in file:
+                with suppress(ValueError):
+                    content = parse_json(line)
+                    if line.endswith(b"\n"):
+                        yield position, content
+                position += len(line)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise unreadable(error, path) from error
 
 
 def check_version(content: Any, form: str, newest: int, path: Path) -> None:

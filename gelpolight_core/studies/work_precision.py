@@ -29,13 +29,12 @@ from gelpolight_core.measurement.score import (
     scored_radius_mm,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.drawing import png
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.studies.trial import truth_at
+from gelpolight_core.studies.trial import solvers_of, truth_at
 from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
@@ -85,14 +84,11 @@ class Point:
     size_percent: float
 
 
-def modes() -> dict[str, tuple[str, str, str]]:
-    """Return model, effort and label of each mode, by its name."""
-    return {
-        "paper": ("paper", "best", tr("paper's model")),
-        "fast": ("full", "fast", tr("full model, {effort}").format(effort="fast")),
-        "balanced": ("full", "balanced", tr("full model, {effort}").format(effort="balanced")),
-        "best": ("full", "best", tr("full model, {effort}").format(effort="best")),
-    }
+def mode_label(mode: str) -> str:
+    """Return a mode's name for people."""
+    if mode == "paper":
+        return tr("paper's model")
+    return tr("full model, {effort}").format(effort=mode)
 
 
 def measure_virtual(
@@ -189,11 +185,7 @@ def measure_session(
             where=str(folder / "presses" / "truth.csv"),
             advice=tr("Use a session that contains such presses and their true depth"),
         )
-    solvers = {
-        name: Reconstructor(calibration, model=model, effort=effort)
-        for name, (model, effort, _) in modes().items()
-        if model == "paper" or calibration.open_sensor.full is not None
-    }
+    solvers = dict(reversed(solvers_of(calibration).items()))
     radius_mm = scored_radius_mm(calibration.open_sensor.sensor)
     times_ms: dict[str, list[float]] = {name: [] for name in solvers}
     errors: dict[str, list[tuple[float, ...]]] = {name: [] for name in solvers}
@@ -214,7 +206,7 @@ def measure_session(
     for name in solvers:
         median, p95 = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
         means = np.abs(errors[name]).mean(axis=0).tolist()
-        label, width = modes()[name][2], calibration.camera.width
+        label, width = mode_label(name), calibration.camera.width
         sensor, pitch_mm = calibration.serial, calibration.table.grid.pitch_mm
         points.append(Point(sensor, name, label, width, pitch_mm, len(rows), median, p95, *means))
     return tuple(points)
