@@ -187,13 +187,6 @@ class Records(Closing):
         write_csv(records, path)
         return len(records)
 
-    def sensors(self) -> tuple[str, ...]:
-        """Return the serial numbers of all sensors with measurements."""
-        with self._reading() as connection:
-            rows = connection.execute("SELECT serial FROM sensors ORDER BY serial").fetchall()
-        with self._refusing():
-            return tuple(written_text(row["serial"]) for row in rows)
-
     def uses(self, calibration_id: str) -> tuple[int, datetime | None]:
         """Return the number of measurements with a calibration, and the time of the last one.
 

@@ -206,8 +206,8 @@ def _records(folder: Path) -> tuple[bytes, ...]:
 
 def _use_records(path: Path) -> None:
     with Records.open(path, busy_s=0.1) as records:
-        for serial in records.sensors():
-            records.measurements(serial)
+        for record in records.measurements():
+            records.measurements(record.serial)
         records.measurements(removed=True)
         records.export_csv(path.with_name("out.csv"))
         records.update_note(1, "seen")
