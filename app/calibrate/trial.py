@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,25 +16,6 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
-
-
-@dataclass(frozen=True, slots=True)
-class KnownObject:
-    """An object and its true dimensions; None if a dimension is not known.
-
-    Attributes
-    ----------
-    shape : str
-        ``ball``, ``cylinder`` or ``cuboid``.
-    size_mm : float
-        Diameter, or side of a square cuboid.
-    height_mm : float or None
-        Depth of the press.
-    """
-
-    shape: str
-    size_mm: float
-    height_mm: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +40,9 @@ class Trial:
 def run_trial(
     frames: Sequence[NDArray[Any]],
     reconstructor: Reconstructor,
-    known: KnownObject,
+    known: Truth,
     *,
-    size_limit_percent: float,
-    height_limit_percent: float,
+    limits_percent: tuple[float, float],
     progress: Callable[[float], None],
 ) -> Trial:
     """Measure the object in frames of one press.
@@ -74,10 +53,10 @@ def run_trial(
         RGB images; they are averaged before the reconstruction.
     reconstructor : Reconstructor
         Reconstructor with the calibration to validate.
-    known : KnownObject
-        The pressed object.
-    size_limit_percent, height_limit_percent : float
-        Largest errors with which the trial passes.
+    known : Truth
+        The pressed object; its height is NaN if it is not known.
+    limits_percent : (float, float)
+        Largest errors of size and height with which the trial passes.
     progress : callable
         Called with the share that is done.
 
@@ -91,9 +70,7 @@ def run_trial(
     heightmap = measurable_depth(reconstructor, frame, name=name)
     progress(0.7)
     measured = measure_heightmap(heightmap, shape=known.shape)
-    height_mm = math.nan if known.height_mm is None else known.height_mm
-    truth = Truth(known.shape, known.size_mm, height_mm)
-    both = compare(measured, truth, (size_limit_percent, height_limit_percent))
+    both = compare(measured, known, limits_percent)
     names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
     comparisons = tuple(
         replace(quantity, name=name)

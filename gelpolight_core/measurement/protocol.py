@@ -41,7 +41,7 @@ FILE_NAME = "protocol.toml"
 FORMAT = "gelpolight-protocol"
 VERSION = 1
 SIZE_LIMIT = 100_000
-LEAST_MM, MOST_MM = 0.05, 200.0
+RANGE_MM = (0.05, 200.0)
 """Lengths of objects."""
 TABLES = {
     "objects": ("shapes", "sizes_mm", "at_height_mm", "heights_mm", "at_size_mm"),
@@ -192,10 +192,10 @@ def _faults(protocol: Protocol) -> Iterator[tuple[str, str]]:
     for name in ("sizes_mm", "heights_mm", "at_size_mm", "at_height_mm", "reach_mm"):
         lengths = np.atleast_1d(getattr(protocol, name)).tolist()
         for length in lengths:
-            if not LEAST_MM <= length <= MOST_MM:
+            if not RANGE_MM[0] <= length <= RANGE_MM[1]:
                 found = tr("{name} contains {length:g}").format(name=name, length=length)
                 advice = tr("Give lengths from {low:g} to {high:g} mm")
-                yield found, advice.format(low=LEAST_MM, high=MOST_MM)
+                yield found, advice.format(low=RANGE_MM[0], high=RANGE_MM[1])
         # The names of the images hold hundredths of a millimetre.
         if len({round(100 * length) for length in lengths}) < len(lengths):
             yield (

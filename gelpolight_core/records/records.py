@@ -18,7 +18,7 @@ from pathlib import Path
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.closing import Closing
-from gelpolight_core.io.reading import refusing, written_text
+from gelpolight_core.io.reading import refusing
 from gelpolight_core.records.database import connect, in_plain_words, is_damage, keep_aside
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of, write_csv
