@@ -137,17 +137,13 @@ def find_object(
     InputError
         As :func:`measure_object`, but for the shape.
     """
-    x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
-    outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
-    weight = np.where(heightmap.flags != 0, DOUBTFUL_WEIGHT, 1.0)
-    weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
+    depth, x, y, weight = usable_depth(heightmap)
     if min(weight.shape) < 8 or not weight.any():
         raise InputError(
             tr("no pixel is usable"),
             where=tr("depth map"),
             advice=tr("Check the image and the working area"),
         )
-    depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
     regions = find_pressed_regions(depth, x, y, weight > 0.0)
     region = _chosen_region(regions, x, y, seed_mm)
     if region.cut:
@@ -163,6 +159,16 @@ def find_object(
     blur = (blur_mm2, pixel_mm2) if blur_mm2 else (pixel_mm2, UNKNOWN_BLUR_MM**2)
     edge = EdgePrior(EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, *blur, blur_known=blur_mm2 > 0.0)
     return window, region, edge
+
+
+def usable_depth(heightmap: HeightMap) -> tuple[Array, Array, Array, Array]:
+    """Return depth (0 where it is not usable), x, y, and weights in [0, 1]."""
+    x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
+    outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
+    weight = np.where(heightmap.flags != 0, DOUBTFUL_WEIGHT, 1.0)
+    weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
+    depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
+    return depth, x, y, weight
 
 
 def _chosen_region(
