@@ -73,7 +73,7 @@ MOST = {
     "tests/app": 10639,
     "tests/batch": 408,
     "tests/calibration": 1606,
-    "tests/command_line": 1030,
+    "tests/command_line": 1033,
     "tests/data": 158,
     "tests/design": 89,
     "tests/design_check": 62,
