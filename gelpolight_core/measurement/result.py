@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, reason_of
+from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -291,14 +292,10 @@ def compare(
         ("height_mm", measurement.height_mm, measurement.height_sd_mm, truth.height_mm),
     )
     size, height = (
-        Quantity(name, value, _known(sd), _known(true), limit)
+        Quantity(name, value, finite_or_none(sd), finite_or_none(true), limit)
         for (name, value, sd, true), limit in zip(rows, limits_percent, strict=True)
     )
     return size, height
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def percent_error(measured: float, true: float) -> float:

@@ -19,6 +19,7 @@ from gelpolight_core.measurement.evaluation import (
     Evaluation,
 )
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
+from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.report.document import (
     Facts,
     Listing,
@@ -281,8 +282,8 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "repeatability": [
             {
                 "direction": pooled.direction,
-                "within_region_sd_mm": _known(pooled.within_region_mm),
-                "between_regions_sd_mm": _known(pooled.between_regions_mm),
+                "within_region_sd_mm": finite_or_none(pooled.within_region_mm),
+                "between_regions_sd_mm": finite_or_none(pooled.between_regions_mm),
             }
             for pooled in evaluation.repeatability
         ],
@@ -290,10 +291,6 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "failed": len(evaluation.failed),
         "skipped": list(evaluation.skipped),
     }
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def write_evaluation_files(
@@ -353,10 +350,10 @@ def _gauge_row(row: GaugeRow) -> dict[str, str | float | None]:
         "size_mm": row.truth.size_mm,
         "height_mm": row.truth.height_mm,
         "same_region_n": row.same.count,
-        "same_region_mean_mm": _known(row.same.mean),
-        "repeatability_sd_mm": _known(row.repeatability_mm),
+        "same_region_mean_mm": finite_or_none(row.same.mean),
+        "repeatability_sd_mm": finite_or_none(row.repeatability_mm),
         "random_regions_n": row.random.count,
-        "random_regions_mean_mm": _known(row.random.mean),
-        "random_regions_sd_mm": _known(row.random.sd),
-        "reproducibility_sd_mm": _known(row.reproducibility_mm),
+        "random_regions_mean_mm": finite_or_none(row.random.mean),
+        "random_regions_sd_mm": finite_or_none(row.random.sd),
+        "reproducibility_sd_mm": finite_or_none(row.reproducibility_mm),
     }
