@@ -115,6 +115,21 @@ class Finding:
         return (self.value <= limits[0]) != (self.verdict is Verdict.PASS)
 
 
+def doubt(key: str, text: str) -> Finding:
+    """Return a finding that makes heights, or what is measured on them, doubtful."""
+    return Finding(key, text, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
+
+
+def worst_of(findings: Iterable[Finding]) -> Finding | None:
+    """Return the first finding with the worst verdict; None if there are none."""
+    return max(findings, key=lambda finding: _ORDER.index(finding.verdict), default=None)
+
+
+def reason_of(findings: Iterable[Finding]) -> str:
+    """Return why something is doubtful: the texts of all findings; empty if there are none."""
+    return joined("; ", (finding.text for finding in findings))
+
+
 def verdict_word(verdict: Verdict) -> str:
     """Return the label of a verdict."""
     return {
@@ -205,7 +220,8 @@ class QualityTable:
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of all figures; "pass" when there are none."""
-        return max((f.verdict for f in self.figures), key=_ORDER.index, default=Verdict.PASS)
+        worst = worst_of(self.figures)
+        return Verdict.PASS if worst is None else worst.verdict
 
     @property
     def remedies(self) -> tuple[str, ...]:

@@ -123,13 +123,7 @@ def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor, mod
         heightmap = reconstruct.depth(image.rgb, name=image.name, health=health)
         height_mm = float(row["height_mm"])
         truth = sensor.folder / "truth" / f"{Path(row['file']).stem}.npz"
-        measured = measure_object(
-            heightmap.depth_mm,
-            heightmap.x_mm,
-            heightmap.y_mm,
-            shape=row["shape"],
-            flags=heightmap.flags,
-        )
+        measured = measure_object(heightmap, shape=row["shape"])
         size_mm = float(row["diameter_mm"] or row["side_mm"])
         errors.append(
             (

@@ -3,39 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.typing import NDArray
 
-from app.workspace.validation import Comparison
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
-from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.result import Measurement, Quantity, Truth, compare
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
-
-
-@dataclass(frozen=True, slots=True)
-class KnownObject:
-    """An object and its true dimensions; None if a dimension is not known.
-
-    Attributes
-    ----------
-    shape : str
-        ``ball``, ``cylinder`` or ``cuboid``.
-    size_mm : float
-        Diameter, or side of a square cuboid.
-    height_mm : float or None
-        Depth of the press.
-    """
-
-    shape: str
-    size_mm: float
-    height_mm: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,24 +26,23 @@ class Trial:
     ----------
     measurement : Measurement
         Measurement of the object.
-    comparisons : tuple of Comparison
-        Comparisons with the true values.
+    comparisons : tuple of Quantity
+        The lengths with their true values and limits.
     heightmap : HeightMap
         The depth it was measured in.
     """
 
     measurement: Measurement
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[Quantity, ...]
     heightmap: HeightMap
 
 
 def run_trial(
     frames: Sequence[NDArray[Any]],
     reconstructor: Reconstructor,
-    known: KnownObject,
+    known: Truth,
     *,
-    size_limit_percent: float,
-    height_limit_percent: float,
+    limits_percent: tuple[float, float],
     progress: Callable[[float], None],
 ) -> Trial:
     """Measure the object in frames of one press.
@@ -74,10 +53,10 @@ def run_trial(
         RGB images; they are averaged before the reconstruction.
     reconstructor : Reconstructor
         Reconstructor with the calibration to validate.
-    known : KnownObject
-        The pressed object.
-    size_limit_percent, height_limit_percent : float
-        Largest errors with which the trial passes.
+    known : Truth
+        The pressed object; its height is NaN if it is not known.
+    limits_percent : (float, float)
+        Largest errors of size and height with which the trial passes.
     progress : callable
         Called with the share that is done.
 
@@ -91,11 +70,12 @@ def run_trial(
     heightmap = measurable_depth(reconstructor, frame, name=name)
     progress(0.7)
     measured = measure_heightmap(heightmap, shape=known.shape)
-    quantity = tr("side") if known.shape == "cuboid" else tr("diameter")
-    comparisons = [Comparison(quantity, measured.size_mm, known.size_mm, size_limit_percent)]
-    if known.height_mm is not None:
-        comparisons.append(
-            Comparison(tr("height"), measured.height_mm, known.height_mm, height_limit_percent)
-        )
+    both = compare(measured, known, limits_percent)
+    names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
+    comparisons = tuple(
+        replace(quantity, name=name)
+        for quantity, name in zip(both, names, strict=True)
+        if quantity.truth is not None
+    )
     measured = judged(measured, heightmap)
-    return Trial(measured, tuple(comparisons), heightmap)
+    return Trial(measured, comparisons, heightmap)

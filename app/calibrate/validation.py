@@ -15,7 +15,7 @@ from app.calibrate.maps import depth_panel
 from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
-from app.calibrate.trial import KnownObject, Trial, run_trial
+from app.calibrate.trial import Trial, run_trial
 from app.calibrate.validation_panel import SHAPES, ValidationPanel
 from app.context.calibration_status import put_into_use
 from app.services.jobs import Job, Jobs
@@ -27,6 +27,7 @@ from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.user import user_name
 from gelpolight_core.measurement.press import read_truth
+from gelpolight_core.measurement.result import Truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
@@ -101,7 +102,7 @@ class ValidationStep(StepPresenter):
 
     def on_bench(self, scene: Scene) -> None:
         """Fill in the object on the virtual bench."""
-        self.form.show_known(KnownObject(scene.item, scene.size_mm, scene.depth_mm))
+        self.form.show_known(Truth(scene.item, scene.size_mm, scene.depth_mm))
 
     def close(self) -> None:
         """Stop the measurement."""
@@ -199,8 +200,7 @@ class ValidationStep(StepPresenter):
                 frames,
                 reconstructor,
                 known,
-                size_limit_percent=stated.size_limit,
-                height_limit_percent=stated.height_limit,
+                limits_percent=(stated.size_limit, stated.height_limit),
                 progress=progress,
             )
             return reconstructor, trial
@@ -288,7 +288,7 @@ class ValidationStep(StepPresenter):
             )
 
 
-def _known_in_folder(path: Path) -> KnownObject | None:
+def _known_in_folder(path: Path) -> Truth | None:
     """Return the object given for a press image in the truth.csv of its folder, or None.
 
     Raises
@@ -300,5 +300,5 @@ def _known_in_folder(path: Path) -> KnownObject | None:
         return None
     for row in read_truth(path.parent).rows:
         if row.file == path.name:
-            return KnownObject(row.truth.shape, row.truth.size_mm, row.truth.height_mm)
+            return row.truth
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from PySide6.QtWidgets import (
@@ -13,7 +14,7 @@ from PySide6.QtWidgets import (
 from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.step_data import Step
 from app.calibrate.step_panel import WIDTH, help_button, lay_button, side_scroll
-from app.calibrate.trial import KnownObject, Trial
+from app.calibrate.trial import Trial
 from app.services.preferences import Limits
 from app.widgets.fields import choice, number, switch
 from app.widgets.forms import Form
@@ -21,6 +22,7 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, keep_space, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
+from gelpolight_core.measurement.result import Truth
 from gelpolight_core.translation import tr
 
 SHAPES = {
@@ -52,10 +54,10 @@ class Asked:
     height_limit: float = number(8.0, tr("Largest depth error"), 0.1, 100.0, PERCENT, 1)
 
     @property
-    def known(self) -> KnownObject:
+    def known(self) -> Truth:
         """The object."""
-        height = self.height_mm if self.height_known else None
-        return KnownObject(self.shape, self.size_mm, height)
+        height = self.height_mm if self.height_known else math.nan
+        return Truth(self.shape, self.size_mm, height)
 
 
 class ValidationPanel(QWidget):
@@ -138,15 +140,14 @@ class ValidationPanel(QWidget):
         """The object and the limits as entered."""
         return self.form.value
 
-    def show_known(self, known: KnownObject) -> None:
+    def show_known(self, known: Truth) -> None:
         """Fill in an object, for example the one on the virtual bench."""
         shape = known.shape if known.shape in SHAPES else next(iter(SHAPES))
-        height = self.asked.height_mm if known.height_mm is None else known.height_mm
         self.form.change(
             shape=shape,
             size_mm=known.size_mm,
-            height_known=known.height_mm is not None,
-            height_mm=height,
+            height_known=known.is_whole,
+            height_mm=known.height_mm if known.is_whole else self.asked.height_mm,
         )
 
     def show_calibration(self, name: str, *, present: bool) -> None:
@@ -208,9 +209,9 @@ class ValidationPanel(QWidget):
                     "<b>{what}</b>: measured {m:.3f} mm, true {t:.3f} mm, error"
                     " <b>{e:+.2f} %</b>, {word} ±{limit:g} %"
                 ).format(
-                    what=escaped(c.quantity.capitalize()),
-                    m=c.measured_mm,
-                    t=c.true_mm,
+                    what=escaped(c.name.capitalize()),
+                    m=c.value,
+                    t=c.truth,
                     e=c.error_percent,
                     word=word,
                     limit=c.limit_percent,

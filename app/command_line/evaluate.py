@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from app.command_line.common import stage_progress
 from app.command_line.reconstructing import add_model, load_reconstructor
 from app.command_line.terminal import say
-from gelpolight_core.batch.presses import measure_presses
+from gelpolight_core.batch.workers import processes
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.measurement.evaluation_report import evaluation_table
-from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
+from gelpolight_core.measurement.evaluation_run import (
+    evaluate_presses,
+    measure_with,
+    press_measurement,
+)
 from gelpolight_core.measurement.protocol_run import presses_folder
-from gelpolight_core.report.evaluation import write_evaluation_files
+from gelpolight_core.report.evaluation import evaluation_table, write_evaluation_files
 from gelpolight_core.translation import tr
 
 
@@ -44,18 +48,15 @@ def run(options: argparse.Namespace) -> int:
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     presses = presses_folder(options.presses)  # before a folder is created for nothing
     make_folder(options.output)
-    measure = press_measurement(reconstructor)
     with stage_progress() as progress:
         if options.workers > 1:
-            outcomes = measure_presses(
-                presses,
-                options.calibration,
-                model=options.model,
-                workers=options.workers,
-                progress=progress,
-            )
-            evaluation = evaluate_presses(presses, lambda image, _shape: outcomes[image.name])
+            measure = partial(measure_with, options.calibration, options.model)
+            with processes(options.workers) as pool:
+                evaluation = evaluate_presses(
+                    presses, measure, progress=progress, submit=pool.submit
+                )
         else:
+            measure = press_measurement(reconstructor)
             evaluation = evaluate_presses(presses, measure, progress=progress)
     written = write_evaluation_files(
         evaluation, options.output, calibration=reconstructor.calibration

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.result import Comparison, Measurement, Truth, compare
+from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.tools import Tool, ToolResult, result_as_dict
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -107,11 +107,11 @@ def _measured(
         return content, [line for result in results for line in tool_lines(result)]
     seed = one_point(options.at, where="--at") if options.at else None
     measurement = judged(measure_heightmap(heightmap, shape=options.shape, seed_mm=seed), heightmap)
-    comparison = None if truth is None else compare(measurement, truth)
-    lines = measurement_lines(measurement, comparison)
+    values = measurement.as_json(truth)
+    lines = measurement_lines(values)
     if options.shape == AUTO:
         lines = [f"{tr('shape'):<12} {measurement.shape}", *lines]
-    return measurement.as_json(comparison) | faults, lines
+    return values | faults, lines
 
 
 def _truths(options: argparse.Namespace) -> dict[str, Truth]:
@@ -141,13 +141,12 @@ def tool_lines(result: ToolResult) -> list[str]:
     for figure in result.figures:
         line = f"  {figure.label:<26} {figure.value:.4f} {figure.unit}"
         lines.append(line + ("" if figure.sd is None else f"  (sd {figure.sd:.4f})"))
-    verdict = result.verdict + (f": {result.reason}" if result.reason else "")
+    verdict = ": ".join(filter(None, (result.verdict, result.reason)))
     return [*lines, f"  {tr('verdict'):<26} {verdict}"]
 
 
-def measurement_lines(measurement: Measurement, comparison: Comparison | None) -> list[str]:
-    """Return a measurement as lines of text, each value with its standard deviation."""
-    values = measurement.as_json(comparison)
+def measurement_lines(values: Mapping[str, Any]) -> list[str]:
+    """Return a measurement's JSON values as lines of text, each with its standard deviation."""
     errors = values["error_percent"] or {}
     rows = (
         ("diameter_mm", tr("diameter"), "mm"),
@@ -171,7 +170,7 @@ def measurement_lines(measurement: Measurement, comparison: Comparison | None) -
         if key in errors:
             line += tr("  error {e:+.2f} %").format(e=errors[key])
         lines.append(line)
-    verdict = measurement.verdict + (f": {measurement.reason}" if measurement.reason else "")
+    verdict = ": ".join(filter(None, (values["verdict"], values["reason"])))
     return [*lines, f"{tr('verdict'):<12} {verdict}"]
 
 

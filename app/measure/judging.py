@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from app.services.preferences import Limits
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.result import Measurement, Truth, compare
+from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.result import Quantity, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.records.entry import MeasurementRecord, Quantity, indenter_record, verdict_of
+from gelpolight_core.records.entry import MeasurementRecord, indenter_record, verdict_of
 from gelpolight_core.translation import tr
 
 DEPTH_FIGURES = frozenset({"step_height", "height", "depth_difference", "mean_depth", "deepest"})
@@ -34,51 +36,19 @@ class Stated:
     height_mm: float | None = None
     name: str = ""
 
-
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """One figure with its true value.
-
-    Attributes
-    ----------
-    quantity : str
-        ``size``, ``height`` or the figure's name.
-    label, unit : str
-        Text for the user.
-    measured, true : float
-        In `unit`.
-    error_percent : float
-        Signed, relative to the true value.
-    limit_percent : float
-        Maximum error to pass.
-    """
-
-    quantity: str
-    label: str
-    unit: str
-    measured: float
-    true: float
-    error_percent: float
-    limit_percent: float
-
-    @property
-    def error(self) -> float:
-        """Measured minus true value, in `unit`."""
-        return self.measured - self.true
-
-    @property
-    def passed(self) -> bool:
-        """Whether the error is within the limit. False for values that are not finite."""
-        return abs(self.error_percent) <= self.limit_percent
+    def truth(self, shape: str) -> Truth:
+        """Return the true sizes of an indenter."""
+        known = (math.nan if x is None else x for x in (self.size_mm, self.height_mm))
+        return Truth(shape, *known)
 
 
-def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Judged, ...]:
+def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Quantity, ...]:
     """Compare a result with its true values.
 
     Returns
     -------
-    tuple of Judged
-        Empty if no true value is given.
+    tuple of Quantity
+        Those with a true value: size and height of an indenter, the first figure of another tool.
 
     Raises
     ------
@@ -86,46 +56,33 @@ def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Judged, .
         If a given length is not greater than zero.
     """
     if result.measurement is not None:
-        return _judge_indenter(result.measurement, stated, limits)
-    if stated.size_mm is None:
-        return ()
-    figure = result.figures[0]
+        truth = stated.truth(result.measurement.shape)
+        both = compare(result.measurement, truth, limits.percent)
+        return tuple(quantity for quantity in both if quantity.truth is not None)
     true = stated.size_mm
+    if true is None:
+        return ()
     if not (math.isfinite(true) and true > 0.0):
         raise InputError(
             tr("The true value is {value}").format(value=true),
             where=tr("True value"),
             advice=tr("Enter a value greater than zero"),
         )
-    # The sign of a step only depends on the order of the clicks.
-    measured = abs(figure.value) if figure.name in DEPTH_FIGURES else figure.value
+    figure = result.figures[0]
     in_depth = figure.name in DEPTH_FIGURES
-    limit = limits.height_percent if in_depth else limits.size_percent
-    error = 100.0 * (measured / true - 1.0)
-    return (Judged(figure.name, figure.label, figure.unit, measured, true, error, limit),)
+    # The sign of a step only depends on the order of the clicks.
+    value = abs(figure.value) if in_depth else figure.value
+    limit = limits.percent[in_depth]
+    return (replace(_quantity(figure), value=value, truth=true, limit_percent=limit),)
 
 
-def _judge_indenter(fit: Measurement, stated: Stated, limits: Limits) -> tuple[Judged, ...]:
-    if stated.size_mm is None and stated.height_mm is None:
-        return ()
-    # For unknown values the measured ones are used, and they are not reported.
-    size = fit.size_mm if stated.size_mm is None else stated.size_mm
-    height = fit.height_mm if stated.height_mm is None else stated.height_mm
-    found = compare(fit, Truth(fit.shape, size, height))
-    rows = []
-    if stated.size_mm is not None:
-        label = tr("mean side") if fit.shape == "cuboid" else tr("diameter")
-        error, limit = found.size_error_percent, limits.size_percent
-        rows.append(Judged("size", label, "mm", fit.size_mm, size, error, limit))
-    if stated.height_mm is not None:
-        error, limit = found.height_error_percent, limits.height_percent
-        rows.append(Judged("height", tr("depth"), "mm", fit.height_mm, height, error, limit))
-    return tuple(rows)
+def _quantity(figure: Measured) -> Quantity:
+    return Quantity(f"{figure.name}_{figure.unit}", figure.value, figure.sd)
 
 
 def record_of(
     result: ToolResult,
-    judged: tuple[Judged, ...],
+    judged: tuple[Quantity, ...],
     stated: Stated,
     heightmap: HeightMap,
     *,
@@ -140,7 +97,7 @@ def record_of(
     ----------
     result : ToolResult
         Result of a tool.
-    judged : tuple of Judged
+    judged : tuple of Quantity
         Comparison with the true values. Empty if there are none.
     stated : Stated
         The true values as entered.
@@ -153,48 +110,28 @@ def record_of(
     operator, note : str
         Operator, and their note.
     """
-    fit = result.measurement
-    context = {
+    settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
+    if stated.name:
+        settings["indenter"] = stated.name
+    context: dict[str, Any] = {
         "serial": serial,
         "calibration_id": heightmap.calibration_id,
         "operator": operator,
         "picture": heightmap.source,
         "note": note,
+        "settings": settings,
     }
-    if fit is None:
-        record = MeasurementRecord(
-            shape=result.tool.name.replace("-", "_"),
-            quantities=tuple(
-                Quantity(f"{figure.name}_{figure.unit}", figure.value, figure.sd)
-                for figure in result.figures
-            ),
-            reason=result.reason,
-            details=result_as_dict(result),
-            **context,
-        )
-    else:
-        comparison = None
-        if stated.size_mm is not None and stated.height_mm is not None:
-            comparison = compare(fit, Truth(fit.shape, stated.size_mm, stated.height_mm))
-        record = indenter_record(
-            fit,
-            comparison,
-            size_limit_percent=limits.size_percent,
-            height_limit_percent=limits.height_percent,
-            **context,
-        )
-    quantities = list(record.quantities)
-    for row in judged:  # size first, then depth
-        index = 1 if row.quantity == "height" and fit is not None else 0
-        quantities[index] = replace(
-            quantities[index], value=row.measured, truth=row.true, limit_percent=row.limit_percent
-        )
-    settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
-    if stated.name:
-        settings["indenter"] = stated.name
-    return replace(
-        record,
-        quantities=tuple(quantities),
-        verdict=verdict_of(tuple(quantities), doubtful=result.verdict != "ok"),
-        settings=settings,
+    fit, doubtful = result.measurement, result.verdict != "ok"
+    if fit is not None:
+        truth = stated.truth(fit.shape)
+        record = indenter_record(fit, truth, limits_percent=limits.percent, **context)
+        return replace(record, verdict=verdict_of(record.quantities, doubtful=doubtful))
+    quantities = (*judged, *map(_quantity, result.figures[len(judged) :]))
+    return MeasurementRecord(
+        shape=result.tool.name.replace("-", "_"),
+        quantities=quantities,
+        verdict=verdict_of(quantities, doubtful=doubtful),
+        reason=result.reason,
+        details=result_as_dict(result),
+        **context,
     )

@@ -11,7 +11,7 @@ from app.context.context import AppContext
 from app.live.frame_results import Shown, Wanted
 from app.live.zero import ZeroControl
 from app.measure.advice import measuring_advice
-from app.measure.judging import Judged, judge, record_of
+from app.measure.judging import judge, record_of
 from app.measure.measuring import MeasuredImage
 from app.measure.press_view_frame import PressViewFrame
 from app.measure.steady import SteadyPress
@@ -21,6 +21,7 @@ from app.view2d.display import Display
 from app.view3d.saving import ViewSaving
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.sensor_calibration import Calibration
@@ -249,7 +250,7 @@ class PressView(PressViewFrame):
         )
         self.kept.emit(record)
 
-    def judged(self) -> tuple[Judged, ...]:
+    def judged(self) -> tuple[Quantity, ...]:
         """Return the comparison of the chosen tool's result with the true values."""
         result = self.work.result
         if result is None:

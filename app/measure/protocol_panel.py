@@ -187,9 +187,7 @@ class RunPanel(QWidget):
         texts = [_press_name(press), tr("not measured"), ""]
         tip = outcome if isinstance(outcome, str) else outcome.reason
         if not isinstance(outcome, str):
-            found = compare(outcome, press.truth)
-            texts[1] = f"{found.size_error_percent:+.1f} %"
-            texts[2] = f"{found.height_error_percent:+.1f} %"
+            texts[1:] = (f"{q.error_percent:+.1f} %" for q in compare(outcome, press.truth))
         self.last.insertRow(0)
         for column, text in enumerate(texts):
             item = QTableWidgetItem(text)

@@ -104,8 +104,7 @@ class ResultView(QWidget):
     def show_evaluation(self, evaluation: Evaluation) -> None:
         """Show the results."""
         self._evaluation = evaluation
-        limits = self._context.settings.limits
-        self._limits_percent = limits.size_percent, limits.height_percent
+        self._limits_percent = self._context.settings.limits.percent
         document = evaluation_document(evaluation, limits_percent=self._limits_percent)
         progress = self._work.run.progress
         word = verdict_word(document.verdict)

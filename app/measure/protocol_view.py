@@ -185,14 +185,13 @@ class ProtocolView(QWidget):
         if self.result is None or self.work is None:
             return
         self.result.show_evaluation(evaluation)
-        run, limits = self.work.run, self.context.settings.limits
+        run = self.work.run
         if run.next() is None:
             record = evaluation_record(
                 evaluation,
                 serial=run.content.serial,
                 calibration_id=run.content.calibration,
-                size_limit_percent=limits.size_percent,
-                height_limit_percent=limits.height_percent,
+                limits_percent=self.context.settings.limits.percent,
                 operator=user_name(),
                 folder=str(run.folder),
             )

@@ -11,13 +11,15 @@ from PySide6.QtWidgets import (
 )
 
 from app.measure.figures_text import UNITS
-from app.measure.judging import Judged, Stated
+from app.measure.judging import Stated
 from app.measure.placing import INDENTERS
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
+from gelpolight_core.measurement.measured import figure_labels
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.translation import tr
 
@@ -209,7 +211,7 @@ class TruthForm(QGroupBox):
 
     # Comparison
 
-    def show_verdict(self, rows: tuple[Judged, ...], result: ToolResult | None) -> None:
+    def show_verdict(self, rows: tuple[Quantity, ...], result: ToolResult | None) -> None:
         """Show the errors of the measurement. No rows: show what to do to see them."""
         if not rows:
             text = tr("Enter the true values to see the error.") if result is not None else ""
@@ -225,13 +227,15 @@ class TruthForm(QGroupBox):
         self.verdict.setText(f"<span style='color:@{role}'>{escaped(text)}</span>")
 
 
-def _sentence(row: Judged) -> str:
-    role = "pass" if row.passed else "fail"
+def _sentence(row: Quantity) -> str:
+    role, name = "pass" if row.passed else "fail", row.name.rpartition("_")[0]
+    labels = figure_labels() | {"side": tr("mean side"), "height": tr("depth")}
+    label = labels.get(name, name)
     return tr(
         "{label}: {error:+.3f}{unit}, <b style='color:@{role}'>{percent:+.2f} %: {word}"
         " {limit:g} %</b>"
     ).format(
-        label=escaped(row.label[:1].upper() + row.label[1:]),
+        label=escaped(label[:1].upper() + label[1:]),
         error=row.error,
         unit=escaped(UNITS.get(row.unit, row.unit)),
         role=role,

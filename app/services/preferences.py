@@ -75,3 +75,8 @@ class Limits:
     age_days: float = number(90.0, tr("Mark calibrations older than"), 1.0, 3650.0, " d")
     height_percent: float = number(8.0, tr("Validation: maximum height error"), 0.1, 100.0, " %", 1)
     size_percent: float = number(5.0, tr("Validation: maximum width error"), 0.1, 100.0, " %", 1)
+
+    @property
+    def percent(self) -> tuple[float, float]:
+        """The limits of size and height."""
+        return self.size_percent, self.height_percent

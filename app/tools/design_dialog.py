@@ -13,7 +13,8 @@ from app.widgets.layout import vbox
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.design_check.check import DesignCheckResult, check_design
 from gelpolight_core.finding import Verdict, limit_text, value_text, verdict_word
-from gelpolight_core.studies.files import write_table
+from gelpolight_core.io.atomic import write_text
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.translation import tr
 
 
@@ -57,7 +58,7 @@ class DesignDialog(WorkDialog):
     def files_of(self, result: DesignCheckResult, folder: Path) -> Sequence[Path]:
         """Write the table as CSV."""
         path = folder / "design-check.csv"
-        write_table([dict(zip(self.heads, row, strict=True)) for row in _rows(result)], path)
+        write_text(path, csv_text(self.heads, _rows(result)))
         return [path]
 
 

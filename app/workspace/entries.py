@@ -123,9 +123,9 @@ def validation_lines(entry: Entry) -> list[str]:
         f"{word}: {trial.indenter}, {day} {by}".rstrip(),
         *(
             line.format(
-                what=c.quantity,
-                a=c.measured_mm,
-                b=c.true_mm,
+                what=c.name,
+                a=c.value,
+                b=c.truth,
                 e=c.error_percent,
                 l=c.limit_percent,
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 from app.workspace.entries import Entry, validation_lines
@@ -17,7 +16,9 @@ def stated_validation(entry: Entry) -> Validation | None:
         return Validation(sentence, Verdict.WARN)
     if trial is None:
         return None
-    return Validation(sentence, Verdict.PASS if trial.passed else Verdict.FAIL, data=asdict(trial))
+    return Validation(
+        sentence, Verdict.PASS if trial.passed else Verdict.FAIL, data=trial.as_json()
+    )
 
 
 def write_entry_report(entry: Entry, path: Path) -> None:

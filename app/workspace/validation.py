@@ -13,41 +13,12 @@ from typing import Any
 
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.reading import brief, plain_text, read_own
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
 VERSION = 1
 ENDING = ".validation.json"
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """One length of the object: measured value, true value and limit.
-
-    Attributes
-    ----------
-    quantity : str
-        Such as ``height`` or ``diameter``.
-    measured_mm, true_mm : float
-        The two lengths.
-    limit_percent : float
-        Maximum error to pass, in percent of the true length.
-    """
-
-    quantity: str
-    measured_mm: float
-    true_mm: float
-    limit_percent: float
-
-    @property
-    def error_percent(self) -> float:
-        """Measured minus true, in percent of the true length."""
-        return 100.0 * (self.measured_mm - self.true_mm) / self.true_mm
-
-    @property
-    def passed(self) -> bool:
-        """Whether the error is within the limit. False for values that are not finite."""
-        return abs(self.error_percent) <= self.limit_percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,20 +35,27 @@ class Validation:
         The operator.
     indenter : str
         Description of the object for the user.
-    comparisons : tuple of Comparison
-        At least one.
+    comparisons : tuple of Quantity
+        At least one, with its true value and limit; its name, such as ``height``, has no unit.
     """
 
     identity: str
     when: str
     who: str
     indenter: str
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[Quantity, ...]
 
     @property
     def passed(self) -> bool:
         """Whether there is at least one length and all are within their limits."""
         return bool(self.comparisons) and all(c.passed for c in self.comparisons)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the validation as plain values."""
+        keys = ("quantity", "measured_mm", "true_mm", "limit_percent")
+        lengths = [(c.name, c.value, c.truth, c.limit_percent) for c in self.comparisons]
+        rows = [dict(zip(keys, length, strict=True)) for length in lengths]
+        return {**asdict(self), "comparisons": rows}
 
 
 def validation_path(calibration: Path) -> Path:
@@ -97,7 +75,7 @@ def write_validation(validation: Validation, calibration: Path) -> Path:
     content = {
         "format": FORMAT,
         "version": VERSION,
-        **asdict(validation),
+        **validation.as_json(),
         "passed": validation.passed,
     }
     write_json(path, content)
@@ -128,11 +106,11 @@ def _parse(content: Any) -> Validation:
         who=plain_text(content["who"]),
         indenter=plain_text(content["indenter"]),
         comparisons=tuple(
-            Comparison(
+            Quantity(
                 plain_text(c["quantity"]),
                 _positive(c["measured_mm"]),
-                _positive(c["true_mm"]),
-                _positive(c["limit_percent"]),
+                truth=_positive(c["true_mm"]),
+                limit_percent=_positive(c["limit_percent"]),
             )
             for c in content["comparisons"]
         ),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -16,8 +15,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gelpolight_core.io.atomic import append_durably, write_atomically
-from gelpolight_core.io.reading import open_file, parse_json, unreadable
+from gelpolight_core.io.atomic import append_json, write_atomically
+from gelpolight_core.io.reading import json_lines, open_file, parse_json
 
 FILE = "batch.jsonl"
 SUMMARY = "batch.csv"
@@ -96,8 +95,7 @@ def keep_rows(rows: Sequence[FrameRow], out: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    lines = [json.dumps(asdict(row), separators=(",", ":")) + "\n" for row in rows]
-    append_durably(out / FILE, "".join(lines).encode())
+    append_json(out / FILE, map(asdict, rows))
 
 
 def write_summary(out: Path, *, measured: bool) -> None:
@@ -144,19 +142,9 @@ def write_summary(out: Path, *, measured: bool) -> None:
 
 def _lines(path: Path) -> Iterator[tuple[int, FrameRow]]:
     """Yield the rows of a file and their positions; an invalid line is skipped."""
-    if not path.exists():
-        return
-    position = 0
-    try:
-        with open_file(path) as file:
-            for line in file:
-                with suppress(ValueError, TypeError):
-                    row = FrameRow(**parse_json(line))
-                    if line.endswith(b"\n"):
-                        yield position, row
-                position += len(line)
-    except OSError as error:
-        raise unreadable(error, path) from error
+    for position, content in json_lines(path):
+        with suppress(TypeError):
+            yield position, FrameRow(**content)
 
 
 def last_line(text: str) -> str:

@@ -8,7 +8,8 @@ import json
 import os
 import secrets
 import stat
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -82,6 +83,13 @@ def write_text(path: Path, text: str, *, inside: Path | None = None) -> None:
 def write_json(path: Path, content: Mapping[str, Any] | Sequence[Any]) -> None:
     """Write a JSON file, as :func:`write_atomically`."""
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Write files by their names into a folder, each as :func:`write_atomically`."""
+    for name, content in contents.items():
+        write_atomically(folder / name, methodcaller("write", content))
+    return tuple(folder / name for name in contents)
 
 
 def refuse_unwritable(path: Path) -> None:
@@ -248,6 +256,12 @@ def append_durably(path: Path, content: bytes) -> None:
         raise cannot_write(error, path) from error
     if is_new:
         sync_folder(path.parent)
+
+
+def append_json(path: Path, rows: Iterable[Any]) -> None:
+    """Append plain values as lines of JSON, as :func:`append_durably`."""
+    lines = [json.dumps(row, separators=(",", ":")) + "\n" for row in rows]
+    append_durably(path, "".join(lines).encode())
 
 
 def _write_all(handle: int, content: bytes) -> None:

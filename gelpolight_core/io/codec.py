@@ -13,7 +13,7 @@ import types
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +129,7 @@ def _array(kind: Any, arrays: Arrays, path: str) -> NDArray[Any]:
 
 def _tuple(inside: tuple[Any, ...], plain: Any, arrays: Arrays, path: str) -> tuple[Any, ...]:
     if not isinstance(plain, list):
-        raise ValueError(f"{path} is not a list")
+        raise ValueError(f"{path} is {'missing' if plain is None else 'not a list'}")
     kinds = inside
     if len(inside) == 2 and inside[1] is Ellipsis:
         kinds = (inside[0],) * len(plain)
@@ -144,6 +144,8 @@ def _scalar(kind: Any, plain: Any, path: str) -> Any:
         return written_text(plain)
     if kind is float and type(plain) in (int, float) and math.isfinite(plain):
         return float(plain)
+    if get_origin(kind) is Literal and isinstance(plain, str) and plain in get_args(kind):
+        return plain
     if kind in (int, bool) and type(plain) is kind:
         return plain
     if isinstance(kind, type) and issubclass(kind, Enum):

@@ -16,7 +16,7 @@ import tomllib
 import zipfile
 import zlib
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
@@ -203,6 +203,31 @@ def parse_json(data: bytes | str) -> Any:
         raise ValueError("it is nested too deeply") from error
 
 
+def json_lines(path: Path) -> Iterator[tuple[int, Any]]:
+    """Yield the position and the content of each line of JSON; none if there is no such file.
+
+    A line that a crash cut off, or that is not JSON, is left out.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    position = 0
+    try:
+        with open_file(path) as file:
+            for line in file:
+                with suppress(ValueError):
+                    content = parse_json(line)
+                    if line.endswith(b"\n"):
+                        yield position, content
+                position += len(line)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise unreadable(error, path) from error
+
+
 def check_version(content: Any, form: str, newest: int, path: Path) -> None:
     """Refuse the content of a file that has another format or an unknown version.
 
@@ -251,15 +276,15 @@ def refuse_newer(version: int, newest: int, path: Path) -> None:
 
 
 @contextmanager
-def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
+def refusing(found: str, where: Path | str, *, advice: str) -> Iterator[None]:
     """Refuse a file whose content turns out to be invalid.
 
     Parameters
     ----------
     found : str
         The sentence of the error, with a placeholder ``{error}`` for the reason.
-    path : Path
-        The file.
+    where : Path or str
+        The file, or the place in it.
     advice : str
         What to do about it.
 
@@ -272,10 +297,10 @@ def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError as error:
-        raise missing_file(path, advice) from error
+        raise missing_file(Path(where), advice) from error
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
-        raise InputError(found.format(error=reason), where=str(path), advice=advice) from error
+        raise InputError(found.format(error=reason), where=str(where), advice=advice) from error
 
 
 def read_own(

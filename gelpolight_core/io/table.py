@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import read_file
+from gelpolight_core.translation import tr
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
@@ -14,3 +19,29 @@ def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     writer.writerow(columns)
     writer.writerows(rows)
     return text.getvalue()
+
+
+def csv_of(rows: Sequence[Mapping[str, object]]) -> str:
+    """Return rows that have the same keys, which are the columns, as CSV."""
+    return csv_text(list(rows[0]), (row.values() for row in rows))
+
+
+def read_csv(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the lines of a CSV file that are not empty, each with its number.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    InputError
+        If it is not a table in UTF-8.
+    """
+    try:
+        reader = csv.reader(read_file(path).decode("utf-8-sig").splitlines())
+        return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(
+            tr("the file is not a table ({error})").format(error=error),
+            where=str(path),
+            advice=tr("Save it again as CSV in UTF-8"),
+        ) from error

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future, as_completed
+from functools import lru_cache
 from pathlib import Path
 
+from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.evaluation import Evaluation, evaluate
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -44,7 +47,8 @@ def evaluate_presses(
     folder: Path,
     measure: Callable[[Path, str], Outcome],
     *,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Callable[[str, float], None] = lambda _name, _share: None,
+    submit: Callable[..., Future[Outcome]] | None = None,
 ) -> Evaluation:
     """Measure every press of a folder with ``truth.csv`` and compare it with the truth.
 
@@ -56,6 +60,8 @@ def evaluate_presses(
         Such as :func:`press_measurement` returns.
     progress : callable, optional
         Called with the file name and the share done, 0..1.
+    submit : callable, optional
+        Of an executor: sends a function and its arguments to another process.
 
     Raises
     ------
@@ -73,14 +79,32 @@ def evaluate_presses(
             where=str(folder / "truth.csv"),
             advice=tr("Put the images beside truth.csv or take their rows out"),
         )
-    outcomes: list[Outcome] = []
-    for k, row in enumerate(table.rows):
-        if progress is not None:
-            progress(row.file, k / len(table.rows))
-        outcomes.append(outcome_of(measure, folder / row.file, row.truth.shape))
-    if progress is not None:
-        progress("", 1.0)
-    return evaluate(table.rows, outcomes, skipped=table.skipped, crossing=crossing_of(folder))
+    outcomes: dict[str, Outcome] = {}
+    if submit is None:
+        for row in table.rows:
+            progress(row.file, len(outcomes) / len(table.rows))
+            outcomes[row.file] = outcome_of(measure, folder / row.file, row.truth.shape)
+    else:
+        jobs = {
+            submit(outcome_of, measure, folder / row.file, row.truth.shape): row.file
+            for row in table.rows
+        }
+        for job in as_completed(jobs):
+            outcomes[jobs[job]] = job.result()
+            progress(jobs[job], len(outcomes) / len(jobs))
+    progress("", 1.0)
+    found = [outcomes[row.file] for row in table.rows]
+    return evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
+
+
+def measure_with(calibration: Path, model: str | None, image: Path, shape: str) -> Outcome:
+    """Measure an image with a calibration file, which each process reads once."""
+    return _measurement(calibration, model)(image, shape)
+
+
+@lru_cache(maxsize=1)
+def _measurement(calibration: Path, model: str | None) -> Callable[[Path, str], Outcome]:
+    return press_measurement(Reconstructor(read_calibration(calibration), model=model, workers=1))
 
 
 def outcome_of(measure: Callable[[Path, str], Outcome], image: Path, shape: str) -> Outcome:

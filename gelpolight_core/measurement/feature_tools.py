@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import doubt
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.edges import fit_circle
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
@@ -22,7 +23,7 @@ from gelpolight_core.measurement.profile_tools import Section
 from gelpolight_core.measurement.roughness import ERROR_NODES, above_plane
 from gelpolight_core.measurement.tool import ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.translation import joined, tr
+from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -165,7 +166,7 @@ class EdgeRadius(Section):
         if arc >= LEAST_ARC_DEG:
             return found
         text = tr("the section shows {arc:.0f} degrees of the arc; at least {least:.0f} are needed")
-        return _doubtful(found, text.format(arc=arc, least=LEAST_ARC_DEG))
+        return _doubtful(found, "short_arc", text.format(arc=arc, least=LEAST_ARC_DEG))
 
 
 def _margin(nodes: AreaNodes, area: Rectangle) -> Mask:
@@ -233,15 +234,14 @@ def _half_crossings(along: Array, relief: Array, extreme: int) -> tuple[float, f
 def _judged(found: ToolResult, height: Measured, width: float) -> ToolResult:
     """Return a result that is doubtful if nothing stands out, or if the membrane bridges it."""
     if height.sd is not None and abs(height.value) < CLEAR * height.sd:
-        found = _doubtful(found, tr("nothing stands out from the surface around it"))
+        found = _doubtful(found, "flat", tr("nothing stands out from the surface around it"))
     if height.value < 0.0 and width < BRIDGED * TYPICAL_DECAY_MM:
         text = tr(
             "the membrane bridges a feature of {width:.2f} mm: it is at least as deep as measured"
         )
-        found = _doubtful(found, text.format(width=width))
+        found = _doubtful(found, "bridged", text.format(width=width))
     return found
 
 
-def _doubtful(found: ToolResult, why: str) -> ToolResult:
-    reason = joined("; ", (text for text in (found.reason, why) if text))
-    return replace(found, verdict="doubtful", reason=reason)
+def _doubtful(found: ToolResult, key: str, why: str) -> ToolResult:
+    return replace(found, findings=(*found.findings, doubt(key, why)))

@@ -7,11 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import Finding, doubt
 from gelpolight_core.measurement.fit import EdgePrior, FitResult, WindowData, fit_indenter
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.segmentation import PressedRegion
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.translation import joined, tr
+from gelpolight_core.translation import tr
 
 GOOD_RESIDUAL = 0.005
 """Residual, as a share of the height, up to which no other shape is tried."""
@@ -29,14 +30,14 @@ SMALLEST_GROUND = 0.8
 """Share of the object's surroundings that must be usable to show the drape."""
 
 
-def describe_fit_problems(
+def fit_problems(
     shape: str,
     fit: FitResult,
     window: WindowData,
     region: PressedRegion,
     edge: EdgePrior,
-) -> str:
-    """Return why a fit is doubtful; an empty text when it is not.
+) -> tuple[Finding | None, ...]:
+    """Return why a fit is doubtful; None for what is not.
 
     Parameters
     ----------
@@ -51,18 +52,17 @@ def describe_fit_problems(
     edge : EdgePrior
         As for the fit.
     """
-    reasons = [
-        "" if fit.converged else tr("the fit did not converge"),
+    return (
+        None if fit.converged else doubt("not_converged", tr("the fit did not converge")),
         _wrong_shape(shape, fit, window, region, edge),
         _wide(shape, fit),
         _odd_drape(fit),
         _cut_drape(window),
-    ]
-    return joined("; ", (reason for reason in reasons if reason))
+    )
 
 
-def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> str:
-    """Return why the height of an object is meaningless; an empty text if its map has an anchor.
+def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> Finding | None:
+    """Return why the height of an object is meaningless; None if its map has an anchor.
 
     Parameters
     ----------
@@ -72,8 +72,9 @@ def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> str:
         The segmented bump.
     """
     if flags is None or not (flags[region.core] & np.uint8(Flag.UNANCHORED)).any():
-        return ""
-    return tr("the contact leaves too little of the boundary free, so the height has no zero level")
+        return None
+    text = tr("the contact leaves too little of the boundary free, so the height has no zero level")
+    return doubt("no_anchor", text)
 
 
 def residuals_of(
@@ -94,47 +95,43 @@ def _wrong_shape(
     window: WindowData,
     region: PressedRegion,
     edge: EdgePrior,
-) -> str:
+) -> Finding | None:
     share = fit.residual_rms_mm / fit.values["height_mm"]
     if share <= GOOD_RESIDUAL:
-        return ""
+        return None
     tried = [name for name in MODELS if name != "cuboid" or share > EDGED_RESIDUAL]
     rivals = residuals_of([name for name in tried if name != shape], window, region, edge)
     best = min(rivals, key=lambda name: rivals[name])
     if rivals[best] < BETTER_SHAPE * fit.residual_rms_mm:
-        return tr(
-            "a {best} fits better (residual {rival:.0f} um) than a {shape} ({own:.0f} um)"
-        ).format(
-            best=best,
-            rival=1e3 * rivals[best],
-            shape=shape,
-            own=1e3 * fit.residual_rms_mm,
-        )
+        text = tr("a {best} fits better (residual {rival:.0f} um) than a {shape} ({own:.0f} um)")
+        rival, own = 1e3 * rivals[best], 1e3 * fit.residual_rms_mm
+        return doubt("shape", text.format(best=best, rival=rival, shape=shape, own=own))
     if share > POOR_RESIDUAL:
-        return tr(
-            "the map departs from a {shape} by {own:.0f} um, {share:.0f} % of its height"
-        ).format(shape=shape, own=1e3 * fit.residual_rms_mm, share=100.0 * share)
-    return ""
+        text = tr("the map departs from a {shape} by {own:.0f} um, {share:.0f} % of its height")
+        own = 1e3 * fit.residual_rms_mm
+        return doubt("residual", text.format(shape=shape, own=own, share=100.0 * share))
+    return None
 
 
-def _wide(shape: str, fit: FitResult) -> str:
+def _wide(shape: str, fit: FitResult) -> Finding | None:
     sizes = ("side_a_mm", "side_b_mm") if shape == "cuboid" else ("diameter_mm",)
     widest = max(fit.sd[key] / fit.values[key] for key in (*sizes, "height_mm"))
     if np.isfinite(widest) and widest <= LARGEST_SD:
-        return ""
-    return tr("the sizes are uncertain by {percent:.0f} %").format(percent=100.0 * widest)
+        return None
+    text = tr("the sizes are uncertain by {percent:.0f} %")
+    return doubt("uncertain", text.format(percent=100.0 * widest))
 
 
-def _odd_drape(fit: FitResult) -> str:
+def _odd_drape(fit: FitResult) -> Finding | None:
     decay = fit.values["drape_decay_mm"]
     if 0.1 <= decay <= 3.0:
-        return ""
-    return tr("the fitted decay length of the drape is {decay:.2f} mm").format(decay=decay)
+        return None
+    text = tr("the fitted decay length of the drape is {decay:.2f} mm")
+    return doubt("drape", text.format(decay=decay))
 
 
-def _cut_drape(window: WindowData) -> str:
+def _cut_drape(window: WindowData) -> Finding | None:
     if window.seen_share >= SMALLEST_GROUND:
-        return ""
-    return tr("only {percent:.0f} % of the drape around the object is on the map").format(
-        percent=100.0 * window.seen_share
-    )
+        return None
+    text = tr("only {percent:.0f} % of the drape around the object is on the map")
+    return doubt("cut_drape", text.format(percent=100.0 * window.seen_share))

@@ -42,19 +42,8 @@ def measure_heightmap(
     """
     if shape == AUTO:
         shape = _found_shape(heightmap, seed_mm)
-    return measure_object(
-        heightmap.depth_mm,
-        heightmap.x_mm,
-        heightmap.y_mm,
-        shape=shape,
-        seed_mm=seed_mm,
-        flags=heightmap.flags,
-        noise_mm=heightmap.noise_mm,
-        depth_scale_sd=heightmap.depth_scale_sd,
-        lateral_scale_sd=heightmap.lateral_scale_sd,
-        mode=mode_error(heightmap),
-        reach_mm=TYPICAL_DECAY_MM,
-    )
+    mode, reach_mm = mode_error(heightmap), TYPICAL_DECAY_MM
+    return measure_object(heightmap, shape=shape, seed_mm=seed_mm, mode=mode, reach_mm=reach_mm)
 
 
 def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:
@@ -154,4 +143,4 @@ def _fitted(tool: FittedIndenter, fit: Measurement) -> ToolResult:
         *turned,
         Measured(fit.drape_decay_mm, fit.sd["drape_decay_mm"], "mm", "drape_decay"),
     )
-    return ToolResult(tool, figures, (fit.outline_mm,), fit.verdict, fit.reason, measurement=fit)
+    return ToolResult(tool, figures, (fit.outline_mm,), fit.findings, measurement=fit)

@@ -8,7 +8,6 @@ or another calibration, therefore never gets an old result.
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -16,15 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.atomic import append_durably
-from gelpolight_core.io.reading import parse_json, plain_text, read_file
+from gelpolight_core.finding import doubt
+from gelpolight_core.io.atomic import append_json
+from gelpolight_core.io.reading import json_lines, plain_text
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.measurement.evaluation_run import Outcome, outcome_of
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.translation import english, tr
-
-SIZE_LIMIT = 100_000_000
+from gelpolight_core.translation import english
 
 
 class Ledger:
@@ -46,13 +43,7 @@ class Ledger:
     def __init__(self, path: Path, name: str) -> None:
         self._path, self._name = path, name
         self._known: dict[str, Outcome] = {}
-        try:
-            lines = read_file(path, SIZE_LIMIT).decode().split("\n")
-        except FileNotFoundError:
-            return
-        except UnicodeDecodeError as error:
-            raise _damaged(path) from error
-        for line in lines:
+        for _, line in json_lines(path):
             self._take_in(line)
 
     def outcome(self, image: Path, shape: str, measure: Callable[[Path, str], Outcome]) -> Outcome:
@@ -105,13 +96,11 @@ class Ledger:
         """
         self._known[key] = outcome
         plain = english(outcome) if isinstance(outcome, str) else _as_json(outcome)
-        line = json.dumps({"key": key, "outcome": plain}, separators=(",", ":")) + "\n"
-        append_durably(self._path, line.encode())
+        append_json(self._path, [{"key": key, "outcome": plain}])
 
-    def _take_in(self, line: str) -> None:
-        """Read one line; the press of an incomplete line is measured again."""
+    def _take_in(self, content: Any) -> None:
+        """Read one line; the press of an invalid line is measured again."""
         try:
-            content = parse_json(line)
             outcome = content["outcome"]
             fitted = isinstance(outcome, dict) and "shape" in outcome
             self._known[content["key"]] = _measurement(outcome) if fitted else _failure(outcome)
@@ -126,20 +115,12 @@ def _failure(outcome: Any) -> str:
     return text
 
 
-def _damaged(path: Path) -> InputError:
-    return InputError(
-        tr("the file is not text in UTF-8"),
-        where=str(path),
-        advice=tr("Move the file away; the presses are then measured again"),
-    )
-
-
 def _as_json(measurement: Measurement) -> dict[str, Any]:
     """Return all fields; JSON writes numbers so that they are read back exactly."""
     plain = asdict(measurement)
     plain["outline_mm"] = measurement.outline_mm.tolist()
-    plain["reason"] = english(measurement.reason)
-    return plain
+    del plain["findings"]
+    return plain | {"verdict": measurement.verdict, "reason": english(measurement.reason)}
 
 
 def _measurement(content: dict[str, Any]) -> Measurement:
@@ -147,7 +128,9 @@ def _measurement(content: dict[str, Any]) -> Measurement:
     for part in ("sd", "noise_sd", "calibration_sd", "mode_sd"):
         if not isinstance(values.get(part), dict | None):
             raise TypeError(f"{part} is no table")
-    values["reason"] = text_of_file(content["reason"])
+    del values["verdict"]
+    reason = text_of_file(values.pop("reason"))
+    values["findings"] = (doubt("stored", reason),) if reason else ()
     values["outline_mm"] = np.array(content["outline_mm"], np.float64)
     return Measurement(**values)
 

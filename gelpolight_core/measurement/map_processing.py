@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,7 +19,6 @@ from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
 Mask = NDArray[np.bool_]
-Counts = NDArray[np.int64]
 Point = tuple[float, float]
 LARGEST_MEDIAN = 15
 FAR = 3.0
@@ -58,9 +58,7 @@ def masked(heightmap: HeightMap, keep: Mask) -> HeightMap:
     flags = heightmap.flags | np.where(keep, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
     percent = 100.0 * float((before & ~keep).sum() / before.sum())
     note = tr("Masked: {percent:.0f} % of the points are left out.").format(percent=percent)
-    return replace(
-        heightmap, flags=flags, findings=(*heightmap.findings, Finding("processed", note))
-    )
+    return _processed(heightmap, note, flags=flags)
 
 
 def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
@@ -222,17 +220,11 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     note = tr("Difference to {name}.").format(name=earlier.source)
     left = _without(heightmap, np.where(there, other, heightmap.depth_mm), note)
     flags = left.flags | np.where(there, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
-    return replace(
-        left,
-        flags=flags,
-        depth_sd_mm=_root_sum_square(
-            heightmap, earlier, heightmap.depth_sd_mm, earlier.depth_sd_mm
-        ),
-        depth_model_sd_mm=_root_sum_square(
-            heightmap, earlier, heightmap.depth_model_sd_mm, earlier.depth_model_sd_mm
-        ),
-        noise_mm=None,
-    )
+    spreads = {
+        name: _root_sum_square(heightmap, earlier, name)
+        for name in ("depth_sd_mm", "depth_model_sd_mm")
+    }
+    return replace(left, flags=flags, noise_mm=None, **spreads)
 
 
 def histogram(
@@ -272,37 +264,28 @@ def _on_grid(
     return np.asarray(found, np.float32)
 
 
-def _root_sum_square(
-    heightmap: HeightMap,
-    earlier: HeightMap,
-    first: NDArray[np.float32] | None,
-    second: NDArray[np.float32] | None,
-) -> NDArray[np.float32] | None:
+def _root_sum_square(heightmap: HeightMap, earlier: HeightMap, name: str) -> Any:
     """Return the standard deviation of a difference; None where one of the two is not stated."""
+    first, second = getattr(heightmap, name), getattr(earlier, name)
     if first is None or second is None:
         return None
     return np.asarray(np.hypot(first, _on_grid(heightmap, earlier, second)), np.float32)
 
 
+def _processed(heightmap: HeightMap, note: str, **changes: Any) -> HeightMap:
+    findings = (*heightmap.findings, Finding("processed", note))
+    return replace(heightmap, findings=findings, **changes)
+
+
 def _without(heightmap: HeightMap, plane: NDArray[np.floating], note: str) -> HeightMap:
     depth = (heightmap.depth_mm - plane).astype(np.float32)
-    return replace(
-        heightmap,
-        depth_mm=depth,
-        normals=None,
-        findings=(*heightmap.findings, Finding("processed", note)),
-    )
+    return _processed(heightmap, note, depth_mm=depth, normals=None)
 
 
 def _filtered(heightmap: HeightMap, depth_mm: NDArray[np.floating], note: str) -> HeightMap:
     """Return a smoothed map. Its errors are no longer those of the map before."""
-    smooth = replace(
-        heightmap,
-        depth_mm=depth_mm.astype(np.float32),
-        normals=None,
-        findings=(*heightmap.findings, Finding("processed", note)),
-    )
-    return _without_errors(smooth)
+    smooth = depth_mm.astype(np.float32)
+    return _without_errors(_processed(heightmap, note, depth_mm=smooth, normals=None))
 
 
 def _without_errors(heightmap: HeightMap) -> HeightMap:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.fit import (
     EdgePrior,
     FitResult,
@@ -18,7 +19,7 @@ from gelpolight_core.measurement.fit import (
     fit_indenter,
     near_wall,
 )
-from gelpolight_core.measurement.fit_checks import describe_fit_problems, no_anchor
+from gelpolight_core.measurement.fit_checks import fit_problems, no_anchor
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.segmentation import (
@@ -34,8 +35,8 @@ from gelpolight_core.measurement.spread import (
     mode_sd,
     noise_of_fit,
 )
-from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.translation import joined, tr
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -60,16 +61,10 @@ SEED_REACH_MM = 1.0
 
 
 def measure_object(
-    depth_mm: NDArray[np.floating],
-    x_mm: NDArray[np.floating],
-    y_mm: NDArray[np.floating],
+    heightmap: HeightMap,
     *,
     shape: str,
     seed_mm: tuple[float, float] | None = None,
-    flags: NDArray[np.uint8] | None = None,
-    noise_mm: NDArray[np.float32] | None = None,
-    depth_scale_sd: float | None = None,
-    lateral_scale_sd: float | None = None,
     mode: ModeError | None = None,
     reach_mm: float = 0.0,
 ) -> Measurement:
@@ -77,21 +72,14 @@ def measure_object(
 
     Parameters
     ----------
-    depth_mm : (rows, columns)
-        Depth map, positive towards the camera; NaN is left out.
-    x_mm, y_mm : (columns,), (rows,)
-        Regular grid in the sensor frame.
+    heightmap : HeightMap
+        Depths that are not finite, or outside the working area, are left out; any other flag
+        weights a depth down. With examples of its noise, the result contains the scatter of
+        repeated measurements; with the scales' standard deviations, those of the calibration.
     shape : {"cylinder", "cuboid", "ball"}
         What was pressed.
     seed_mm : (float, float), optional
         A point on the object (x, y); needed where several objects are pressed.
-    flags : (rows, columns) uint8, optional
-        Bit 1: outside the working area, left out; any other bit: doubtful, weighted down.
-    noise_mm : (examples, rows / 4, columns / 4), optional
-        Examples of the errors by the map's noise, as stored in a height map. With them, the result
-        contains the scatter of repeated measurements.
-    depth_scale_sd, lateral_scale_sd : float, optional
-        Relative standard deviations of the calibration's depths and lengths; part of the sd.
     mode : ModeError, optional
         What the map's model and effort leave; part of the sd.
     reach_mm : float, optional
@@ -101,8 +89,8 @@ def measure_object(
     Raises
     ------
     InputError
-        Unknown shape, arrays that do not fit together, nothing pressed, several objects and no
-        seed, no object at the seed, an object cut by the border.
+        Unknown shape, nothing pressed, several objects and no seed, no object at the seed, an
+        object cut by the border.
     """
     if shape not in MODELS:
         raise InputError(
@@ -110,42 +98,28 @@ def measure_object(
             where=tr("shape"),
             advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
         )
-    window, region, prior = find_object(
-        depth_mm,
-        x_mm,
-        y_mm,
-        seed_mm=seed_mm,
-        flags=flags,
-        reach_mm=reach_mm,
-        blur_mm2=0.0 if mode is None else mode.blur_mm2,
-    )
+    blur_mm2 = 0.0 if mode is None else mode.blur_mm2
+    window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, blur_mm2=blur_mm2)
     model = MODELS[shape]
     fit = fit_indenter(model, window, model.start(region), edge=prior)
-    reasons = (describe_fit_problems(shape, fit, window, region, prior), no_anchor(flags, region))
-    reason = joined("; ", (found for found in reasons if found))
+    anchor = no_anchor(heightmap.flags, region)
+    problems = (*fit_problems(shape, fit, window, region, prior), anchor)
+    findings = tuple(finding for finding in problems if finding is not None)
     face = _face(shape, fit, window)
-    noise = (
-        {}
-        if noise_mm is None
-        else noise_of_fit(
-            fit, window, face, noise_mm, np.asarray(x_mm, np.float64), np.asarray(y_mm, np.float64)
-        )
-    )
+    noise = {} if heightmap.noise_mm is None else noise_of_fit(fit, window, face, heightmap)
+    depth_sd, lateral_sd = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
     scale = {}
-    if depth_scale_sd is not None and lateral_scale_sd is not None:
-        scale = calibration_sd(shape, fit.values, depth_scale_sd, lateral_scale_sd)
+    if depth_sd is not None and lateral_sd is not None:
+        scale = calibration_sd(shape, fit.values, depth_sd, lateral_sd)
     of_mode = {} if mode is None else mode_sd(shape, fit.values, mode)
     parts = (noise, scale, of_mode)
-    return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, reason)
+    return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
 
 
 def find_object(
-    depth_mm: NDArray[np.floating],
-    x_mm: NDArray[np.floating],
-    y_mm: NDArray[np.floating],
-    *,
+    heightmap: HeightMap,
     seed_mm: tuple[float, float] | None = None,
-    flags: NDArray[np.uint8] | None = None,
+    *,
     reach_mm: float = 0.0,
     blur_mm2: float = 0.0,
 ) -> tuple[WindowData, PressedRegion, EdgePrior]:
@@ -153,7 +127,7 @@ def find_object(
 
     Parameters
     ----------
-    depth_mm, x_mm, y_mm, seed_mm, flags, reach_mm
+    heightmap, seed_mm, reach_mm
         As for :func:`measure_object`.
     blur_mm2 : float, optional
         Variance of the map's blur, known to one pixel squared; 0 if it is not known.
@@ -163,7 +137,13 @@ def find_object(
     InputError
         As :func:`measure_object`, but for the shape.
     """
-    depth, x, y, weight = _checked(depth_mm, x_mm, y_mm, flags)
+    depth, x, y, weight = usable_depth(heightmap)
+    if min(weight.shape) < 8 or not weight.any():
+        raise InputError(
+            tr("no pixel is usable"),
+            where=tr("depth map"),
+            advice=tr("Check the image and the working area"),
+        )
     regions = find_pressed_regions(depth, x, y, weight > 0.0)
     region = _chosen_region(regions, x, y, seed_mm)
     if region.cut:
@@ -181,36 +161,14 @@ def find_object(
     return window, region, edge
 
 
-def _checked(
-    depth_mm: NDArray[np.floating],
-    x_mm: NDArray[np.floating],
-    y_mm: NDArray[np.floating],
-    flags: NDArray[np.uint8] | None,
-) -> tuple[Array, Array, Array, Array]:
-    """Return depth (finite), x, y and weights in [0, 1]."""
-    depth = np.asarray(depth_mm, dtype=np.float64)
-    x, y = np.asarray(x_mm, dtype=np.float64), np.asarray(y_mm, dtype=np.float64)
-    fits = depth.ndim == 2 and depth.shape == (y.size, x.size) and min(depth.shape) >= 8
-    if not fits or (flags is not None and flags.shape != depth.shape):
-        raise InputError(
-            tr(
-                "the depth map has shape {shape}, but there are positions for {x} "
-                "columns and {y} rows"
-            ).format(shape=depth.shape, x=x.size, y=y.size),
-            where=tr("depth map"),
-            advice=tr("Give arrays of one grid, at least 8 x 8"),
-        )
-    weight = np.isfinite(depth).astype(np.float64)
-    if flags is not None:
-        weight[(flags & np.uint8(Flag.OUTSIDE)) != 0] = 0.0
-        weight[(flags & ~np.uint8(Flag.OUTSIDE)) != 0] *= DOUBTFUL_WEIGHT
-    if not weight.any():
-        raise InputError(
-            tr("no pixel is usable"),
-            where=tr("depth map"),
-            advice=tr("Check the image and the working area"),
-        )
-    return np.where(weight > 0.0, depth, 0.0), x, y, weight
+def usable_depth(heightmap: HeightMap) -> tuple[Array, Array, Array, Array]:
+    """Return depth (0 where it is not usable), x, y, and weights in [0, 1]."""
+    x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
+    outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
+    weight = np.where(heightmap.flags != 0, DOUBTFUL_WEIGHT, 1.0)
+    weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
+    depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
+    return depth, x, y, weight
 
 
 def _chosen_region(
@@ -326,7 +284,7 @@ def _measurement(
     fit: FitResult,
     shift_mm: float,
     parts: tuple[dict[str, float], dict[str, float], dict[str, float]],
-    reason: str,
+    findings: tuple[Finding, ...],
 ) -> Measurement:
     values, (noise, scale, of_mode) = fit.values, parts
     # Edge and face differ by the shift: the height is not more accurate than half of it.
@@ -355,8 +313,7 @@ def _measurement(
         residual_rms_mm=fit.residual_rms_mm,
         correlated_pixels=fit.correlated_pixels,
         outline_mm=MODELS[shape].outline(values),
-        verdict="doubtful" if reason else "ok",
-        reason=reason,
+        findings=findings,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -128,17 +129,30 @@ def map_errors(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> MapErrors | No
     x_mm, y_mm : (N,)
         Places.
     """
-    noise = heightmap.noise_mm
-    if noise is None or heightmap.depth_model_sd_mm is None:
+    if heightmap.noise_mm is None or heightmap.depth_model_sd_mm is None:
         return None
-    column, row = index_of(heightmap, x_mm, y_mm)
-    factor = round(heightmap.x_mm.size / noise.shape[2])
-    first = 0.5 * (factor - 1)
-    position = np.stack([row - first, column - first]) / factor
-    examples = np.array([map_coordinates(e, position, order=1, mode="nearest") for e in noise])
+    examples = noise_at(heightmap, x_mm, y_mm)
     model_sd = value_at(heightmap, heightmap.depth_model_sd_mm, x_mm, y_mm)
-    examples = examples + model_sd * _smooth_fields(len(noise), x_mm, y_mm)
+    examples = examples + model_sd * _smooth_fields(len(examples), x_mm, y_mm)
     return MapErrors(examples, heightmap.depth_scale_sd or 0.0, heightmap.lateral_scale_sd or 0.0)
+
+
+def noise_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
+    """Return examples (examples, N) of a map's noise at places.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The map, with examples of its noise, which are averages over blocks of nodes.
+    x_mm, y_mm : (N,)
+        Places.
+    """
+    assert heightmap.noise_mm is not None
+    factor = round(heightmap.x_mm.size / heightmap.noise_mm.shape[2])
+    column, row = index_of(heightmap, x_mm, y_mm)
+    position = (np.stack([row, column]) - 0.5 * (factor - 1)) / factor
+    read = partial(map_coordinates, coordinates=position, order=1, mode="nearest")
+    return np.array([read(example, output=np.float64) for example in heightmap.noise_mm])
 
 
 def measured(

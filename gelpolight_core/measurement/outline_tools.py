@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -17,7 +17,7 @@ from gelpolight_core.measurement.edges import (
     rectangle_at_steepest,
 )
 from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
-from gelpolight_core.measurement.roughness import ERROR_NODES, fit_plane, roughness
+from gelpolight_core.measurement.roughness import fit_plane, of_area, roughness
 from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
@@ -103,27 +103,13 @@ class RectangleTool:
 
 def _depth_figures(heightmap: HeightMap, nodes: AreaNodes) -> tuple[Measured, ...]:
     """Return mean and greatest depth, and tilt of the mean plane."""
-    few = nodes.thinned(ERROR_NODES)
-    errors = map_errors(heightmap, few.x_mm, few.y_mm)
-
-    def mean(d: Array, stretch: float) -> float:
-        return float(d.mean())
-
-    def tilt(d: Array, stretch: float) -> float:
-        return _tilt_deg(stretch * few.x_mm, stretch * few.y_mm, d)
-
+    figure = of_area(heightmap, nodes)
     top = np.argmax(nodes.depth_mm, keepdims=True)
-    top_errors = map_errors(heightmap, nodes.x_mm[top], nodes.y_mm[top])
+    errors = map_errors(heightmap, nodes.x_mm[top], nodes.y_mm[top])
     return (
-        replace(
-            measured("mean_depth", "mm", mean, few.depth_mm, errors),
-            value=float(nodes.depth_mm.mean()),
-        ),
-        measured("deepest", "mm", mean, nodes.depth_mm[top], top_errors),
-        replace(
-            measured("tilt", "deg", tilt, few.depth_mm, errors),
-            value=_tilt_deg(nodes.x_mm, nodes.y_mm, nodes.depth_mm),
-        ),
+        figure("mean_depth", "mm", lambda x, y, depth: float(depth.mean())),
+        measured("deepest", "mm", lambda d, stretch: float(d[0]), nodes.depth_mm[top], errors),
+        figure("tilt", "deg", _tilt_deg),
     )
 
 

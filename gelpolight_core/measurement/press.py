@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.reading import brief, is_file_name, read_file
+from gelpolight_core.io.reading import brief, is_file_name
+from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement, Truth, percent_error
 from gelpolight_core.translation import tr
@@ -129,22 +129,9 @@ def read_truth(path: Path) -> TruthTable:
     for line, record in records:
         where = tr("{path}, line {line}").format(path=path, line=line)
         file, shape = record.get("file", ""), record.get("shape", "").lower()
-        if not file:
-            raise InputError(
-                tr("a row names no file"), where=where, advice=tr("Name the image of the press")
-            )
-        if not is_file_name(file):
-            raise InputError(
-                tr("'{file}' is not the name of an image in this folder").format(file=brief(file)),
-                where=where,
-                advice=tr("Put the image beside truth.csv, and name it without a folder"),
-            )
-        if file in seen:
-            raise InputError(
-                tr("{file} is listed twice").format(file=file),
-                where=where,
-                advice=tr("Keep one row for each image"),
-            )
+        fault = _file_fault(file, seen)
+        if fault is not None:
+            raise InputError(fault[0], where=where, advice=fault[1])
         seen.add(file)
         if shape in MODELS:
             rows.append(_press(file, shape, record, where))
@@ -159,10 +146,22 @@ def read_truth(path: Path) -> TruthTable:
     return TruthTable(tuple(rows), tuple(skipped))
 
 
+def _file_fault(file: str, seen: Collection[str]) -> tuple[str, str] | None:
+    """Return what is wrong with the name of a press's image, and what to do; None: nothing."""
+    if not file:
+        return tr("a row names no file"), tr("Name the image of the press")
+    if not is_file_name(file):
+        found = tr("'{file}' is not the name of an image in this folder").format(file=brief(file))
+        return found, tr("Put the image beside truth.csv, and name it without a folder")
+    if file in seen:
+        return tr("{file} is listed twice").format(file=file), tr("Keep one row for each image")
+    return None
+
+
 def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     """Return the rows with their line numbers, keys and values stripped."""
     try:
-        text = read_file(path).decode("utf-8-sig")
+        numbered = read_csv(path)
     except FileNotFoundError as error:
         raise InputError(
             tr("The file does not exist"),
@@ -170,21 +169,6 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
             advice=tr("Put a truth.csv with the columns {names} there").format(
                 names="file,shape,diameter_mm,side_mm,height_mm"
             ),
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            tr("the file is not text in UTF-8"),
-            where=str(path),
-            advice=tr("Save it again as CSV in UTF-8"),
-        ) from error
-    reader = csv.reader(text.splitlines())
-    try:
-        numbered = [(reader.line_num, cells) for cells in reader]
-    except csv.Error as error:
-        raise InputError(
-            tr("the file is not a table ({error})").format(error=error),
-            where=tr("{path}, line {line}").format(path=path, line=reader.line_num),
-            advice=tr("Save it again as CSV in UTF-8"),
         ) from error
     header = [name.strip() for name in numbered[0][1]] if numbered else []
     missing = [name for name in NEEDED if name not in header]
@@ -199,7 +183,6 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     return [
         (line, dict(zip(header, (cell.strip() for cell in cells), strict=False)))
         for line, cells in numbered[1:]
-        if any(cell.strip() for cell in cells)
     ]
 
 
@@ -217,12 +200,8 @@ def _length(record: dict[str, str], key: str, where: str) -> float:
         value = math.nan
     if 0.0 < value <= LONGEST_MM:
         return value
-    raise InputError(
-        tr("{key} is '{text}'").format(key=key, text=brief(text))
-        if text
-        else tr("{key} is empty").format(key=key),
-        where=where,
-        advice=tr("Give a length in mm greater than zero")
-        if not value > LONGEST_MM
-        else tr("Give a length of at most {most:g} mm").format(most=LONGEST_MM),
-    )
+    found = tr("{key} is '{text}'") if text else tr("{key} is empty")
+    advice = tr("Give a length in mm greater than zero")
+    if value > LONGEST_MM:
+        advice = tr("Give a length of at most {most:g} mm").format(most=LONGEST_MM)
+    raise InputError(found.format(key=key, text=brief(text)), where=where, advice=advice)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -52,7 +52,7 @@ class _BetweenRanges:
     """
 
     name: ClassVar[str]
-    compute: ClassVar[staticmethod[[Profile, Range, Range], Measured]]
+    compute: ClassVar[Any]
     start_mm: Point
     end_mm: Point
     first_mm: Range

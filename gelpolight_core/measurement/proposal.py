@@ -8,9 +8,9 @@ import numpy as np
 
 from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL, residuals_of
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.measure import find_object
+from gelpolight_core.measurement.measure import find_object, usable_depth
 from gelpolight_core.measurement.segmentation import PressedRegion, find_pressed_regions
-from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,33 +48,20 @@ def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None)
     InputError
         If a seed is given and no object is there, or no part of the map is usable.
     """
-    region = _tallest(heightmap)
-    if region is None or (seed_mm is None and region.cut):
+    depth, x, y, weight = usable_depth(heightmap)
+    if not weight.any():
         return None
-    window, region, edge = find_object(
-        heightmap.depth_mm,
-        heightmap.x_mm,
-        heightmap.y_mm,
-        seed_mm=seed_mm or _point_on(region, heightmap),
-        flags=heightmap.flags,
-    )
+    regions = find_pressed_regions(depth, x, y, weight > 0.0)
+    if not regions or (seed_mm is None and regions[0].cut):
+        return None
+    seed_mm = seed_mm or _point_on(regions[0], heightmap)
+    window, region, edge = find_object(heightmap, seed_mm)
     residual = residuals_of(MODELS, window, region, edge)
     best, second, _ = sorted(residual, key=lambda shape: residual[shape])
     if residual[best] > POOR_RESIDUAL * region.height_mm:
         return None
     alike = residual[best] > BETTER_SHAPE * residual[second]
     return Proposal((best, second) if alike else (best,), region.centre_mm)
-
-
-def _tallest(heightmap: HeightMap) -> PressedRegion | None:
-    """Return the tallest object, cut by the border or not."""
-    depth = heightmap.depth_mm.astype(np.float64)
-    valid = np.isfinite(depth) & ((heightmap.flags & np.uint8(Flag.OUTSIDE)) == 0)
-    if not valid.any():
-        return None
-    x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
-    regions = find_pressed_regions(np.where(valid, depth, 0.0), x, y, valid)
-    return regions[0] if regions else None
 
 
 def _point_on(region: PressedRegion, heightmap: HeightMap) -> tuple[float, float]:

@@ -11,22 +11,28 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import tomli_w
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_text
-from gelpolight_core.io.reading import brief, parse_toml, read_file
+from gelpolight_core.io.codec import unpack
+from gelpolight_core.io.reading import (
+    brief,
+    check_version,
+    parse_toml,
+    plain_text,
+    read_file,
+    refusing,
+)
 from gelpolight_core.measurement.evaluation import Crossing
-from gelpolight_core.measurement.press import LONGEST_MM, Press
+from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 
 SHAPES = ("cylinder", "cuboid")
@@ -35,6 +41,13 @@ FILE_NAME = "protocol.toml"
 FORMAT = "gelpolight-protocol"
 VERSION = 1
 SIZE_LIMIT = 100_000
+RANGE_MM = (0.05, 200.0)
+"""Lengths of objects."""
+TABLES = {
+    "objects": ("shapes", "sizes_mm", "at_height_mm", "heights_mm", "at_size_mm"),
+    "places": ("repeats", "regions", "reach_mm", "seed"),
+}
+"""The tables of the file, and the fields of the protocol in each."""
 ROOM_MM = 2.0
 """Visible ground around every object: three decay lengths of 0.7 mm, where the drape has decreased
 to a twentieth of the height."""
@@ -165,66 +178,50 @@ def check_protocol(protocol: Protocol, *, where: str = "protocol") -> Protocol:
         If there is nothing to press, a shape is unknown, a number is out of range or occurs twice,
         or an object has no room.
     """
-
-    def refusal(found: str, advice: str) -> InputError:
-        return InputError(found, where=where, advice=advice)
-
-    for shape in protocol.shapes:
-        if shape not in SHAPES:
-            raise refusal(
-                tr("the protocol has no shape '{shape}'").format(shape=shape),
-                tr("Choose from {shapes}").format(shapes=", ".join(SHAPES)),
-            )
-    _check_lengths(protocol, refusal)
-    if len(set(protocol.shapes)) < len(protocol.shapes):
-        raise refusal(tr("a shape is named twice"), tr("Name each shape once"))
-    if not protocol.objects:
-        raise refusal(
-            tr("the protocol contains no object"), tr("Choose a shape, and a size or height")
-        )
-    counts = {tr("repeats"): protocol.repeats, tr("regions"): protocol.regions}
-    for name, count in counts.items():
-        if not 0 <= count <= 99:
-            raise refusal(
-                tr("the number of {name} is {count}").format(count=count, name=name),
-                tr("Use 0 to 99"),
-            )
-    if protocol.repeats + protocol.regions == 0:
-        raise refusal(
-            tr("the protocol contains no press"), tr("State a number of repeats or of regions")
-        )
-    for truth in protocol.objects:
-        room = room_mm(truth, protocol.reach_mm)
-        if room <= 0.0:
-            raise refusal(
-                tr("a {shape} of {size:g} mm does not fit within {reach:.1f} mm").format(
-                    shape=truth.shape, size=truth.size_mm, reach=protocol.reach_mm
-                ),
-                tr("Leave this size out: {mm:.1f} mm are missing").format(mm=-room),
-            )
+    for found, advice in _faults(protocol):
+        raise InputError(found, where=where, advice=advice)
     return protocol
 
 
-def _check_lengths(protocol: Protocol, refusal: Callable[[str, str], InputError]) -> None:
-    lists: dict[str, Sequence[float]] = {
-        "sizes_mm": protocol.sizes_mm,
-        "heights_mm": protocol.heights_mm,
-        "at_size_mm": (protocol.at_size_mm,),
-        "at_height_mm": (protocol.at_height_mm,),
-        "reach_mm": (protocol.reach_mm,),
-    }
-    for name, lengths in lists.items():
+def _faults(protocol: Protocol) -> Iterator[tuple[str, str]]:
+    """Yield why a protocol cannot be pressed, with what to do."""
+    for shape in protocol.shapes:
+        if shape not in SHAPES:
+            found = tr("the protocol has no shape '{shape}'").format(shape=brief(shape))
+            yield found, tr("Choose from {shapes}").format(shapes=", ".join(SHAPES))
+    for name in ("sizes_mm", "heights_mm", "at_size_mm", "at_height_mm", "reach_mm"):
+        lengths = np.atleast_1d(getattr(protocol, name)).tolist()
         for length in lengths:
-            if not 0.05 <= length <= 200.0:
-                raise refusal(
-                    tr("{name} contains {length:g}").format(name=name, length=length),
-                    tr("Give lengths from 0.05 to 200 mm"),
-                )
+            if not RANGE_MM[0] <= length <= RANGE_MM[1]:
+                found = tr("{name} contains {length:g}").format(name=name, length=length)
+                advice = tr("Give lengths from {low:g} to {high:g} mm")
+                yield found, advice.format(low=RANGE_MM[0], high=RANGE_MM[1])
         # The names of the images hold hundredths of a millimetre.
         if len({round(100 * length) for length in lengths}) < len(lengths):
-            raise refusal(
-                tr("{name} contains a length twice").format(name=name), tr("Name each length once")
+            yield (
+                tr("{name} contains a length twice").format(name=name),
+                tr("Name each length once"),
             )
+    if len(set(protocol.shapes)) < len(protocol.shapes):
+        yield tr("a shape is named twice"), tr("Name each shape once")
+    if not protocol.objects:
+        yield tr("the protocol contains no object"), tr("Choose a shape, and a size or height")
+    counts = {tr("repeats"): protocol.repeats, tr("regions"): protocol.regions}
+    for name, count in counts.items():
+        if not 0 <= count <= 99:
+            found = tr("the number of {name} is {count}").format(count=count, name=name)
+            yield found, tr("Use 0 to 99")
+    if protocol.repeats + protocol.regions == 0:
+        yield tr("the protocol contains no press"), tr("State a number of repeats or of regions")
+    if protocol.seed < 0:
+        yield tr("the seed is below zero"), tr("Give a seed of 0 or more")
+    for truth in protocol.objects:
+        room = room_mm(truth, protocol.reach_mm)
+        if room <= 0.0:
+            found = tr("a {shape} of {size:g} mm does not fit within {reach:.1f} mm").format(
+                shape=truth.shape, size=truth.size_mm, reach=protocol.reach_mm
+            )
+            yield found, tr("Leave this size out: {mm:.1f} mm are missing").format(mm=-room)
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,26 +251,13 @@ def write_protocol_file(content: ProtocolFile, folder: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    p = content.protocol
+    values = asdict(content.protocol)
     table = {
         "format": FORMAT,
         "version": VERSION,
         "sensor": {"serial": content.serial, "calibration": content.calibration},
-        "objects": {
-            "shapes": list(p.shapes),
-            "sizes_mm": list(p.sizes_mm),
-            "at_height_mm": p.at_height_mm,
-            "heights_mm": list(p.heights_mm),
-            "at_size_mm": p.at_size_mm,
-        },
-        "places": {
-            "repeats": p.repeats,
-            "regions": p.regions,
-            "reach_mm": p.reach_mm,
-            "seed": p.seed,
-        },
+        **{name: {key: values[key] for key in keys} for name, keys in TABLES.items()},
     }
-
     write_text(folder / FILE_NAME, tomli_w.dumps(table))
 
 
@@ -287,58 +271,24 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
         unknown, missing, of the wrong kind or out of range.
     """
     path = folder / FILE_NAME
+    advice = tr("Correct the file; the presses in the folder are intact")
     try:
-        content = parse_toml(read_file(path, SIZE_LIMIT))
+        with refusing(tr("the protocol cannot be read ({error})"), path, advice=advice):
+            content = parse_toml(read_file(path, SIZE_LIMIT))
+            check_version(content, FORMAT, VERSION, path)
+            if missing := [
+                k for name, keys in TABLES.items() for k in keys if k not in content[name]
+            ]:
+                raise ValueError(f"{missing[0]} is missing")
+            values = {key: value for name in TABLES for key, value in content[name].items()}
+            protocol = check_protocol(unpack(Protocol, values, {}, "protocol"), where=str(path))
+            sensor = content["sensor"]
+            return ProtocolFile(
+                protocol, plain_text(sensor["serial"]), plain_text(sensor["calibration"])
+            )
     except FileNotFoundError as error:
         raise InputError(
             tr("there is no {name}").format(name=FILE_NAME),
             where=str(folder),
             advice=tr("Name the folder of a run of the evaluation protocol"),
         ) from error
-    except ValueError as error:
-        raise InputError(
-            tr("the protocol cannot be read ({reason})").format(reason=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct the file; the presses in the folder are intact"),
-        ) from error
-    return _parse(Table(content, "", path))
-
-
-def _parse(top: Table) -> ProtocolFile:
-    top.check_version(FORMAT, VERSION)
-    sensor, objects, places = (top.table(name) for name in ("sensor", "objects", "places"))
-    top.no_more("format", "version", "sensor", "objects", "places")
-    sensor.no_more("serial", "calibration")
-    objects.no_more("shapes", "sizes_mm", "at_height_mm", "heights_mm", "at_size_mm")
-    places.no_more("repeats", "regions", "reach_mm", "seed")
-    protocol = Protocol(
-        shapes=_texts(objects, "shapes"),
-        sizes_mm=_lengths(objects, "sizes_mm"),
-        heights_mm=_lengths(objects, "heights_mm"),
-        at_size_mm=objects.number("at_size_mm", 0.05, 200.0),
-        at_height_mm=objects.number("at_height_mm", 0.05, 200.0),
-        repeats=places.whole("repeats"),
-        regions=places.whole("regions"),
-        reach_mm=places.number("reach_mm", 0.05, 200.0),
-        seed=places.whole("seed"),
-    )
-    if protocol.seed < 0:
-        raise places.wrong("seed", tr("is below zero"))
-    checked = check_protocol(protocol, where=str(top.path))
-    return ProtocolFile(checked, sensor.text("serial"), sensor.text("calibration"))
-
-
-def _texts(table: Table, key: str) -> tuple[str, ...]:
-    value: Any = table.content.get(key)
-    if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
-        raise table.wrong(key, tr("is not a list of texts"))
-    return tuple(brief(text) for text in value)
-
-
-def _lengths(table: Table, key: str) -> tuple[float, ...]:
-    value: Any = table.content.get(key)
-    if not isinstance(value, list) or not all(
-        type(x) in (int, float) and abs(x) <= LONGEST_MM for x in value
-    ):
-        raise table.wrong(key, tr("is not a list of lengths"))
-    return tuple(float(x) for x in value)

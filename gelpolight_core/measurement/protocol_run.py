@@ -8,7 +8,6 @@ stored, so an interrupted run continues with the press that was not finished.
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import append_durably, cannot_write, make_folder, write_text
 from gelpolight_core.io.reading import brief, read_file
-from gelpolight_core.io.table import csv_text
+from gelpolight_core.io.table import csv_text, read_csv
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.press import Press, read_truth
 from gelpolight_core.measurement.protocol import (
@@ -334,16 +333,9 @@ def _write_rows(rows: Sequence[Sequence[str]], presses: Path) -> None:
 
 def _read_rows(path: Path) -> list[list[str]]:
     try:
-        text = read_file(path).decode("utf-8-sig")
-        lines = [row for row in csv.reader(text.splitlines()) if row]
+        lines = [row for _, row in read_csv(path)]
     except FileNotFoundError:
         return []
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(
-            tr("The file cannot be read ({reason})").format(reason=error),
-            where=str(path),
-            advice=tr("Correct it; the images in the folder are intact"),
-        ) from error
     if not lines or tuple(lines[0]) != COLUMNS:
         raise InputError(
             tr("the first line is not that of a protocol run"),

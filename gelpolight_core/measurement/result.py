@@ -10,9 +10,66 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, reason_of
+from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One measured value.
+
+    Attributes
+    ----------
+    name : str
+        Name with unit, such as ``diameter_mm``, ``height_mm`` or ``angle_deg``.
+    value : float
+        The measured value.
+    sd : float or None
+        Its standard deviation, if known.
+    truth : float or None
+        The true value, if known.
+    limit_percent : float or None
+        Largest error that passes, in percent of the truth.
+    """
+
+    name: str
+    value: float
+    sd: float | None = None
+    truth: float | None = None
+    limit_percent: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse invalid numbers, and a true value of 0."""
+        given = (self.value, self.sd, self.truth, self.limit_percent)
+        if not all(number is None or math.isfinite(number) for number in given):
+            raise ValueError(f"{self.name} holds a number that is not finite: {given}")
+        if self.truth == 0.0:
+            raise ValueError(f"{self.name} has a true value of 0")
+
+    @property
+    def unit(self) -> str:
+        """The unit in its name."""
+        return self.name.rpartition("_")[2]
+
+    @property
+    def error(self) -> float | None:
+        """Measured minus true, in the quantity's unit."""
+        return None if self.truth is None else self.value - self.truth
+
+    @property
+    def error_percent(self) -> float | None:
+        """The error in percent of the truth."""
+        return None if self.truth is None else percent_error(self.value, self.truth)
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the error is within the limit; None without truth or limit."""
+        if self.error_percent is None or self.limit_percent is None:
+            return None
+        return abs(self.error_percent) <= self.limit_percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +105,8 @@ class Measurement:
         How many pixels have a common error; the standard deviations count such a group once.
     outline_mm : (N, 2)
         Contact region, (x, y), closed, for an overlay.
-    verdict : str
-        ``ok`` or ``doubtful``.
-    reason : str
-        Why doubtful; empty when ok.
+    findings : tuple of Finding
+        Why it is doubtful; empty when it is not.
     noise_sd : dict or None
         The part by noise, the scatter of repeated images; None if the map's noise is not known.
     calibration_sd : dict or None
@@ -85,12 +140,21 @@ class Measurement:
     residual_rms_mm: float
     correlated_pixels: float
     outline_mm: Array
-    verdict: str
-    reason: str
+    findings: tuple[Finding, ...] = ()
     noise_sd: dict[str, Any] | None = None
     calibration_sd: dict[str, Any] | None = None
     mode_sd: dict[str, Any] | None = None
     corner_rounding: float | None = None
+
+    @property
+    def verdict(self) -> str:
+        """``ok``, or ``doubtful`` where there are findings."""
+        return "doubtful" if self.findings else "ok"
+
+    @property
+    def reason(self) -> str:
+        """Why doubtful; empty when ok."""
+        return reason_of(self.findings)
 
     @property
     def size_mm(self) -> float:
@@ -111,16 +175,18 @@ class Measurement:
     @property
     def height_sd_mm(self) -> float:
         """Standard deviation of `height_mm`."""
-        return float(self.sd["height_mm"])
+        return float(self.sd.get("height_mm", math.nan))
 
-    def as_json(self, comparison: Comparison | None = None) -> dict[str, Any]:
-        """Return the measurement as plain values; `comparison` adds truth and errors in percent.
+    def as_json(self, truth: Truth | None = None) -> dict[str, Any]:
+        """Return the measurement as plain values; true sizes that are known add errors in percent.
 
         Parameters
         ----------
-        comparison : Comparison, optional
-            From :func:`compare`.
+        truth : Truth, optional
+            Nominal sizes.
         """
+        whole = truth if truth is not None and truth.is_whole else None
+        errors = whole and {q.name: q.error_percent for q in compare(self, whole)}
         size: dict[str, Any] = {"diameter_mm": self.diameter_mm}
         if self.side_mm is not None:
             size = {"side_mm": list(self.side_mm)}
@@ -135,8 +201,8 @@ class Measurement:
             "noise_sd": _plain(self.noise_sd),
             "calibration_sd": _plain(self.calibration_sd),
             "mode_sd": _plain(self.mode_sd),
-            "truth": None if comparison is None else comparison.truth.as_json(),
-            "error_percent": None if comparison is None else dict(comparison.error_percent),
+            "truth": whole and whole.as_json(),
+            "error_percent": errors,
             "verdict": self.verdict,
             "reason": self.reason,
             "edge_radius_mm": self.edge_radius_mm,
@@ -174,51 +240,38 @@ class Truth:
         """The name under which the size is written: ``side_mm`` or ``diameter_mm``."""
         return "side_mm" if self.shape == "cuboid" else "diameter_mm"
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether both sizes are known."""
+        return math.isfinite(self.size_mm) and math.isfinite(self.height_mm)
+
     def as_json(self) -> dict[str, Any]:
         """Return the truth as plain values."""
         return {"shape": self.shape, self.size_key: self.size_mm, "height_mm": self.height_mm}
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """A measurement compared with the true values.
-
-    Attributes
-    ----------
-    truth : Truth
-        What was pressed.
-    size_error_percent, height_error_percent : float
-        Planar and depth direction, signed, of the true value.
-    """
-
-    truth: Truth
-    size_error_percent: float
-    height_error_percent: float
-
-    @property
-    def error_percent(self) -> dict[str, float]:
-        """The errors under the names of the measured values."""
-        return {
-            self.truth.size_key: self.size_error_percent,
-            "height_mm": self.height_error_percent,
-        }
-
-
-def compare(measurement: Measurement, truth: Truth) -> Comparison:
-    """Return the percent errors of a measurement; of a cuboid, of its mean side.
+def compare(
+    measurement: Measurement,
+    truth: Truth | None = None,
+    limits_percent: tuple[float | None, float | None] = (None, None),
+) -> tuple[Quantity, Quantity]:
+    """Return size and height of a measurement with their true values; of a cuboid, its mean side.
 
     Parameters
     ----------
     measurement : Measurement
         From :func:`~gelpolight_core.measurement.measure.measure_object`.
-    truth : Truth
-        Nominal sizes, greater than zero.
+    truth : Truth, optional
+        Nominal sizes, greater than zero; NaN where one is not known.
+    limits_percent : (float, float), optional
+        Largest errors of size and height that pass.
 
     Raises
     ------
     InputError
         If the shape differs from that of the truth, or a true size is not positive.
     """
+    truth = truth or Truth(measurement.shape, math.nan, math.nan)
     if truth.shape != measurement.shape:
         raise InputError(
             tr("the true shape is a {truth}, but a {shape} was measured").format(
@@ -228,17 +281,21 @@ def compare(measurement: Measurement, truth: Truth) -> Comparison:
             advice=tr("Measure with the shape that was pressed"),
         )
     for value in (truth.size_mm, truth.height_mm):
-        if not (math.isfinite(value) and value > 0.0):
+        if value <= 0.0 or math.isinf(value):
             raise InputError(
                 tr("the true size is {value} mm").format(value=value),
                 where=tr("truth"),
                 advice=tr("Give sizes greater than zero"),
             )
-    return Comparison(
-        truth,
-        percent_error(measurement.size_mm, truth.size_mm),
-        percent_error(measurement.height_mm, truth.height_mm),
+    rows = (
+        (truth.size_key, measurement.size_mm, measurement.size_sd_mm, truth.size_mm),
+        ("height_mm", measurement.height_mm, measurement.height_sd_mm, truth.height_mm),
     )
+    size, height = (
+        Quantity(name, value, finite_or_none(sd), finite_or_none(true), limit)
+        for (name, value, sd, true), limit in zip(rows, limits_percent, strict=True)
+    )
+    return size, height
 
 
 def percent_error(measured: float, true: float) -> float:

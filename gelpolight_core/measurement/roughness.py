@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.area import Rectangle, nodes_inside
+from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import Measured, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -46,19 +46,43 @@ def roughness(heightmap: HeightMap, rectangle: Rectangle) -> Parameters:
     ISO 25178-2:2021, height parameters: Sa (arithmetical mean height), Sq (root mean square
     height), Sz (maximum height: maximum peak height plus maximum pit depth).
     """
-    nodes = nodes_inside(heightmap, rectangle)
+    figure = of_area(heightmap, nodes_inside(heightmap, rectangle))
+
+    def of_height(parameter: Callable[[Array], float]) -> Callable[[Array, Array, Array], float]:
+        return lambda x, y, depth: UM * parameter(above_plane(x, y, depth))
+
+    return (
+        figure("sa", "um", of_height(_mean)),
+        figure("sq", "um", of_height(_rms)),
+        figure("sz", "um", of_height(lambda z: float(np.ptp(z)))),
+    )
+
+
+def of_area(
+    heightmap: HeightMap, nodes: AreaNodes
+) -> Callable[[str, str, Callable[[Array, Array, Array], float]], Measured]:
+    """Return what measures an area: from a figure's name, its unit and its computation.
+
+    The value is that of all nodes; errors are propagated at a part of them.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The map.
+    nodes : AreaNodes
+        Of the area. A figure is computed from their x, y and depth in mm, (N,) each.
+    """
     few = nodes.thinned(ERROR_NODES)
     errors = map_errors(heightmap, few.x_mm, few.y_mm)
-    height = above_plane(nodes.x_mm, nodes.y_mm, nodes.depth_mm)
 
-    def figure(name: str, parameter: Callable[[Array], float]) -> Measured:
-        def compute(depths: Array, stretch: float) -> float:
-            return UM * parameter(above_plane(few.x_mm, few.y_mm, depths))
+    def figure(name: str, unit: str, compute: Callable[[Array, Array, Array], float]) -> Measured:
+        def of_few(depth_mm: Array, stretch: float) -> float:
+            return compute(stretch * few.x_mm, stretch * few.y_mm, depth_mm)
 
-        of_few = measured(name, "um", compute, few.depth_mm, errors)
-        return replace(of_few, value=UM * parameter(height))
+        found = measured(name, unit, of_few, few.depth_mm, errors)
+        return replace(found, value=compute(nodes.x_mm, nodes.y_mm, nodes.depth_mm))
 
-    return figure("sa", _mean), figure("sq", _rms), figure("sz", lambda z: float(np.ptp(z)))
+    return figure
 
 
 def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> Parameters:

@@ -26,6 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.measurement.fit import FitResult, WindowData
+from gelpolight_core.measurement.measured import noise_at
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -82,12 +84,7 @@ where a ray meets that surface."""
 
 
 def noise_of_fit(
-    fit: FitResult,
-    window: WindowData,
-    face: Mask | None,
-    noise_mm: NDArray[np.float32],
-    x_mm: Array,
-    y_mm: Array,
+    fit: FitResult, window: WindowData, face: Mask | None, heightmap: HeightMap
 ) -> dict[str, float]:
     """Return the standard deviation of the fit's parameters from a map's noise.
 
@@ -100,50 +97,19 @@ def noise_of_fit(
     face : (rows, columns) bool or None
         Pixels of the window whose median is the height; None if the height does not come from a
         median.
-    noise_mm : (examples, map rows / factor, map columns / factor)
-        Examples of the map's noise, averages over blocks of pixels.
-    x_mm, y_mm : (map columns,), (map rows,)
-        The map's grid.
+    heightmap : HeightMap
+        The map, with examples of its noise.
     """
-    examples = noise_mm.reshape(len(noise_mm), -1)
-    factor = round(x_mm.size / noise_mm.shape[2])
 
-    def sums(pixels: Mask, shares: Array) -> Array:
-        """Return for each example the sums of its values at pixels (P,), with shares (n, P)."""
-        first = 0.5 * (factor - 1)
-        column = (window.x_mm[pixels] - x_mm[0]) / (x_mm[1] - x_mm[0])
-        row = (window.y_mm[pixels] - y_mm[0]) / (y_mm[1] - y_mm[0])
-        nodes, weights = _bilinear((row - first) / factor, (column - first) / factor, noise_mm)
-        size = examples.shape[1]
-        spread = [
-            np.bincount(nodes.ravel(), (weights * share).ravel(), minlength=size)
-            for share in shares
-        ]
-        return np.asarray(examples @ np.array(spread).T, np.float64)
+    def at(pixels: Mask) -> Array:
+        """Return each example's values at pixels of the window."""
+        return noise_at(heightmap, window.x_mm[pixels], window.y_mm[pixels])
 
-    moved = dict(zip(fit.values, sums(fit.chosen, fit.gain).T, strict=True))
+    moved = dict(zip(fit.values, (at(fit.chosen) @ fit.gain.T).T, strict=True))
     if face is not None and face.any():
         # If errors are correlated over the whole face, a median scatters like the mean.
-        mean = np.full((1, int(face.sum())), 1.0 / face.sum())
-        moved["height_mm"] = sums(face, mean)[:, 0] - moved["offset_mm"]
+        moved["height_mm"] = at(face).mean(axis=1) - moved["offset_mm"]
     return {name: float(np.sqrt(np.mean(change**2))) for name, change in moved.items()}
-
-
-def _bilinear(
-    row: Array, column: Array, maps: NDArray[np.float32]
-) -> tuple[NDArray[np.intp], Array]:
-    """Return the four nodes (4, P) of a map around each point, and their bilinear weights."""
-    rows, columns = maps.shape[1:]
-    row, column = np.clip(row, 0.0, rows - 1.0), np.clip(column, 0.0, columns - 1.0)
-    above = np.minimum(row.astype(np.intp), max(rows - 2, 0))
-    left = np.minimum(column.astype(np.intp), max(columns - 2, 0))
-    down, right = row - above, column - left
-    below, beside = np.minimum(above + 1, rows - 1), np.minimum(left + 1, columns - 1)
-    nodes = [above * columns + left, above * columns + beside]
-    nodes += [below * columns + left, below * columns + beside]
-    weights = [(1.0 - down) * (1.0 - right), (1.0 - down) * right]
-    weights += [down * (1.0 - right), down * right]
-    return np.array(nodes), np.array(weights)
 
 
 def calibration_sd(

@@ -50,9 +50,14 @@ class Statistics:
     def as_json(self, unit: str) -> dict[str, float | None]:
         """Return plain values, their names with a unit; None instead of NaN."""
         return {
-            key if key == "count" else f"{key}_{unit}": value if math.isfinite(value) else None
+            key if key == "count" else f"{key}_{unit}": finite_or_none(value)
             for key, value in asdict(self).items()
         }
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return a number, or None for one that files do not hold."""
+    return value if math.isfinite(value) else None
 
 
 def statistics_of(values: Iterable[float]) -> Statistics:

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import Finding, doubt, reason_of
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.result import Measurement
@@ -46,10 +47,8 @@ class ToolResult:
         What was measured, the most important first.
     drawing_mm : tuple of (N, 2) arrays
         Lines (x, y) to be drawn over the map.
-    verdict : str
-        ``ok`` or ``doubtful``.
-    reason : str
-        Why doubtful; empty when ok.
+    findings : tuple of Finding
+        Why it is doubtful; empty when it is not.
     measurement : Measurement or None
         The whole fit, of a fitted indenter.
     profile : Profile or None
@@ -59,10 +58,19 @@ class ToolResult:
     tool: Tool
     figures: tuple[Measured, ...]
     drawing_mm: tuple[Array, ...]
-    verdict: str = "ok"
-    reason: str = ""
+    findings: tuple[Finding, ...] = ()
     measurement: Measurement | None = None
     profile: Profile | None = None
+
+    @property
+    def verdict(self) -> str:
+        """``ok``, or ``doubtful`` where there are findings."""
+        return "doubtful" if self.findings else "ok"
+
+    @property
+    def reason(self) -> str:
+        """Why doubtful; empty when ok."""
+        return reason_of(self.findings)
 
     def __getitem__(self, name: str) -> Measured:
         """Return the figure of that name."""
@@ -116,11 +124,10 @@ def tool_result(
     """
     flagged = (flags & UNKNOWN) != 0
     share = float(np.mean(flagged)) if flagged.size else 0.0
-    reason = ""
+    findings: tuple[Finding, ...] = ()
     if share > FLAGGED_SHARE:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
-        reason = tr("{percent:.0f} % of the points are flagged ({names})").format(
-            percent=100.0 * share, names=", ".join(names)
-        )
-    verdict = "doubtful" if reason else "ok"
-    return ToolResult(tool, figures, drawing, verdict, reason, profile=profile)
+        text = tr("{percent:.0f} % of the points are flagged ({names})")
+        text = text.format(percent=100.0 * share, names=", ".join(names))
+        findings = (doubt("flagged", text),)
+    return ToolResult(tool, figures, drawing, findings, profile=profile)

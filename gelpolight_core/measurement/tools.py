@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, asdict, fields
+from dataclasses import asdict, fields
 from types import MappingProxyType
 from typing import Any, cast
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.reading import brief
+from gelpolight_core.io.codec import unpack
+from gelpolight_core.io.reading import brief, refusing
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.feature_tools import EdgeRadius, Pit, Scratch
 from gelpolight_core.measurement.indenter_tools import Ball, Cuboid, Cylinder
-from gelpolight_core.measurement.outline_tools import EDGES, Circle, RectangleTool
+from gelpolight_core.measurement.outline_tools import Circle, RectangleTool
 from gelpolight_core.measurement.point_tools import Angle, Distance, StepHeight
 from gelpolight_core.measurement.profile_tools import ProfileAngle, ProfileStep, ProfileWidth
 from gelpolight_core.measurement.tool import Tool, ToolResult
@@ -90,21 +91,15 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
             where=tr("measuring tool"),
             advice=tr("Choose one of {names}").format(names=", ".join(TOOLS)),
         )
-    known = {field.name: field for field in fields(cast(Any, kind))}
     given = {key: value for key, value in content.items() if key != "tool"}
-    wrong = sorted(set(given) - set(known))
-    needed = {key for key, field in known.items() if field.default is MISSING}
-    missing = sorted(needed - set(given))
-    if wrong or missing:
-        raise InputError(
-            tr("{key} is missing").format(key=missing[0])
-            if missing
-            else tr("{key} is not known").format(key=brief(wrong[0])),
-            where=tr("measuring tool {name}").format(name=name),
-            advice=tr("It needs {names}").format(names=", ".join(known)),
-        )
-    values = {key: _value(known[key], value, name) for key, value in given.items()}
-    return kind(**values)
+    with refusing(
+        tr("the values do not describe this tool ({error})"),
+        tr("measuring tool {name}").format(name=name),
+        advice=tr("It needs {names}; give lengths in mm, and a position as two numbers").format(
+            names=", ".join(field.name for field in fields(cast(Any, kind)))
+        ),
+    ):
+        return unpack(kind, _plain(given), {}, kind.name)
 
 
 def tools_from_json(content: Any) -> tuple[Tool, ...]:
@@ -146,44 +141,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return [_plain(part) for part in value]
     return value
-
-
-def _value(field: Field[Any], value: Any, tool: Any) -> Any:
-    """Return a value of the type in the annotation of a field."""
-    kind = str(field.type)
-    try:
-        if value is None and "None" in kind:
-            return None
-        if kind == "Rectangle":
-            return Rectangle(
-                _point(value["centre_mm"]),
-                _point(value["sides_mm"]),
-                _number(value.get("yaw_deg", 0.0)),
-            )
-        if kind == "Edge":
-            if value not in EDGES:
-                raise ValueError("no such edge")
-            return value
-        if kind.startswith("tuple"):
-            return tuple(_point(part) for part in value)
-        return _point(value) if kind.startswith(("Point", "Range")) else _number(value)
-    except (TypeError, ValueError, KeyError, AttributeError, ArithmeticError) as error:
-        raise InputError(
-            tr("{key} is {value}").format(key=field.name, value=brief(value)),
-            where=tr("measuring tool {name}").format(name=tool),
-            advice=tr("Give lengths in mm as numbers, and a position as two numbers"),
-        ) from error
-
-
-def _point(value: Any) -> tuple[float, float]:
-    x, y = value
-    return _number(x), _number(y)
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, (bool, str)):
-        raise ValueError("it is no number")
-    number = float(value)
-    if not abs(number) < 1e6:
-        raise ValueError("it is no length")
-    return number

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
+from gelpolight_core.finding import Finding, doubt
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tool import ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
-from gelpolight_core.translation import joined, tr
+from gelpolight_core.translation import tr
 
 Result = TypeVar("Result", Measurement, ToolResult)
 
@@ -36,18 +37,14 @@ def judged(result: Result, height_map: HeightMap) -> Result:
         Doubtful, with the reason, if the height map has faults, or a shape with walls was measured
         with an in-place calibration; unchanged otherwise.
     """
-    faults: list[str] = [finding.text for finding in height_map.doubts]
+    faults: tuple[Finding, ...] = height_map.doubts
     if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
-        faults.append(
-            tr(
-                "the balls of this in-place calibration have no walls: on the virtual sensor, "
-                "heights are 7 to 10 % too small and sizes 2 to 11 % too large"
-            )
+        text = tr(
+            "the balls of this in-place calibration have no walls: on the virtual sensor, "
+            "heights are 7 to 10 % too small and sizes 2 to 11 % too large"
         )
-    if not faults:
-        return result
-    reason = joined("; ", (text for text in (*faults, result.reason) if text))
-    doubtful = replace(result, verdict="doubtful", reason=reason)
-    if isinstance(doubtful, ToolResult) and doubtful.measurement is not None:
-        doubtful = replace(doubtful, measurement=judged(doubtful.measurement, height_map))
-    return doubtful
+        faults = (*faults, doubt("walls", text))
+    found = replace(result, findings=(*faults, *result.findings))
+    if isinstance(found, ToolResult) and found.measurement is not None:
+        found = replace(found, measurement=judged(found.measurement, height_map))
+    return found

@@ -2,67 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-import numpy as np
-
-from gelpolight_core.measurement.result import Comparison, Measurement
+from gelpolight_core.measurement.result import Measurement, Quantity, Truth, compare
 
 PASSED, FAILED, DOUBTFUL, UNJUDGED = "pass", "fail", "doubtful", ""
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """One measured value.
-
-    Attributes
-    ----------
-    name : str
-        Name with unit, such as ``diameter_mm``, ``height_mm`` or ``angle_deg``.
-    value : float
-        The measured value.
-    sd : float or None
-        Its standard deviation, if known.
-    truth : float or None
-        The true value, if known.
-    limit_percent : float or None
-        Largest error that passes, in percent of the truth.
-    """
-
-    name: str
-    value: float
-    sd: float | None = None
-    truth: float | None = None
-    limit_percent: float | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse invalid numbers, and a true value of 0."""
-        given = (self.value, self.sd, self.truth, self.limit_percent)
-        if not all(number is None or math.isfinite(number) for number in given):
-            raise ValueError(f"{self.name} holds a number that is not finite: {given}")
-        if self.truth == 0.0:
-            raise ValueError(f"{self.name} has a true value of 0")
-
-    @property
-    def error(self) -> float | None:
-        """Measured minus true, in the quantity's unit."""
-        return None if self.truth is None else self.value - self.truth
-
-    @property
-    def error_percent(self) -> float | None:
-        """The error in percent of the truth."""
-        return None if self.truth is None else 100.0 * (self.value / self.truth - 1.0)
-
-    @property
-    def passed(self) -> bool | None:
-        """Whether the error is within the limit; None without truth or limit."""
-        if self.error_percent is None or self.limit_percent is None:
-            return None
-        return abs(self.error_percent) <= self.limit_percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,15 +87,10 @@ def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool = False) -> str
 
 def indenter_record(
     measurement: Measurement,
-    comparison: Comparison | None = None,
+    truth: Truth | None = None,
     *,
-    serial: str,
-    calibration_id: str,
-    size_limit_percent: float,
-    height_limit_percent: float,
-    operator: str = "",
-    picture: str = "",
-    note: str = "",
+    limits_percent: tuple[float, float],
+    **context: Any,
 ) -> MeasurementRecord:
     """Return the record of a fitted indenter.
 
@@ -157,44 +99,19 @@ def indenter_record(
     measurement : Measurement
         The fit; for a cuboid the mean side is stored as ``side_mm``, because its error is judged by
         it.
-    comparison : Comparison, optional
-        Comparison with the truth, if known.
-    serial, calibration_id, operator, picture, note
-        As in :class:`MeasurementRecord`.
-    size_limit_percent, height_limit_percent : float
-        Largest errors that pass.
+    truth : Truth, optional
+        Nominal sizes, as far as they are known.
+    limits_percent : (float, float)
+        Largest errors of size and height that pass.
+    **context
+        Further fields of :class:`MeasurementRecord`.
     """
-    truth = None if comparison is None else comparison.truth
-    size_name = "diameter_mm" if measurement.side_mm is None else "side_mm"
-    quantities = (
-        Quantity(
-            size_name,
-            measurement.size_mm,
-            _finite(measurement.size_sd_mm),
-            None if truth is None else truth.size_mm,
-            size_limit_percent,
-        ),
-        Quantity(
-            "height_mm",
-            measurement.height_mm,
-            _finite(measurement.sd.get("height_mm")),
-            None if truth is None else truth.height_mm,
-            height_limit_percent,
-        ),
-    )
+    quantities = compare(measurement, truth, limits_percent)
     return MeasurementRecord(
-        serial=serial,
-        calibration_id=calibration_id,
         shape=measurement.shape,
         quantities=quantities,
         verdict=verdict_of(quantities, doubtful=measurement.verdict != "ok"),
         reason=measurement.reason,
-        details=measurement.as_json(comparison),
-        operator=operator,
-        picture=picture,
-        note=note,
+        details=measurement.as_json(truth),
+        **context,
     )
-
-
-def _finite(value: Any) -> float | None:
-    return None if value is None or not np.isfinite(value) else float(value)

@@ -6,7 +6,8 @@ import math
 from dataclasses import asdict
 
 from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation
-from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord, Quantity
+from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord
 from gelpolight_core.records.records import Records
 
 SHAPE = "evaluation"
@@ -17,8 +18,7 @@ def evaluation_record(
     *,
     serial: str,
     calibration_id: str,
-    size_limit_percent: float,
-    height_limit_percent: float,
+    limits_percent: tuple[float, float],
     operator: str = "",
     folder: str = "",
 ) -> MeasurementRecord | None:
@@ -30,8 +30,8 @@ def evaluation_record(
         Evaluation of all presses.
     serial, calibration_id, operator
         As in :class:`MeasurementRecord`.
-    size_limit_percent, height_limit_percent : float
-        Largest mean errors that pass.
+    limits_percent : (float, float)
+        Largest mean errors that pass, planar and in depth.
     folder : str
         Folder of the presses; stored as the image name.
 
@@ -40,7 +40,7 @@ def evaluation_record(
     record : MeasurementRecord or None
         None if nothing could be measured.
     """
-    limits = {"planar": size_limit_percent, "depth": height_limit_percent}
+    limits = dict(zip(DIRECTIONS, limits_percent, strict=True))
     errors = {direction: evaluation.overall(direction).mean_absolute for direction in DIRECTIONS}
     found = {direction: error for direction, error in errors.items() if math.isfinite(error)}
     if not found:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.closing import Closing
-from gelpolight_core.io.reading import refusing, written_text
+from gelpolight_core.io.reading import refusing
 from gelpolight_core.records.database import connect, in_plain_words, is_damage, keep_aside
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of, write_csv
@@ -186,13 +186,6 @@ class Records(Closing):
         records = self.measurements(serial)
         write_csv(records, path)
         return len(records)
-
-    def sensors(self) -> tuple[str, ...]:
-        """Return the serial numbers of all sensors with measurements."""
-        with self._reading() as connection:
-            rows = connection.execute("SELECT serial FROM sensors ORDER BY serial").fetchall()
-        with self._refusing():
-            return tuple(written_text(row["serial"]) for row in rows)
 
     def uses(self, calibration_id: str) -> tuple[int, datetime | None]:
         """Return the number of measurements with a calibration, and the time of the last one.

@@ -65,6 +65,14 @@ def listing(title: str, items: Iterable[T], *columns: tuple[str, Callable[[T], s
     return Listing(title, heads, tuple(tuple(cell(item) for cell in cells) for item in items))
 
 
+def text_lines(table: Listing) -> list[str]:
+    """Return a table as lines of text with aligned columns, the title first."""
+    cells = (table.heads, *table.rows)
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    rows = (map(str.ljust, row, widths) for row in cells)
+    return [table.title, *("  ".join(row).rstrip() for row in rows)]
+
+
 Parts = tuple[tuple[Drawing, ...], tuple[Listing, ...]]
 """Drawings and tables of a stage."""
 

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from matplotlib import get_data_path, rc_context
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import get_font
@@ -35,6 +36,7 @@ MARKERS = ("o", "s", "^")
 ACCENT = "#e69f00"
 ACROSS = 6
 """Images side by side."""
+PNG_DPI = 150
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 7.5,
@@ -83,6 +85,18 @@ def drawing(
         return drawn
 
     return decorate
+
+
+@in_drawing_thread
+def png(paint: Callable[[Figure], object], width_in: float, height_in: float) -> bytes:
+    """Return what `paint` draws on an empty figure of the given size, as PNG."""
+    stream = io.BytesIO()
+    with rc_context({"axes.formatter.min_exponent": 4}):  # writes 10 and 0.1 instead of powers
+        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        FigureCanvasAgg(figure)
+        paint(figure)
+        figure.savefig(stream, format="png", dpi=PNG_DPI)
+    return stream.getvalue()
 
 
 def printable(text: str) -> str:

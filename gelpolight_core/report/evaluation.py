@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.io.atomic import write_text
-from gelpolight_core.io.table import csv_text
+from gelpolight_core.io.atomic import write_files
+from gelpolight_core.io.table import csv_of
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.evaluation import (
     ALL,
@@ -18,22 +20,20 @@ from gelpolight_core.measurement.evaluation import (
     PAPER_PERCENT,
     Evaluation,
 )
-from gelpolight_core.measurement.evaluation_report import (
-    evaluation_json,
-    paint_evaluation,
-    write_evaluation,
-)
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
+from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.report.document import (
     Listing,
     Report,
     Section,
     Validation,
     listing,
+    text_lines,
 )
-from gelpolight_core.report.drawing import drawing
+from gelpolight_core.report.drawing import drawing, png
+from gelpolight_core.report.evaluation_figure import paint_evaluation
 from gelpolight_core.report.facts import head_facts
-from gelpolight_core.report.file import write_report
+from gelpolight_core.report.file import report_pdf
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
@@ -159,29 +159,7 @@ def _groups(evaluation: Evaluation) -> Listing:
 
 
 def _gauge_section(evaluation: Evaluation, gauge: tuple[GaugeRow, ...]) -> Section:
-    texts = {
-        "within_region_mm": tr("Repeatability, {direction}, all objects"),
-        "between_regions_mm": tr("Reproducibility, {direction}, all objects"),
-    }
-    return Section(
-        "gauge",
-        tr("Repeatability of the gauge"),
-        tr(
-            "Repeatability is the standard deviation of presses in one region; reproducibility "
-            "is the additional scatter between regions"
-        ),
-        QualityTable(),
-        tuple(
-            (text.format(direction=label(pooled.direction)), _micrometres(getattr(pooled, name)))
-            for pooled in evaluation.repeatability
-            for name, text in texts.items()
-        ),
-        listings=(_gauge_listing(gauge),),
-    )
-
-
-def _gauge_listing(gauge: tuple[GaugeRow, ...]) -> Listing:
-    return listing(
+    table = listing(
         tr("Object by object"),
         gauge,
         (tr("direction"), lambda row: label(row.direction)),
@@ -194,6 +172,26 @@ def _gauge_listing(gauge: tuple[GaugeRow, ...]) -> Listing:
         (tr("mean (mm)"), lambda row: _number(row.random.mean, ".4f")),
         (tr("sd"), lambda row: _micrometres(row.random.sd)),
         (tr("reproducibility"), lambda row: _micrometres(row.reproducibility_mm)),
+    )
+    intro = tr(
+        "Repeatability is the standard deviation of presses in one region; reproducibility "
+        "is the additional scatter between regions"
+    )
+    pooled = _pooled(evaluation)
+    title = tr("Repeatability of the gauge")
+    return Section("gauge", title, intro, QualityTable(), pooled, listings=(table,))
+
+
+def _pooled(evaluation: Evaluation) -> Facts:
+    """Return repeatability and reproducibility over all objects."""
+    texts = {
+        "within_region_mm": tr("Repeatability, {direction}, all objects"),
+        "between_regions_mm": tr("Reproducibility, {direction}, all objects"),
+    }
+    return tuple(
+        (text.format(direction=label(pooled.direction)), _micrometres(getattr(pooled, name)))
+        for pooled in evaluation.repeatability
+        for name, text in texts.items()
     )
 
 
@@ -249,6 +247,52 @@ def _with_sd(value_mm: float | None, sd_mm: float | None) -> str:
     return "" if value_mm is None else f"{value_mm:.3f} \N{PLUS-MINUS SIGN} {sd_mm:.3f}"
 
 
+def evaluation_table(evaluation: Evaluation) -> str:
+    """Return the evaluation as lines of text: every press, then every group."""
+    presses = known_objects(evaluation, tr("Every press"))
+    lines = [*text_lines(presses), "", *text_lines(_groups(evaluation)), ""]
+    lines += [f"{name}: {value}" for name, value in _pooled(evaluation)]
+    lines.append(evaluation_sentence(evaluation))
+    if evaluation.failed:
+        lines.append(evaluation.failure)
+    if evaluation.skipped:
+        lines.append(
+            tr("{count} skipped because this shape cannot be measured: {files}").format(
+                count=len(evaluation.skipped), files=", ".join(evaluation.skipped)
+            )
+        )
+    return "\n".join(lines)
+
+
+def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
+    """Return the evaluation as plain values; figures that do not exist are None."""
+    return {
+        "paper_percent": dict(PAPER_PERCENT),
+        "overall": {d: evaluation.overall(d).as_json("percent") for d in DIRECTIONS},
+        "groups": [
+            {
+                "direction": group.direction,
+                "shape": group.shape,
+                "dimension_mm": group.dimension_mm,
+                "regions": group.regions,
+                **group.statistic.as_json("percent"),
+            }
+            for group in evaluation.groups
+        ],
+        "repeatability": [
+            {
+                "direction": pooled.direction,
+                "within_region_sd_mm": finite_or_none(pooled.within_region_mm),
+                "between_regions_sd_mm": finite_or_none(pooled.between_regions_mm),
+            }
+            for pooled in evaluation.repeatability
+        ],
+        "presses": [press.as_row() for press in evaluation.results],
+        "failed": len(evaluation.failed),
+        "skipped": list(evaluation.skipped),
+    }
+
+
 def write_evaluation_files(
     evaluation: Evaluation,
     folder: Path,
@@ -279,38 +323,37 @@ def write_evaluation_files(
     InputError
         If a file cannot be written.
     """
-    written = list(write_evaluation(evaluation, folder))
     document = evaluation_document(
         evaluation,
         facts=() if calibration is None else head_facts(calibration),
         limits_percent=limits_percent,
     )
-    written.append(folder / "evaluation.pdf")
-    write_report(document, written[-1])
+    content = json.dumps(evaluation_json(evaluation), indent=2, allow_nan=False)
+    contents = {
+        "evaluation.txt": (evaluation_table(evaluation) + "\n").encode(),
+        "evaluation.csv": csv_of([press.as_row() for press in evaluation.results]).encode(),
+        "evaluation.json": (content + "\n").encode(),
+        "evaluation.png": png(lambda figure: paint_evaluation(figure, evaluation), 11.0, 11.0),
+        "evaluation.pdf": report_pdf(document),
+    }
     gauge = gauge_rows(evaluation)
     if gauge:
-        path = folder / "gauge.csv"
-        write_text(path, gauge_csv(gauge))
-        written.append(path)
-    return tuple(written)
+        contents["gauge.csv"] = csv_of([_gauge_row(row) for row in gauge]).encode()
+    return write_files(folder, contents)
 
 
-def gauge_csv(gauge: tuple[GaugeRow, ...]) -> str:
-    """Return the gauge table as CSV, one line for each object and direction."""
-    rows = [
-        {
-            "direction": row.direction,
-            "shape": row.truth.shape,
-            "size_mm": row.truth.size_mm,
-            "height_mm": row.truth.height_mm,
-            "same_region_n": row.same.count,
-            "same_region_mean_mm": row.same.mean,
-            "repeatability_sd_mm": row.repeatability_mm,
-            "random_regions_n": row.random.count,
-            "random_regions_mean_mm": row.random.mean,
-            "random_regions_sd_mm": row.random.sd,
-            "reproducibility_sd_mm": row.reproducibility_mm,
-        }
-        for row in gauge
-    ]
-    return csv_text(list(rows[0]), (["" if v != v else v for v in row.values()] for row in rows))
+def _gauge_row(row: GaugeRow) -> dict[str, str | float | None]:
+    """Return one object and direction as a line of the table."""
+    return {
+        "direction": row.direction,
+        "shape": row.truth.shape,
+        "size_mm": row.truth.size_mm,
+        "height_mm": row.truth.height_mm,
+        "same_region_n": row.same.count,
+        "same_region_mean_mm": finite_or_none(row.same.mean),
+        "repeatability_sd_mm": finite_or_none(row.repeatability_mm),
+        "random_regions_n": row.random.count,
+        "random_regions_mean_mm": finite_or_none(row.random.mean),
+        "random_regions_sd_mm": finite_or_none(row.random.sd),
+        "reproducibility_sd_mm": finite_or_none(row.reproducibility_mm),
+    }

@@ -18,8 +18,10 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import write_files
+from gelpolight_core.io.table import csv_of
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.studies.files import drawn, write_results
+from gelpolight_core.report.drawing import png
 from gelpolight_core.translation import tr
 
 MODES = (*reversed(EFFORTS), "paper")
@@ -222,7 +224,7 @@ def summary_line(results: Iterable[CaseResult]) -> str:
     )
 
 
-def write_stability(results: Sequence[CaseResult], folder: Path) -> list[Path]:
+def write_stability(results: Sequence[CaseResult], folder: Path) -> tuple[Path, ...]:
     """Write ``stability.csv`` and ``stability.png``: the error of each case with its limit.
 
     Raises
@@ -231,8 +233,9 @@ def write_stability(results: Sequence[CaseResult], folder: Path) -> list[Path]:
         If a file cannot be written.
     """
     shown = [result for result in results if result.first.error_um]
-    png = drawn(lambda figure: _paint(figure, shown), 9.0, 1.5 + 0.14 * len(shown))
-    return write_results(folder, "stability", [result.row for result in results], png)
+    image = png(lambda figure: _paint(figure, shown), 9.0, 1.5 + 0.14 * len(shown))
+    table = csv_of([result.row for result in results]).encode()
+    return write_files(folder, {"stability.csv": table, "stability.png": image})
 
 
 def _paint(figure: Figure, results: Sequence[CaseResult]) -> None:

@@ -50,10 +50,17 @@ def maps_of(
     calibration: Calibration, frame: NDArray[Any], *, uncertainty: bool = False
 ) -> dict[str, HeightMap]:
     """Return the height map of a frame in each of `MODES`."""
+    solvers = solvers_of(calibration).items()
+    return {mode: solver.depth(frame, uncertainty=uncertainty) for mode, solver in solvers}
+
+
+def solvers_of(calibration: Calibration) -> dict[str, Reconstructor]:
+    """Return the reconstructor of each of `MODES` that a calibration has."""
+    paper = {"paper": Reconstructor(calibration, model="paper")}
+    if calibration.open_sensor.full is None:
+        return paper
     full = Reconstructor(calibration, model="full")
-    paper = Reconstructor(calibration, model="paper")
-    solvers = {mode: paper if mode == "paper" else full.at_effort(mode) for mode in MODES}
-    return {mode: s.depth(frame, uncertainty=uncertainty) for mode, s in solvers.items()}
+    return {mode: full.at_effort(mode) for mode in MODES if mode not in paper} | paper
 
 
 def is_finite(found: HeightMap) -> bool:

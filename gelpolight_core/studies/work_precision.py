@@ -19,6 +19,8 @@ from matplotlib.figure import Figure
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import write_files
+from gelpolight_core.io.table import csv_of
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.score import (
     TrueDepth,
@@ -27,13 +29,12 @@ from gelpolight_core.measurement.score import (
     scored_radius_mm,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.report.drawing import png
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
-from gelpolight_core.studies.files import drawn, write_results
-from gelpolight_core.studies.trial import truth_at
+from gelpolight_core.studies.trial import solvers_of, truth_at
 from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
@@ -83,14 +84,11 @@ class Point:
     size_percent: float
 
 
-def modes() -> dict[str, tuple[str, str, str]]:
-    """Return model, effort and label of each mode, by its name."""
-    return {
-        "paper": ("paper", "best", tr("paper's model")),
-        "fast": ("full", "fast", tr("full model, {effort}").format(effort="fast")),
-        "balanced": ("full", "balanced", tr("full model, {effort}").format(effort="balanced")),
-        "best": ("full", "best", tr("full model, {effort}").format(effort="best")),
-    }
+def mode_label(mode: str) -> str:
+    """Return a mode's name for people."""
+    if mode == "paper":
+        return tr("paper's model")
+    return tr("full model, {effort}").format(effort=mode)
 
 
 def measure_virtual(
@@ -187,11 +185,7 @@ def measure_session(
             where=str(folder / "presses" / "truth.csv"),
             advice=tr("Use a session that contains such presses and their true depth"),
         )
-    solvers = {
-        name: Reconstructor(calibration, model=model, effort=effort)
-        for name, (model, effort, _) in modes().items()
-        if model == "paper" or calibration.open_sensor.full is not None
-    }
+    solvers = dict(reversed(solvers_of(calibration).items()))
     radius_mm = scored_radius_mm(calibration.open_sensor.sensor)
     times_ms: dict[str, list[float]] = {name: [] for name in solvers}
     errors: dict[str, list[tuple[float, ...]]] = {name: [] for name in solvers}
@@ -212,7 +206,7 @@ def measure_session(
     for name in solvers:
         median, p95 = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
         means = np.abs(errors[name]).mean(axis=0).tolist()
-        label, width = modes()[name][2], calibration.camera.width
+        label, width = mode_label(name), calibration.camera.width
         sensor, pitch_mm = calibration.serial, calibration.table.grid.pitch_mm
         points.append(Point(sensor, name, label, width, pitch_mm, len(rows), median, p95, *means))
     return tuple(points)
@@ -314,10 +308,10 @@ def point_table(points: Sequence[Point]) -> str:
 
 def figure_png(points: Sequence[Point]) -> bytes:
     """Return the figure as PNG: depth error and plateau height against time."""
-    return drawn(lambda figure: _paint(figure, points), 9.0, 4.0)
+    return png(lambda figure: _paint(figure, points), 9.0, 4.0)
 
 
-def write_work_precision(points: Sequence[Point], folder: Path) -> list[Path]:
+def write_work_precision(points: Sequence[Point], folder: Path) -> tuple[Path, ...]:
     """Write ``work-precision.csv`` and ``work-precision.png`` into a folder.
 
     Raises
@@ -327,7 +321,8 @@ def write_work_precision(points: Sequence[Point], folder: Path) -> list[Path]:
     """
     front = pareto_front(points)
     rows = [{**asdict(point), "on_front": point in front} for point in points]
-    return write_results(folder, "work-precision", rows, figure_png(points))
+    contents = {"csv": csv_of(rows).encode(), "png": figure_png(points)}
+    return write_files(folder, {f"work-precision.{end}": made for end, made in contents.items()})
 
 
 def _paint(figure: Figure, points: Sequence[Point]) -> None:

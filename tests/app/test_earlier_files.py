@@ -128,7 +128,7 @@ def test_a_workspace_knows_its_calibration_validation_and_records(workspace: Wor
 
     assert entry.path.name == "first.gplcal"
     assert entry.validation is not None
-    assert [c.quantity for c in entry.validation.comparisons] == ["diameter", "height"]
+    assert [c.name for c in entry.validation.comparisons] == ["diameter", "height"]
     assert entry.validated
     assert [record.note for record in kept] == ["first press"]
     assert {record.note for record in removed} - {"first press"} == {"by mistake"}

@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 
 from app.command_line.main import main as gelpolight
-from gelpolight_core.measurement.result import Truth, compare
+from gelpolight_core.measurement.result import Quantity, Truth
 
 DESIGN = Path(__file__).with_name("small_sensor.toml")
 PRESS = "cylinder_s5_d100"
@@ -93,8 +93,8 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
     image = rgb_of(session / f"presses/{PRESS}.png")
     measurement = measure_heightmap(reconstructor(calibration).depth(image), shape="cylinder")
     record = record_of(
-        measurement, compare(measurement, TRUTH), serial="small-1",
-        calibration_id=calibration.identity, size_limit_percent=5.0, height_limit_percent=8.0,
+        measurement, TRUTH, serial="small-1",
+        calibration_id=calibration.identity, limits_percent=(5.0, 8.0),
         settings={"model": calibration.model}, operator="A. Tester", picture=f"{PRESS}.png",
         note="first press",
     )  # fmt: skip
@@ -113,13 +113,12 @@ def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: P
     write_indenters([Indenter("Pin A", "cylinder", 5.0, height_mm=1.0),
                      Indenter("Block", "cuboid", 4.0, 6.0)], workspace)  # fmt: skip
     lengths = (
-        ("diameter", measurement.size_mm, 5.0, 5.0),
-        ("height", measurement.height_mm, 1.0, 8.0),
+        Quantity("diameter", measurement.size_mm, None, 5.0, 5.0),
+        Quantity("height", measurement.height_mm, None, 1.0, 8.0),
     )
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    found = tuple(validation.Comparison(*length) for length in lengths)
     validation.write_validation(
-        validation.Validation(calibration.identity, now, "A. Tester", "Pin A", found), path
+        validation.Validation(calibration.identity, now, "A. Tester", "Pin A", lengths), path
     )
     Workspace(workspace).use(path)
 

@@ -60,16 +60,7 @@ def test_presses_that_were_not_used_are_measured(
     for name in names:
         image = closed_session.image(closed_session.folder / "balls" / name)
         found = reconstructor.depth(image.rgb, uncertainty=True)
-        ball = measure_object(
-            found.depth_mm,
-            found.x_mm,
-            found.y_mm,
-            shape="ball",
-            flags=found.flags,
-            noise_mm=found.noise_mm,
-            depth_scale_sd=found.depth_scale_sd,
-            lateral_scale_sd=found.lateral_scale_sd,
-        )
+        ball = measure_object(found, shape="ball")
         wanted = 2.0 * closed_session.ball_radius_mm(name)
         assert ball.diameter_mm == pytest.approx(wanted, rel=0.08)
         assert abs(ball.diameter_mm - wanted) < 3.0 * ball.sd["diameter_mm"]

@@ -18,7 +18,7 @@ from app.command_line.tool_arguments import _read as read_tools
 from app.services.settings import Settings
 from app.workspace.indenters import first_indenters, read_indenters, write_indenters
 from app.workspace.sessions import read_session_entry
-from app.workspace.validation import Comparison, Validation, read_validation, write_validation
+from app.workspace.validation import Validation, read_validation, write_validation
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
@@ -33,7 +33,7 @@ from gelpolight_core.measurement.protocol import (
     read_protocol_file,
     write_protocol_file,
 )
-from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.result import Measurement, Quantity
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.measurement.tools import tools_from_json
 from gelpolight_core.optics.camera import Camera
@@ -42,7 +42,7 @@ from gelpolight_core.optics.resampling import build_resampling_table
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import Records
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
@@ -206,8 +206,8 @@ def _records(folder: Path) -> tuple[bytes, ...]:
 
 def _use_records(path: Path) -> None:
     with Records.open(path, busy_s=0.1) as records:
-        for serial in records.sensors():
-            records.measurements(serial)
+        for record in records.measurements():
+            records.measurements(record.serial)
         records.measurements(removed=True)
         records.export_csv(path.with_name("out.csv"))
         records.update_note(1, "seen")
@@ -243,10 +243,12 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
     write_decisions(decided, folder)
     write_protocol_file(ProtocolFile(Protocol(repeats=1, regions=2), "A", "c"), folder)
     write_indenters(first_indenters()[:3], folder)
-    trial = Validation("c", "2026-01-02", "me", "ball", (Comparison("height", 1.0, 1.0, 8.0),))
+    trial = Validation(
+        "c", "2026-01-02", "me", "ball", (Quantity("height", 1.0, truth=1.0, limit_percent=8.0),)
+    )
     write_validation(trial, folder / "c.gplcal")
     good = Measurement("ball", 3.0, None, 1.0, (0.0, 1.0), None, 0.5, {"height_mm": 0.1}, None, 0.1,
-                       0.0, 0.01, 9.0, np.zeros((4, 2)), "ok", "")  # fmt: skip
+                       0.0, 0.01, 9.0, np.zeros((4, 2)))  # fmt: skip
     Ledger(folder / "ledger.jsonl", "c").keep("k", good)
 
     def held(name: str) -> bytes:

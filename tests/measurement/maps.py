@@ -36,6 +36,13 @@ def made(surface: Callable[[Array, Array], Array] | Array, **more: object) -> He
     )
 
 
+def on_grid(depth: Array, x: Array, y: Array, flags: NDArray[np.uint8] | None = None) -> HeightMap:
+    """Return the map of depths on any grid."""
+    flags = np.zeros(depth.shape, np.uint8) if flags is None else flags
+    pitch = float(x[1] - x[0])
+    return HeightMap(depth, x, y, pitch, None, flags, "T-1", "full", "made.png")
+
+
 def stated(count: int, sigma_mm: float, *, model_mm: float = 0.0) -> dict[str, object]:
     """Return noise that is even over blocks of four nodes, and what a map says of it."""
     shape = (Y.size, X.size)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene
+from matplotlib.figure import Figure
 from report_pdf import report_data, report_text
 
 from gelpolight_core.errors import InputError
@@ -21,18 +22,18 @@ from gelpolight_core.measurement.evaluation import (
     Evaluation,
     evaluate,
 )
-from gelpolight_core.measurement.evaluation_report import (
-    evaluation_figure,
-    evaluation_table,
-    write_evaluation,
-)
 from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.press import Press, read_truth
 from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.report.evaluation import evaluation_document, write_evaluation_files
+from gelpolight_core.report.evaluation import (
+    evaluation_document,
+    evaluation_table,
+    write_evaluation_files,
+)
+from gelpolight_core.report.evaluation_figure import paint_evaluation
 
 HEADER = "file,shape,diameter_mm,side_mm,height_mm\n"
 
@@ -55,8 +56,6 @@ def measurement(shape: str, size: float, height: float) -> Measurement:
         residual_rms_mm=0.003,
         correlated_pixels=1.0,
         outline_mm=np.zeros((1, 2)),
-        verdict="ok",
-        reason="",
     )
 
 
@@ -113,7 +112,7 @@ def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path: Path
     assert [r.file for r in evaluation.failed] == ["b"]
     assert "not measured: no object is pressed" in evaluation_table(evaluation)
     assert "1 of 2 presses could not be measured" in evaluation_table(evaluation)
-    write_evaluation(evaluation, tmp_path)
+    write_evaluation_files(evaluation, tmp_path)
     with (tmp_path / "evaluation.csv").open() as file:
         table = list(csv.DictReader(file))
     assert table[1]["verdict"] == "not measured"
@@ -123,7 +122,8 @@ def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path: Path
 
 
 def test_the_figure_shows_both_directions_the_series_and_the_papers_lines() -> None:
-    figure = evaluation_figure(paper_protocol())
+    figure = Figure(figsize=(11.0, 11.0))
+    paint_evaluation(figure, paper_protocol())
     titles = [axes.get_title() for axes in figure.axes]
     assert titles == [
         "planar direction, same region",

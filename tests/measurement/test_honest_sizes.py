@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from maps import on_grid
 from scipy.ndimage import gaussian_filter
 
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -32,7 +33,7 @@ def measured(
     # A reconstruction's errors hang together over the drape.
     mode = ModeError(0.0, 0.0, blur_mm2=blur_mm**2) if known else None
     x, y = surface.x_mm, surface.y_mm
-    return measure_object(depth, x, y, shape=shape, reach_mm=DECAY_MM, mode=mode)
+    return measure_object(on_grid(depth, x, y), shape=shape, reach_mm=DECAY_MM, mode=mode)
 
 
 def sizes(measurement: Measurement) -> list[tuple[float, float]]:

@@ -32,8 +32,6 @@ def measurement(height: float = 1.0 / 3.0) -> Measurement:
         residual_rms_mm=0.003,
         correlated_pixels=9.5,
         outline_mm=np.random.default_rng(0).standard_normal((5, 2)),
-        verdict="ok",
-        reason="",
         noise_sd=None,
         calibration_sd=spread,
     )

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from maps import on_grid
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.drape import ball_depth, cuboid_depth, cylinder_depth
 from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.measurement.result import Truth, compare
+from gelpolight_core.measurement.result import Truth
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,7 @@ def test_a_cylinder_anywhere_is_measured_without_its_drape(
     diameter: float, height: float, decay: float, x: float, y: float
 ) -> None:
     depth = pressed("cylinder", size=(diameter, 0.0), height=height, decay=decay, centre=(x, y))
-    measured = measure_object(noisy(depth, 1), X, Y, shape="cylinder")
+    measured = measure_object(on_grid(noisy(depth, 1), X, Y), shape="cylinder")
     assert measured.diameter_mm == pytest.approx(diameter, abs=max(5 * measured.size_sd_mm, 0.01))
     assert measured.height_mm == pytest.approx(height, abs=0.003)
     assert measured.centre_mm == pytest.approx((x, y), abs=0.005)
@@ -76,7 +77,7 @@ def test_a_cylinder_anywhere_is_measured_without_its_drape(
 @pytest.mark.parametrize("yaw", [-44.0, -10.0, 0.0, 30.0])
 def test_a_cuboid_is_measured_with_both_sides_and_its_yaw(yaw: float) -> None:
     depth = pressed("cuboid", size=(4.0, 6.0), yaw_deg=yaw)
-    measured = measure_object(noisy(depth, 2), X, Y, shape="cuboid")
+    measured = measure_object(on_grid(noisy(depth, 2), X, Y), shape="cuboid")
     assert measured.side_mm == pytest.approx((4.0, 6.0), abs=0.02)
     assert measured.yaw_deg == pytest.approx(yaw, abs=0.1)
     assert measured.verdict == "ok"
@@ -87,7 +88,7 @@ def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(
     diameter: float, height: float
 ) -> None:
     depth = pressed("ball", size=(diameter, 0.0), height=height)
-    measured = measure_object(noisy(depth, 3), X, Y, shape="ball")
+    measured = measure_object(on_grid(noisy(depth, 3), X, Y), shape="ball")
     assert measured.diameter_mm == pytest.approx(diameter, abs=5 * measured.size_sd_mm)
     assert measured.size_sd_mm < 0.01 * diameter
     assert measured.height_mm == pytest.approx(height, abs=0.005)
@@ -96,7 +97,7 @@ def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(
 @pytest.mark.parametrize("shape", ["cylinder", "cuboid", "ball"])
 def test_the_stated_sd_is_the_scatter_of_repeats(shape: str) -> None:
     depth = pressed(shape)
-    repeats = [measure_object(noisy(depth, seed), X, Y, shape=shape) for seed in range(12)]
+    repeats = [measure_object(on_grid(noisy(depth, seed), X, Y), shape=shape) for seed in range(12)]
     for values, stated in (
         ([m.size_mm if shape != "cuboid" else m.side_mm[0] for m in repeats], "size_sd_mm"),
         ([m.height_mm for m in repeats], "height"),
@@ -123,7 +124,7 @@ def test_a_real_reconstructions_errors_leave_the_sizes_usable(shape: str, seed: 
     x, y = np.meshgrid(X - 1.3, Y + 0.7)
     dome = 0.03 * np.clip(1.0 - (x**2 + y**2) / 2.5**2, 0.0, None)
     worse = gaussian_filter(depth + dome, 1.0) + 0.02 * ground / ground.std()
-    measured = measure_object(noisy(worse, seed), X, Y, shape=shape)
+    measured = measure_object(on_grid(noisy(worse, seed), X, Y), shape=shape)
     assert measured.size_mm == pytest.approx(5.0, rel=0.015)
     # The dome itself lifts the face by 1.5 % on average, the ground is off by 2 % of the height.
     assert measured.height_mm == pytest.approx(1.0, rel=0.05)
@@ -141,7 +142,7 @@ def test_flagged_and_missing_pixels_do_not_move_the_result() -> None:
     flags[np.hypot(x, y) > 7.0] = 1
     depth[flags == 1] = 9.0
     depth[::7, ::5] = np.nan
-    measured = measure_object(depth, X, Y, shape="cylinder", flags=flags)
+    measured = measure_object(on_grid(depth, X, Y, flags), shape="cylinder")
     assert measured.diameter_mm == pytest.approx(5.0, rel=0.01)
     assert measured.height_mm == pytest.approx(1.0, rel=0.01)
 
@@ -152,13 +153,13 @@ def test_the_object_under_the_seed_is_measured() -> None:
     )
     depth = noisy(both, 6)
     with pytest.raises(InputError, match=r"2 objects.*--seed"):
-        measure_object(depth, X, Y, shape="cylinder")
-    left = measure_object(depth, X, Y, shape="cylinder", seed_mm=(-4.0, 0.5))
-    right = measure_object(depth, X, Y, shape="cylinder", seed_mm=(4.5, 1.0))
+        measure_object(on_grid(depth, X, Y), shape="cylinder")
+    left = measure_object(on_grid(depth, X, Y), shape="cylinder", seed_mm=(-4.0, 0.5))
+    right = measure_object(on_grid(depth, X, Y), shape="cylinder", seed_mm=(4.5, 1.0))
     assert left.diameter_mm == pytest.approx(3.0, rel=0.01)
     assert right.diameter_mm == pytest.approx(4.0, rel=0.01)
     with pytest.raises(InputError, match="no object lies at the seed point"):
-        measure_object(depth, X, Y, shape="cylinder", seed_mm=(0.0, -6.0))
+        measure_object(on_grid(depth, X, Y), shape="cylinder", seed_mm=(0.0, -6.0))
 
 
 @pytest.mark.parametrize("pressed_shape", ["cylinder", "cuboid", "ball"])
@@ -166,7 +167,7 @@ def test_the_object_under_the_seed_is_measured() -> None:
 def test_the_wrong_shape_is_doubtful_and_the_right_one_named(
     pressed_shape: str, measured_shape: str
 ) -> None:
-    measured = measure_object(noisy(pressed(pressed_shape), 7), X, Y, shape=measured_shape)
+    measured = measure_object(on_grid(noisy(pressed(pressed_shape), 7), X, Y), shape=measured_shape)
     if pressed_shape == measured_shape:
         assert (measured.verdict, measured.reason) == ("ok", "")
     else:
@@ -177,25 +178,25 @@ def test_the_wrong_shape_is_doubtful_and_the_right_one_named(
 def test_a_membrane_without_an_object_is_refused() -> None:
     for depth in (np.zeros((Y.size, X.size)), noisy(np.zeros((Y.size, X.size)), 8)):
         with pytest.raises(InputError, match="no object is pressed"):
-            measure_object(depth, X, Y, shape="ball")
+            measure_object(on_grid(depth, X, Y), shape="ball")
     wavy = gaussian_filter(np.random.default_rng(1).standard_normal((Y.size, X.size)), 30.0)
     with pytest.raises(InputError, match="no object is pressed"):
-        measure_object(0.02 * wavy / wavy.std(), X, Y, shape="ball")
+        measure_object(on_grid(0.02 * wavy / wavy.std(), X, Y), shape="ball")
 
 
 def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful() -> None:
     cut = noisy(pressed("cylinder", centre=(9.0, 0.0)), 9)
     with pytest.raises(InputError, match="cut by the border"):
-        measure_object(cut, X, Y, shape="cylinder")
+        measure_object(on_grid(cut, X, Y), shape="cylinder")
     close = noisy(pressed("cylinder", centre=(6.8, 5.0)), 9)
-    measured = measure_object(close, X, Y, shape="cylinder")
+    measured = measure_object(on_grid(close, X, Y), shape="cylinder")
     assert measured.verdict == "doubtful"
     assert "of the drape" in measured.reason
 
 
 def test_json_holds_what_scripts_rely_on() -> None:
-    measured = measure_object(noisy(pressed("cuboid"), 10), X, Y, shape="cuboid")
-    plain = json.loads(json.dumps(measured.as_json(compare(measured, Truth("cuboid", 5.0, 1.0)))))
+    measured = measure_object(on_grid(noisy(pressed("cuboid"), 10), X, Y), shape="cuboid")
+    plain = json.loads(json.dumps(measured.as_json(Truth("cuboid", 5.0, 1.0))))
     assert set(plain["sd"]) == {"side_mm", "height_mm", "centre_mm", "yaw_deg", "drape_decay_mm"}
     assert len(plain["side_mm"]) == len(plain["sd"]["side_mm"]) == 2
     assert plain["truth"] == {"shape": "cuboid", "side_mm": 5.0, "height_mm": 1.0}
@@ -203,7 +204,9 @@ def test_json_holds_what_scripts_rely_on() -> None:
         100 * (np.mean(plain["side_mm"]) / 5.0 - 1)
     )
     assert plain["verdict"] == "ok"
-    round_one = measure_object(noisy(pressed("cylinder"), 10), X, Y, shape="cylinder").as_json()
+    round_one = measure_object(
+        on_grid(noisy(pressed("cylinder"), 10), X, Y), shape="cylinder"
+    ).as_json()
     assert "side_mm" not in round_one
     assert round_one["diameter_mm"] == pytest.approx(5.0, rel=0.01)
     assert round_one["truth"] is None
@@ -221,7 +224,7 @@ def test_true_depth_maps_give_the_true_sizes(shared_data: Path, sensor: str) -> 
             depth, pitch = file["depth_mm"], float(file["pitch_mm"])
             x = float(file["x0_mm"]) + pitch * np.arange(depth.shape[1])
             y = float(file["y0_mm"]) + pitch * np.arange(depth.shape[0])
-        measured = measure_object(depth, x, y, shape=row["shape"])
+        measured = measure_object(on_grid(depth, x, y), shape=row["shape"])
         size = float(row["diameter_mm"] or row["side_mm"])
         assert measured.size_mm == pytest.approx(size, rel=0.003), row["file"]
         assert measured.height_mm == pytest.approx(float(row["height_mm"]), rel=0.002), row["file"]

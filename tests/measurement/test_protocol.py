@@ -164,10 +164,10 @@ def test_a_run_that_is_killed_between_any_two_presses_loses_none(tmp_path: Path)
 @pytest.mark.parametrize(
     ("key", "other", "message"),
     [
-        ("repeats = 2", 'repeats = "two"', r"\[places\] repeats is not a whole number"),
+        ("repeats = 2", 'repeats = "two"', "repeats has the invalid value two"),
         ("seed = 0", "seed = -1", "seed is below zero"),
-        ("seed = 0", "seed = 0\nsneed = 1", "sneed is unknown"),
-        ("3.0,", '"wide",', r"\[objects\] sizes_mm is not a list of lengths"),
+        ("seed = 0", "seed = 0\nsneed = 1", "unknown entry sneed"),
+        ("3.0,", '"wide",', "sizes_mm.0 has the invalid value wide"),
         ("at_size_mm = 5.0", "", "at_size_mm is missing"),
     ],
 )

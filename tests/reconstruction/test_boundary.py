@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -138,7 +139,7 @@ def test_what_the_boundary_cuts_off_is_not_measured(x_mm: float, effort: str) ->
     press = scene(f"cylinder 12 at {x_mm:g}")
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
     with pytest.raises(InputError, match="cut by the border"):
-        measure_object(found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=found.flags)
+        measure_object(found, shape="cylinder")
 
 
 def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
@@ -146,9 +147,7 @@ def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
     paper = Reconstructor(sensor().calibration, model="paper")
     found = paper.depth(press.frame)
     assert fixed_boundary_note() in found.findings
-    measured = measure_object(
-        found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=found.flags
-    )
+    measured = measure_object(found, shape="cylinder")
     assert measured.verdict == "doubtful"
     central = sensor().pressed(Ball(4.0, DEPTH_MM), x_mm=1.0, samples=1)
     assert not paper.depth(central.frame).findings
@@ -160,9 +159,7 @@ def test_a_face_without_an_anchor_is_doubtful() -> None:
     found = Reconstructor(sensor().calibration).depth(press.frame)
 
     def verdict(flags: NDArray[np.uint8]) -> str:
-        return measure_object(
-            found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=flags
-        ).verdict
+        return measure_object(replace(found, flags=flags), shape="cylinder").verdict
 
     assert verdict(found.flags) == "ok"
     assert verdict(found.flags | np.uint8(Flag.UNANCHORED)) == "doubtful"

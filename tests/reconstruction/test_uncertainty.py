@@ -92,13 +92,7 @@ def repeats(
         stated,
         np.std([m.depth_mm for m in maps], axis=0, ddof=1),
         np.sqrt(0.5 * np.var(slopes, axis=0, ddof=1).sum(axis=-1)),
-        [
-            measure_object(
-                m.depth_mm, m.x_mm, m.y_mm, shape="cylinder", flags=m.flags, noise_mm=m.noise_mm,
-                depth_scale_sd=m.depth_scale_sd, lateral_scale_sd=m.lateral_scale_sd,
-            )
-            for m in maps
-        ],
+        [measure_object(m, shape="cylinder") for m in maps],
         np.hypot(x - item.x_mm, y - item.y_mm),
     )  # fmt: skip
 

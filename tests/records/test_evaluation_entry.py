@@ -29,8 +29,7 @@ def record(found: Evaluation) -> object:
         found,
         serial="A",
         calibration_id="A-1",
-        size_limit_percent=5.0,
-        height_limit_percent=8.0,
+        limits_percent=(5.0, 8.0),
         folder="run",
     )
 

@@ -14,8 +14,9 @@ from pathlib import Path
 import pytest
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.records import schema
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,7 +32,8 @@ ADD_FOR_EVER = """
 import sys
 import time
 from pathlib import Path
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import Records
 
 records = Records.open(Path(sys.argv[1]))

@@ -17,13 +17,14 @@ from hypothesis import strategies as st
 from report_pdf import report_data, report_text
 
 from app.command_line.main import MENDABLE, main
-from app.workspace.validation import Comparison, Validation, write_validation
+from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts
@@ -251,7 +252,7 @@ def test_the_command_states_the_validation_of_the_window(
 ) -> None:
     source = tmp_path / "c.gplcal"
     write_calibration(virtual_calibration, source)
-    lengths = (Comparison("height", measured_mm, 1.0, 8.0),)
+    lengths = (Quantity("height", measured_mm, truth=1.0, limit_percent=8.0),)
     identity = virtual_calibration.identity
     # As the Validation step of the wizard keeps it.
     write_validation(

@@ -32,10 +32,11 @@ from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.protocol import (
     read_protocol_file,
 )
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.reader import Recording, is_recording
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.decisions import read_decisions
 from gelpolight_core.session.images import read_image

@@ -19,10 +19,11 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import NameTakenError, write_atomically
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.file_hashes import KnownFiles

@@ -12,7 +12,7 @@ import scene
 from recorded import noisy
 
 from app.workspace.indenters import first_indenters, write_indenters
-from app.workspace.validation import Comparison, Validation, write_validation
+from app.workspace.validation import Validation, write_validation
 from app.workspace.workspace import Workspace
 from gelpolight_core.batch.results import FILE, FrameRow, keep_rows, write_summary
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
@@ -24,8 +24,9 @@ from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import write_csv
 from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report
@@ -38,7 +39,9 @@ from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.simulation.session import session_toml
 
 RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),))
-TRIAL = Validation("c", "2026-01-02", "me", "ball", (Comparison("height", 1.0, 1.0, 8.0),))
+TRIAL = Validation(
+    "c", "2026-01-02", "me", "ball", (Quantity("height", 1.0, truth=1.0, limit_percent=8.0),)
+)
 
 
 @dataclass(frozen=True)

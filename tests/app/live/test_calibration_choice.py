@@ -13,9 +13,10 @@ from pytestqt.qtbot import QtBot
 from app.context.context import AppContext
 from app.live.calibration_choice import CalibrationBox, CalibrationChoice
 from app.services.jobs import Job
-from app.workspace.validation import Comparison, Validation, write_validation
+from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.sensor_calibration import Calibration
 
 
@@ -102,7 +103,7 @@ def test_matching_is_the_newest_validated_one_and_never_one_that_failed(
     choice.use_what_fits("T-1", None)
     assert workspace.in_use == days[3]
     for day in (1, 2):
-        trial = (Comparison("height", 1.0, 1.0, 8.0),)
+        trial = (Quantity("height", 1.0, truth=1.0, limit_percent=8.0),)
         identity = read_summary(days[day]).identity
         write_validation(Validation(identity, "2026", "Ada", "cylinder", trial), days[day])
     choice.refresh()

@@ -11,7 +11,8 @@ from pytestqt.qtbot import QtBot
 from app.measure.error_plot import ErrorPlot
 from app.services.preferences import Limits
 from app.theme import theme
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 
 
 @pytest.fixture

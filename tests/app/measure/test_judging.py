@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from app.measure.judging import Stated, judge, record_of
 from app.services.preferences import Limits
+from gelpolight_core.finding import doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
@@ -34,8 +35,6 @@ FIT = Measurement(
     residual_rms_mm=0.001,
     correlated_pixels=10.0,
     outline_mm=np.zeros((3, 2)),
-    verdict="ok",
-    reason="",
 )
 PRESSED = ToolResult(
     Cylinder((0.0, 0.0)), (Measured(5.1, 0.02, "mm", "diameter"),), (), measurement=FIT
@@ -59,21 +58,18 @@ def _record(
 def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
     found = compare(FIT, Truth("cylinder", size, height))
     rows = judge(PRESSED, Stated(size, height), Limits())
-    assert [row.error_percent for row in rows] == [
-        found.size_error_percent,
-        found.height_error_percent,
-    ]
+    assert [row.error_percent for row in rows] == [length.error_percent for length in found]
     record = _record(PRESSED, Stated(size, height))
     assert [q.error_percent for q in record.quantities] == [row.error_percent for row in rows]
-    assert record.details["error_percent"] == found.error_percent
+    assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
 
 
 def test_only_what_is_known_is_judged() -> None:
     assert judge(PRESSED, Stated(), Limits()) == ()
     (row,) = judge(PRESSED, Stated(size_mm=5.0), Limits())
-    assert (row.quantity, row.limit_percent) == ("size", 5.0)
+    assert (row.name, row.limit_percent) == ("diameter_mm", 5.0)
     (row,) = judge(PRESSED, Stated(height_mm=1.0), Limits())
-    assert (row.quantity, row.limit_percent) == ("height", 8.0)
+    assert (row.name, row.limit_percent) == ("height_mm", 8.0)
     (row,) = judge(APART, Stated(size_mm=2.0), Limits())
     assert row.error_percent == pytest.approx(50.0)
     assert not row.passed
@@ -84,7 +80,7 @@ def test_the_verdict_follows_the_limits() -> None:
     assert _record(PRESSED, stated).verdict == PASSED
     strict = Limits(size_percent=1.0)
     assert _record(PRESSED, stated, strict).verdict == FAILED
-    doubtful = replace(PRESSED, verdict="doubtful", reason="cut")
+    doubtful = replace(PRESSED, findings=(doubt("cut", "cut"),))
     assert _record(doubtful, stated).verdict == DOUBTFUL
     assert _record(PRESSED, Stated()).verdict == UNJUDGED
 

@@ -6,7 +6,8 @@ from PySide6.QtWidgets import QApplication
 
 from app.measure.record_table import record_cells
 from app.theme.icons import icon
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 
 
 def test_an_evaluation_has_a_row_with_its_mean_errors(qapp: QApplication) -> None:

@@ -34,10 +34,11 @@ from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from app.workspace.gel_care import presses_text, write_presses
 from app.workspace.report import write_entry_report
-from app.workspace.validation import Comparison, Validation, write_validation
+from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME
 
 
@@ -156,7 +157,7 @@ def test_a_validated_calibration_is_marked(
     page.open_path(source)
     chosen = page.chosen()
     assert chosen is not None
-    passed = Comparison("height", 1.02, 1.0, 8.0)
+    passed = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
     identity = scene.calibration().identity
     write_validation(
         Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder 5 mm", (passed,)),

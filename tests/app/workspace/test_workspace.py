@@ -14,7 +14,6 @@ import scene
 
 from app.workspace.entries import read_entry
 from app.workspace.validation import (
-    Comparison,
     Validation,
     read_validation,
     validation_path,
@@ -25,10 +24,11 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.errors import InputError
-from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.records.entry import MeasurementRecord
 
-GOOD = Comparison("height", 1.02, 1.0, 8.0)
-BAD = Comparison("diameter", 5.6, 5.0, 5.0)
+GOOD = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
+BAD = Quantity("diameter", 5.6, truth=5.0, limit_percent=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def workspace(tmp_path: Path) -> Workspace:
     return Workspace(tmp_path / "workspace")
 
 
-def trial(path: Path, *comparisons: Comparison) -> Validation:
+def trial(path: Path, *comparisons: Quantity) -> Validation:
     return Validation(
         read_summary(path).identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", comparisons
     )
@@ -185,7 +185,7 @@ def test_a_validation_is_imported_with_its_calibration(
 
 @pytest.mark.parametrize("comparisons", [(BAD,), (GOOD, BAD), ()], ids=["bad", "one bad", "none"])
 def test_a_failed_or_empty_trial_does_not_validate(
-    workspace: Workspace, source: Path, comparisons: tuple[Comparison, ...]
+    workspace: Workspace, source: Path, comparisons: tuple[Quantity, ...]
 ) -> None:
     place = workspace.import_calibration(source)
     write_validation(trial(place, *comparisons), place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -17,12 +18,12 @@ from app.calibrate.closed_balls import Progress
 from app.calibrate.detection import as_image, read_raw
 from app.calibrate.setup_form import SetupForm
 from app.calibrate.setup_values import new_session
-from app.calibrate.validation import KnownObject
 from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.in_place_session import SETTLED
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.in_place.preset import preset_named
+from gelpolight_core.measurement.result import Truth
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import InPlace, SensorData, read_session
 
@@ -83,7 +84,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     technician.rest()
     assert report.is_file()
     wizard.go_to("validation")
-    step.form.show_known(KnownObject("ball", 2.0 * opened.ball_radius_mm(files[-1].name), None))
+    step.form.show_known(Truth("ball", 2.0 * opened.ball_radius_mm(files[-1].name), math.nan))
     step.import_press(files[-1])
     technician.until(step.form.keep.isEnabled)
     technician.click("validation.keep")

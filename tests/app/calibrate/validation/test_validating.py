@@ -15,9 +15,11 @@ from technician import Technician
 
 from app.calibrate import validation as validating
 from app.command_line.main import main
-from app.workspace.validation import Comparison, Validation, write_validation
+from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.finding import doubt
+from gelpolight_core.measurement.result import Quantity
 
 Made = Callable[[], Project]
 PRESS = "presses/cylinder_s5_d100.png"
@@ -81,7 +83,7 @@ def test_a_doubtful_trial_cannot_be_recorded(
     technician.until(panel.keep.isEnabled)
     assert step._trial is not None
     trial = step._trial[0]
-    unsure = replace(trial.measurement, verdict="doubtful", reason="cut by the border")
+    unsure = replace(trial.measurement, findings=(doubt("cut", "cut by the border"),))
     panel.show_trial(replace(trial, measurement=unsure))
     assert not panel.keep.isEnabled()
     assert panel.result.property("meaning") == "warn"
@@ -92,7 +94,10 @@ def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
     technician: Technician, computed_project: Made, tmp_path: Path
 ) -> None:
     path = save(technician, computed_project(), tmp_path / "workspace")
-    controller, passed = technician.wizard.model, Comparison("height", 1.0, 1.0, 8.0)
+    controller, passed = (
+        technician.wizard.model,
+        Quantity("height", 1.0, truth=1.0, limit_percent=8.0),
+    )
     for identity, state in (("another", "empty"), (read_summary(path).identity, "pass")):
         trial = Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (passed,))
         write_validation(trial, path)
@@ -112,7 +117,7 @@ def test_a_validated_calibration_that_is_not_in_use_can_be_put_into_use(
     path = save(technician, computed_project(), tmp_path / "workspace")
     step = technician.wizard.at("validation")
     context = step.context
-    passed = Comparison("height", 1.0, 1.0, 8.0)
+    passed = Quantity("height", 1.0, truth=1.0, limit_percent=8.0)
     identity = read_summary(path).identity
     write_validation(
         Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (passed,)), path

@@ -1,0 +1,15 @@
+"""One function says which of several findings is the worst."""
+
+from __future__ import annotations
+
+from gelpolight_core.finding import Finding, QualityTable, Verdict, doubt, reason_of, worst_of
+
+
+def test_the_worst_finding_is_the_first_one_with_the_worst_verdict() -> None:
+    fine, doubtful = Finding("a", "fine"), doubt("b", "cut by the border")
+    failed = Finding("c", "no light", verdict=Verdict.FAIL)
+    assert worst_of((fine, doubtful, failed, doubt("d", "dark"))) is failed
+    assert worst_of((fine, doubtful, doubt("d", "dark"))) is doubtful
+    assert worst_of(()) is None
+    assert QualityTable((fine, doubtful)).verdict is Verdict.WARN
+    assert reason_of((doubtful, failed)) == "cut by the border; no light"
