@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from gelpolight_core.errors import InputError
 from gelpolight_core.translation import joined, pattern, tr
 
 TINY = 1e-9
@@ -73,13 +74,20 @@ class Finding:
     @property
     def stated(self) -> str:
         """Text, value and unit."""
+        if math.isnan(self.value):
+            return self.text
         form = "{text}: {value:.3g} {unit}" if self.unit else "{text}: {value:.3g}"
         return pattern(form, text=self.text, value=self.value, unit=self.unit)
 
     @property
     def line(self) -> str:
         """Text and remedy as sentences."""
-        return ". ".join((self.text[:1].upper() + self.text[1:], self.remedy)).rstrip(". ") + "."
+        return _sentences(self.text, self.remedy)
+
+    @property
+    def sentence(self) -> str:
+        """Text with its value, and remedy, as sentences."""
+        return _sentences(self.stated, self.remedy)
 
     @property
     def meaningless(self) -> bool:
@@ -113,6 +121,16 @@ class Finding:
         if not limits:
             return False
         return (self.value <= limits[0]) != (self.verdict is Verdict.PASS)
+
+
+def _sentences(text: str, remedy: str) -> str:
+    text = (text[:1].upper() + text[1:]).rstrip(". ")
+    return ". ".join((text, remedy)).rstrip(". ") + "." if text or remedy else ""
+
+
+def refused(error: InputError) -> Finding:
+    """Return the finding of an error, without its `where` part."""
+    return Finding("refused", error.found, verdict=Verdict.FAIL, remedy=error.advice)
 
 
 def verdict_word(verdict: Verdict) -> str:
@@ -180,6 +198,12 @@ def judge(
     else:
         verdict = Verdict.WARN if beyond(warn) else Verdict.PASS
     return Finding(key, text, float(value), unit, warn, fail, verdict, remedy)
+
+
+def worst_of(findings: Iterable[Finding]) -> Finding | None:
+    """Return the first finding with the worst verdict; None if all pass."""
+    poor = [finding for finding in findings if finding.verdict is not Verdict.PASS]
+    return max(poor, key=lambda finding: _ORDER.index(finding.verdict), default=None)
 
 
 def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
