@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from app.measure.figures_text import unit_behind, unit_of
 from app.services.preferences import Limits
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.result import Measurement, Truth, compare
+from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.measurement.result import Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.records.entry import MeasurementRecord, Quantity, indenter_record, verdict_of
+from gelpolight_core.records.entry import MeasurementRecord, Quantity, verdict_of
 from gelpolight_core.translation import tr
 
 DEPTH_FIGURES = frozenset({"step_height", "height", "depth_difference", "mean_depth", "deepest"})
@@ -35,97 +37,86 @@ class Stated:
     name: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """One figure with its true value.
-
-    Attributes
-    ----------
-    quantity : str
-        ``size``, ``height`` or the figure's name.
-    label, unit : str
-        Text for the user.
-    measured, true : float
-        In `unit`.
-    error_percent : float
-        Signed, relative to the true value.
-    limit_percent : float
-        Maximum error to pass.
-    """
-
-    quantity: str
-    label: str
-    unit: str
-    measured: float
-    true: float
-    error_percent: float
-    limit_percent: float
-
-    @property
-    def error(self) -> float:
-        """Measured minus true value, in `unit`."""
-        return self.measured - self.true
-
-    @property
-    def passed(self) -> bool:
-        """Whether the error is within the limit. False for values that are not finite."""
-        return abs(self.error_percent) <= self.limit_percent
-
-
-def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Judged, ...]:
-    """Compare a result with its true values.
-
-    Returns
-    -------
-    tuple of Judged
-        Empty if no true value is given.
+def quantities_of(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Quantity, ...]:
+    """Return the measured values of a result, with their true values where they are known.
 
     Raises
     ------
     InputError
         If a given length is not greater than zero.
     """
-    if result.measurement is not None:
-        return _judge_indenter(result.measurement, stated, limits)
+    fit = result.measurement
+    if fit is not None:
+        size_name = "diameter_mm" if fit.side_mm is None else "side_mm"
+        sds = (fit.size_sd_mm, fit.sd.get("height_mm"))
+        size_sd_mm, height_sd_mm = (x if x is not None and math.isfinite(x) else None for x in sds)
+        return (
+            Quantity(
+                size_name, fit.size_mm, size_sd_mm, _checked(stated.size_mm), limits.size_percent
+            ),
+            Quantity(
+                "height_mm",
+                fit.height_mm,
+                height_sd_mm,
+                _checked(stated.height_mm),
+                limits.height_percent,
+            ),
+        )
+    first, *others = (Quantity(f"{f.name}_{f.unit}", f.value, f.sd) for f in result.figures)
     if stated.size_mm is None:
-        return ()
-    figure = result.figures[0]
-    true = stated.size_mm
-    if not (math.isfinite(true) and true > 0.0):
+        return (first, *others)
+    # The sign of a step only depends on the order of the clicks.
+    in_depth = result.figures[0].name in DEPTH_FIGURES
+    value = abs(first.value) if in_depth else first.value
+    limit = limits.height_percent if in_depth else limits.size_percent
+    first = replace(first, value=value, truth=_checked(stated.size_mm), limit_percent=limit)
+    return (first, *others)
+
+
+def _checked(true: float | None) -> float | None:
+    if true is not None and not (math.isfinite(true) and true > 0.0):
         raise InputError(
             tr("The true value is {value}").format(value=true),
             where=tr("True value"),
             advice=tr("Enter a value greater than zero"),
         )
-    # The sign of a step only depends on the order of the clicks.
-    measured = abs(figure.value) if figure.name in DEPTH_FIGURES else figure.value
-    in_depth = figure.name in DEPTH_FIGURES
-    limit = limits.height_percent if in_depth else limits.size_percent
-    error = 100.0 * (measured / true - 1.0)
-    return (Judged(figure.name, figure.label, figure.unit, measured, true, error, limit),)
+    return true
 
 
-def _judge_indenter(fit: Measurement, stated: Stated, limits: Limits) -> tuple[Judged, ...]:
-    if stated.size_mm is None and stated.height_mm is None:
-        return ()
-    # For unknown values the measured ones are used, and they are not reported.
-    size = fit.size_mm if stated.size_mm is None else stated.size_mm
-    height = fit.height_mm if stated.height_mm is None else stated.height_mm
-    found = compare(fit, Truth(fit.shape, size, height))
-    rows = []
-    if stated.size_mm is not None:
-        label = tr("mean side") if fit.shape == "cuboid" else tr("diameter")
-        error, limit = found.size_error_percent, limits.size_percent
-        rows.append(Judged("size", label, "mm", fit.size_mm, size, error, limit))
-    if stated.height_mm is not None:
-        error, limit = found.height_error_percent, limits.height_percent
-        rows.append(Judged("height", tr("depth"), "mm", fit.height_mm, height, error, limit))
-    return tuple(rows)
+def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Finding, ...]:
+    """Compare a result with its true values.
+
+    Returns
+    -------
+    tuple of Finding
+        The error of every value whose true value is known, in percent.
+
+    Raises
+    ------
+    InputError
+        If a given length is not greater than zero.
+    """
+    fit = result.measurement
+    if fit is None:
+        labels = [figure.label for figure in result.figures]
+    else:
+        labels = [tr("mean side") if fit.shape == "cuboid" else tr("diameter"), tr("depth")]
+    return tuple(
+        Finding(
+            quantity.name,
+            f"{label}: {quantity.error:+.3f}{unit_behind(unit_of(quantity.name))}",
+            quantity.error_percent,
+            "%",
+            fail_limit=quantity.limit_percent,
+            verdict=Verdict.PASS if quantity.passed else Verdict.FAIL,
+        )
+        for label, quantity in zip(labels, quantities_of(result, stated, limits), strict=True)
+        if quantity.error_percent is not None
+    )
 
 
 def record_of(
     result: ToolResult,
-    judged: tuple[Judged, ...],
     stated: Stated,
     heightmap: HeightMap,
     *,
@@ -140,8 +131,6 @@ def record_of(
     ----------
     result : ToolResult
         Result of a tool.
-    judged : tuple of Judged
-        Comparison with the true values. Empty if there are none.
     stated : Stated
         The true values as entered.
     heightmap : HeightMap
@@ -153,48 +142,28 @@ def record_of(
     operator, note : str
         Operator, and their note.
     """
-    fit = result.measurement
-    context = {
-        "serial": serial,
-        "calibration_id": heightmap.calibration_id,
-        "operator": operator,
-        "picture": heightmap.source,
-        "note": note,
-    }
+    fit, size_mm, height_mm = result.measurement, stated.size_mm, stated.height_mm
+    quantities = quantities_of(result, stated, limits)
     if fit is None:
-        record = MeasurementRecord(
-            shape=result.tool.name.replace("-", "_"),
-            quantities=tuple(
-                Quantity(f"{figure.name}_{figure.unit}", figure.value, figure.sd)
-                for figure in result.figures
-            ),
-            reason=result.reason,
-            details=result_as_dict(result),
-            **context,
-        )
+        shape, details = result.tool.name.replace("-", "_"), result_as_dict(result)
+    elif size_mm is None or height_mm is None:
+        shape, details = fit.shape, fit.as_json()
     else:
-        comparison = None
-        if stated.size_mm is not None and stated.height_mm is not None:
-            comparison = compare(fit, Truth(fit.shape, stated.size_mm, stated.height_mm))
-        record = indenter_record(
-            fit,
-            comparison,
-            size_limit_percent=limits.size_percent,
-            height_limit_percent=limits.height_percent,
-            **context,
-        )
-    quantities = list(record.quantities)
-    for row in judged:  # size first, then depth
-        index = 1 if row.quantity == "height" and fit is not None else 0
-        quantities[index] = replace(
-            quantities[index], value=row.measured, truth=row.true, limit_percent=row.limit_percent
-        )
+        shape = fit.shape
+        details = fit.as_json(compare(fit, Truth(shape, size_mm, height_mm)))
     settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
     if stated.name:
         settings["indenter"] = stated.name
-    return replace(
-        record,
-        quantities=tuple(quantities),
-        verdict=verdict_of(tuple(quantities), doubtful=result.verdict != "ok"),
+    return MeasurementRecord(
+        serial=serial,
+        calibration_id=heightmap.calibration_id,
+        shape=shape,
+        quantities=quantities,
+        verdict=verdict_of(quantities, doubtful=result.verdict != "ok"),
+        reason=result.reason,
         settings=settings,
+        details=details,
+        operator=operator,
+        picture=heightmap.source,
+        note=note,
     )

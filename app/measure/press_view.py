@@ -11,7 +11,7 @@ from app.context.context import AppContext
 from app.live.frame_results import Shown, Wanted
 from app.live.zero import ZeroControl
 from app.measure.advice import measuring_advice
-from app.measure.judging import Judged, judge, record_of
+from app.measure.judging import judge, record_of
 from app.measure.measuring import MeasuredImage
 from app.measure.press_view_frame import PressViewFrame
 from app.measure.steady import SteadyPress
@@ -239,7 +239,6 @@ class PressView(PressViewFrame):
             return
         record = record_of(
             result,
-            self.judged(),
             self.panel.truth.stated,
             heightmap,
             limits=self.context.settings.limits,
@@ -249,21 +248,16 @@ class PressView(PressViewFrame):
         )
         self.kept.emit(record)
 
-    def judged(self) -> tuple[Judged, ...]:
-        """Return the comparison of the chosen tool's result with the true values."""
-        result = self.work.result
-        if result is None:
-            return ()
-        return judge(result, self.panel.truth.stated, self.context.settings.limits)
-
     def judge_again(self) -> None:
         """Compare with the true values again after they, the result or the limits changed."""
-        try:
-            rows = self.judged()
-        except InputError as error:
-            self.panel.truth.show_refusal(str(error))
+        truth, result = self.panel.truth, self.work.result
+        if result is None:
+            truth.say("")
             return
-        self.panel.truth.show_verdict(rows, self.work.result)
+        try:
+            truth.show_verdict(judge(result, truth.stated, self.context.settings.limits))
+        except InputError as error:
+            truth.say(str(error), "fail")
 
     def _refresh(self) -> None:
         can_freeze = self._shown is not None

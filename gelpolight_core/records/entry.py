@@ -8,10 +8,6 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-import numpy as np
-
-from gelpolight_core.measurement.result import Comparison, Measurement
-
 PASSED, FAILED, DOUBTFUL, UNJUDGED = "pass", "fail", "doubtful", ""
 
 
@@ -136,65 +132,3 @@ def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool = False) -> str
     if not judged:
         return UNJUDGED
     return PASSED if all(judged) else FAILED
-
-
-def indenter_record(
-    measurement: Measurement,
-    comparison: Comparison | None = None,
-    *,
-    serial: str,
-    calibration_id: str,
-    size_limit_percent: float,
-    height_limit_percent: float,
-    operator: str = "",
-    picture: str = "",
-    note: str = "",
-) -> MeasurementRecord:
-    """Return the record of a fitted indenter.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        The fit; for a cuboid the mean side is stored as ``side_mm``, because its error is judged by
-        it.
-    comparison : Comparison, optional
-        Comparison with the truth, if known.
-    serial, calibration_id, operator, picture, note
-        As in :class:`MeasurementRecord`.
-    size_limit_percent, height_limit_percent : float
-        Largest errors that pass.
-    """
-    truth = None if comparison is None else comparison.truth
-    size_name = "diameter_mm" if measurement.side_mm is None else "side_mm"
-    quantities = (
-        Quantity(
-            size_name,
-            measurement.size_mm,
-            _finite(measurement.size_sd_mm),
-            None if truth is None else truth.size_mm,
-            size_limit_percent,
-        ),
-        Quantity(
-            "height_mm",
-            measurement.height_mm,
-            _finite(measurement.sd.get("height_mm")),
-            None if truth is None else truth.height_mm,
-            height_limit_percent,
-        ),
-    )
-    return MeasurementRecord(
-        serial=serial,
-        calibration_id=calibration_id,
-        shape=measurement.shape,
-        quantities=quantities,
-        verdict=verdict_of(quantities, doubtful=measurement.verdict != "ok"),
-        reason=measurement.reason,
-        details=measurement.as_json(comparison),
-        operator=operator,
-        picture=picture,
-        note=note,
-    )
-
-
-def _finite(value: Any) -> float | None:
-    return None if value is None or not np.isfinite(value) else float(value)
