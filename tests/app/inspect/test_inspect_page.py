@@ -265,7 +265,7 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     context.settings.prefer(recording_limit_gb=1e-6)  # it stops by itself
     qtbot.waitUntil(lambda: not page.recorder.busy, timeout=4 * WAIT_MS)
     assert page.recorder.action.text() == "Record"
-    assert any("size limit" in notice.text for notice in context.toasts.history)
+    assert any("size limit" in message.finding.text for message in context.toasts.history)
     (path,) = context.workspace.folder.glob("sensors/*/recordings/*.gplrec")
     page.open_path(path)
     _wait_for_depth(page, qtbot)
