@@ -259,33 +259,20 @@ def worst_verdict(quality: Mapping[str, QualityTable]) -> Verdict:
     return joined_tables(quality.values()).verdict
 
 
-def failure(quality: Mapping[str, QualityTable]) -> str:
-    """Return which figures of a calibration failed, as a clause; empty where none did.
+def calibration_fault(quality: Mapping[str, QualityTable]) -> Finding | None:
+    """Return the finding of every height map of a calibration that failed; None if it did not.
+
+    A calibration with warnings is within the limits in which its stated uncertainties hold.
 
     Parameters
     ----------
     quality : mapping of str to QualityTable
         Of every stage.
     """
-    failed = [
-        figure.stated
-        for table in quality.values()
-        for figure in table.figures
-        if figure.verdict is Verdict.FAIL
-    ]
+    figures = joined_tables(quality.values()).figures
+    failed = [figure.stated for figure in figures if figure.verdict is Verdict.FAIL]
     if not failed:
-        return ""
-    return tr("the calibration failed its quality check ({figures})").format(
-        figures=joined(", ", failed)
-    )
-
-
-def failed_calibration(quality: Mapping[str, QualityTable]) -> tuple[Finding, ...]:
-    """Return the finding of every height map of a calibration that failed; none if it did not.
-
-    A calibration with warnings is within the limits in which its stated uncertainties hold.
-    """
-    text = failure(quality)
-    if not text:
-        return ()
-    return (Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL),)
+        return None
+    text = tr("the calibration failed its quality check ({figures})")
+    text = text.format(figures=joined(", ", failed))
+    return Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL)

@@ -417,17 +417,17 @@ def judge_ball(name: str, project: Project) -> Finding | None:
     press = ball.press
     error_percent = 100.0 * press.shading_misfit
     found = Finding("shading_error_percent", tr("Shading error"), error_percent, "%")
-    if odd := _disagreement(press, project):
-        return replace(found, verdict=Verdict.FAIL, remedy=odd)
+    if (odd := _disagreement(press, project)) is not None:
+        return replace(found, verdict=Verdict.FAIL, remedy=odd.line)
     worst = worst_of(press.quality.figures)
     return found if worst is None else replace(found, verdict=worst.verdict, remedy=worst.remedy)
 
 
-def _disagreement(press: BallPress, project: Project) -> str:
+def _disagreement(press: BallPress, project: Project) -> Finding | None:
     """Return why a press disagrees with the others, if it was compared with its present radius."""
     compared = project.results.get(REFLECTANCE)
     for agreement in () if compared is None else compared.table.agreements:
         same = agreement.stated_radius_mm == press.pose.radius_mm
         if agreement.name == press.name and same:
             return agreement.fault
-    return ""
+    return None

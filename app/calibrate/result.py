@@ -39,7 +39,8 @@ from app.widgets.sign import Sign
 from app.workspace.report import stated_validation
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.finding import QualityTable
+from gelpolight_core.causes import with_one_cause
+from gelpolight_core.finding import Finding, QualityTable
 from gelpolight_core.session.missing import OPEN_STAGES
 from gelpolight_core.translation import tr
 
@@ -64,6 +65,8 @@ class ResultView(QWidget):
         self._name = ""
         self.headline = named(PlainLabel(wrap=True), "result.headline", tr("Verdict"))
         make_bold(self.headline, size=1.2)
+        self.cause = named(PlainLabel(wrap=True), "result.cause", tr("Most likely cause"))
+        make_bold(self.cause)
         inside = QWidget()
         rows = vbox(of=inside)
         for step in steps:
@@ -84,7 +87,14 @@ class ResultView(QWidget):
             button.setMinimumHeight(38)
         self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        vbox(self.headline, (scroll, 1), hbox(self.save, self.report), self.saved, of=self)
+        vbox(
+            self.headline,
+            self.cause,
+            (scroll, 1),
+            hbox(self.save, self.report),
+            self.saved,
+            of=self,
+        )
 
     def show_saved(self, sentence: str, role: str = "pass") -> None:
         """Show where the calibration or its report was saved, or why it was not."""
@@ -115,8 +125,14 @@ class ResultView(QWidget):
         if self._name and not saved:
             self.show_saved("")  # what was saved is no longer what the captures give
         self._name = saved
+        cause, tables = with_one_cause({stage: statuses[stage].quality for stage in self._rows})
+        self.cause.setText(f"{cause}." if cause else "")
+        self.cause.setVisible(bool(cause))
         for stage, row in self._rows.items():
-            row.show_state(*states[row.step.key], statuses[stage].quality)
+            state, sentence = states[row.step.key]
+            # The cause is shown once, above all stages.
+            sentence = sentence.removeprefix(f"{cause}.").strip() if cause else sentence
+            row.show_state(state, sentence, tables[stage])
         done = all(is_done(statuses[stage].state.value) for stage in self._rows)
         failed = [row.step.title for s, row in self._rows.items() if statuses[s].state is FAIL]
         made = all(
@@ -219,7 +235,7 @@ class _StageRow(QWidget):
         self._word.setText(state_word(state).capitalize())
         show_meaning(self._word, state_meaning(state))
         self._sentence.setText(sentence)
-        self._sentence.setVisible(state != StageState.PASS.value)
+        self._sentence.setVisible(bool(sentence) and state != StageState.PASS.value)
         self.table.set_table(quality)
         self.more.setVisible(bool(quality.figures))
 
@@ -247,7 +263,7 @@ class Saving(QObject):
         """Write the calibration into the library, and use it from now on unless it failed."""
         project, workspace = self._model.project, self._context.workspace
 
-        def work(_progress: object) -> tuple[Path, str]:
+        def work(_progress: object) -> tuple[Path, Finding | None]:
             calibration = project.finish().calibration
             name = f"{calibration.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
             path = workspace.keep_calibration(calibration, name)
@@ -255,12 +271,14 @@ class Saving(QObject):
                 workspace.use(path)
             return path, calibration.fault
 
-        def done(saved: tuple[Path, str]) -> None:
+        def done(saved: tuple[Path, Finding | None]) -> None:
             path, fault = saved
-            text = tr("Saved as {path} and now in use. Validate it next.")
-            if fault:
+            if fault is None:
+                text = tr("Saved as {path} and now in use. Validate it next.").format(path=path)
+            else:
                 text = tr("Saved as a draft, {path}, and not in use: {fault}.")
-            self._view.show_saved(text.format(path=path, fault=fault), "fail" if fault else "pass")
+                text = text.format(path=path, fault=fault.text)
+            self._view.show_saved(text, "pass" if fault is None else "fail")
             self._context.requests.calibrations_changed.emit()
             self._model.saved_as.emit(str(path))
 

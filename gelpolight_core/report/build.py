@@ -15,6 +15,7 @@ from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, RADIANCE, TOP_
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.recipes import JOINT, stage_title
 from gelpolight_core.calibration.scatter import gather_scatter
+from gelpolight_core.causes import with_one_cause
 from gelpolight_core.finding import Verdict
 from gelpolight_core.in_place.calibrate import InPlaceResult
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
@@ -145,22 +146,24 @@ def _refined_leds(c: OpenSensor) -> tuple[Listing, ...]:
 def _assemble(c: Calibration, parts: Mapping[str, Parts], validation: Validation | None) -> Report:
     facts = stage_facts(c)
     validation = validation or _not_validated()
+    cause, quality = with_one_cause(c.quality)
     sections = tuple(
         Section(
             key,
             stage_title(key),
             stage_intro(key),
-            quality,
+            table,
             facts.get(key, ()),
             *parts.get(key, ((), ())),
         )
-        for key, quality in c.quality.items()
+        for key, table in quality.items()
     )
     sources = tuple(sorted(c.provenance.sources.items()))
     return Report(
         title=tr("Calibration of sensor {serial}").format(serial=c.serial),
         verdict=Verdict.FAIL if validation.verdict is Verdict.FAIL else c.verdict,
         sections=sections,
+        cause=cause,
         facts=head_facts(c),
         validation=validation,
         listings=(Listing(tr("Source files"), (tr("file"), "SHA-256"), sources),),
