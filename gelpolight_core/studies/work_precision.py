@@ -27,6 +27,7 @@ from gelpolight_core.measurement.score import (
     scored_radius_mm,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.modes import MODES, MODES_OF, PAPER, Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
@@ -83,14 +84,9 @@ class Point:
     size_percent: float
 
 
-def modes() -> dict[str, tuple[str, str, str]]:
-    """Return model, effort and label of each mode, by its name."""
-    return {
-        "paper": ("paper", "best", tr("paper's model")),
-        "fast": ("full", "fast", tr("full model, {effort}").format(effort="fast")),
-        "balanced": ("full", "balanced", tr("full model, {effort}").format(effort="balanced")),
-        "best": ("full", "best", tr("full model, {effort}").format(effort="best")),
-    }
+def modes() -> dict[str, Mode]:
+    """Return each mode by its name: the model's, or the effort of the full model."""
+    return {PAPER: MODES[-1], **{mode.effort: mode for mode in MODES[:-1]}}
 
 
 def measure_virtual(
@@ -188,9 +184,9 @@ def measure_session(
             advice=tr("Use a session that contains such presses and their true depth"),
         )
     solvers = {
-        name: Reconstructor(calibration, model=model, effort=effort)
-        for name, (model, effort, _) in modes().items()
-        if model == "paper" or calibration.open_sensor.full is not None
+        name: Reconstructor(calibration, model=mode.model, effort=mode.effort)
+        for name, mode in modes().items()
+        if mode in MODES_OF[calibration.model]
     }
     radius_mm = scored_radius_mm(calibration.open_sensor.sensor)
     times_ms: dict[str, list[float]] = {name: [] for name in solvers}
@@ -212,7 +208,7 @@ def measure_session(
     for name in solvers:
         median, p95 = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
         means = np.abs(errors[name]).mean(axis=0).tolist()
-        label, width = modes()[name][2], calibration.camera.width
+        label, width = modes()[name].label, calibration.camera.width
         sensor, pitch_mm = calibration.serial, calibration.table.grid.pitch_mm
         points.append(Point(sensor, name, label, width, pitch_mm, len(rows), median, p95, *means))
     return tuple(points)
