@@ -79,7 +79,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert read_calibration(path).model == "in-place"
     step = wizard.at("validation")
     report = tmp_path / "report.pdf"
-    wizard.open.saving.write_report(report)
+    wizard.open.write_report(report)
     technician.rest()
     assert report.is_file()
     wizard.go_to("validation")
