@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
@@ -107,3 +107,30 @@ def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]
     if not likely or (len(likely) > 1 and likely[0][0] == likely[1][0]):
         return "", frozenset()
     return likely[0][1].remedy, likely[0][1].moves
+
+
+def with_one_cause(quality: Mapping[str, QualityTable]) -> tuple[str, dict[str, QualityTable]]:
+    """Return the most likely cause of a calibration's findings, to be shown before them.
+
+    Parameters
+    ----------
+    quality : mapping of str to QualityTable
+        Of every stage.
+
+    Returns
+    -------
+    cause : str
+        As a sentence without a full stop; empty if there is none.
+    quality : dict of str to QualityTable
+        The tables; findings that follow from the cause have no remedy of their own.
+    """
+    remedy, follow = explained(quality)
+    if not remedy:
+        return "", dict(quality)
+    tables = {
+        stage: QualityTable(
+            tuple(replace(f, remedy="") if f.key in follow else f for f in table.figures)
+        )
+        for stage, table in quality.items()
+    }
+    return tr("Most likely cause: {remedy}").format(remedy=remedy), tables

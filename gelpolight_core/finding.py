@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from gelpolight_core.errors import InputError
 from gelpolight_core.translation import joined, pattern, tr
 
 TINY = 1e-9
@@ -73,13 +74,20 @@ class Finding:
     @property
     def stated(self) -> str:
         """Text, value and unit."""
+        if math.isnan(self.value):
+            return self.text
         form = "{text}: {value:.3g} {unit}" if self.unit else "{text}: {value:.3g}"
         return pattern(form, text=self.text, value=self.value, unit=self.unit)
 
     @property
     def line(self) -> str:
         """Text and remedy as sentences."""
-        return ". ".join((self.text[:1].upper() + self.text[1:], self.remedy)).rstrip(". ") + "."
+        return _sentences(self.text, self.remedy)
+
+    @property
+    def sentence(self) -> str:
+        """Text with its value, and remedy, as sentences."""
+        return _sentences(self.stated, self.remedy)
 
     @property
     def meaningless(self) -> bool:
@@ -120,14 +128,19 @@ def doubt(key: str, text: str) -> Finding:
     return Finding(key, text, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
 
 
-def worst_of(findings: Iterable[Finding]) -> Finding | None:
-    """Return the first finding with the worst verdict; None if there are none."""
-    return max(findings, key=lambda finding: _ORDER.index(finding.verdict), default=None)
-
-
 def reason_of(findings: Iterable[Finding]) -> str:
     """Return why something is doubtful: the texts of all findings; empty if there are none."""
     return joined("; ", (finding.text for finding in findings))
+
+
+def _sentences(text: str, remedy: str) -> str:
+    text = (text[:1].upper() + text[1:]).rstrip(". ")
+    return ". ".join((text, remedy)).rstrip(". ") + "." if text or remedy else ""
+
+
+def refused(error: InputError) -> Finding:
+    """Return the finding of an error, without its `where` part."""
+    return Finding("refused", error.found, verdict=Verdict.FAIL, remedy=error.advice)
 
 
 def verdict_word(verdict: Verdict) -> str:
@@ -197,6 +210,12 @@ def judge(
     return Finding(key, text, float(value), unit, warn, fail, verdict, remedy)
 
 
+def worst_of(findings: Iterable[Finding]) -> Finding | None:
+    """Return the first finding with the worst verdict; None if all pass."""
+    poor = [finding for finding in findings if finding.verdict is not Verdict.PASS]
+    return max(poor, key=lambda finding: _ORDER.index(finding.verdict), default=None)
+
+
 def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:
     """Judge how many images were left out.
 
@@ -251,33 +270,20 @@ def worst_verdict(quality: Mapping[str, QualityTable]) -> Verdict:
     return joined_tables(quality.values()).verdict
 
 
-def failure(quality: Mapping[str, QualityTable]) -> str:
-    """Return which figures of a calibration failed, as a clause; empty where none did.
+def calibration_fault(quality: Mapping[str, QualityTable]) -> Finding | None:
+    """Return the finding of every height map of a calibration that failed; None if it did not.
+
+    A calibration with warnings is within the limits in which its stated uncertainties hold.
 
     Parameters
     ----------
     quality : mapping of str to QualityTable
         Of every stage.
     """
-    failed = [
-        figure.stated
-        for table in quality.values()
-        for figure in table.figures
-        if figure.verdict is Verdict.FAIL
-    ]
+    figures = joined_tables(quality.values()).figures
+    failed = [figure.stated for figure in figures if figure.verdict is Verdict.FAIL]
     if not failed:
-        return ""
-    return tr("the calibration failed its quality check ({figures})").format(
-        figures=joined(", ", failed)
-    )
-
-
-def failed_calibration(quality: Mapping[str, QualityTable]) -> tuple[Finding, ...]:
-    """Return the finding of every height map of a calibration that failed; none if it did not.
-
-    A calibration with warnings is within the limits in which its stated uncertainties hold.
-    """
-    text = failure(quality)
-    if not text:
-        return ()
-    return (Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL),)
+        return None
+    text = tr("the calibration failed its quality check ({figures})")
+    text = text.format(figures=joined(", ", failed))
+    return Finding("calibration", text, verdict=Verdict.FAIL, heights=Heights.DOUBTFUL)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
-from gelpolight_core.finding import QualityTable, Verdict, failure, worst_verdict
+from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, worst_verdict
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.lights.crosstalk import unmix
@@ -572,12 +572,12 @@ class Calibration:
         return worst_verdict(self.quality)
 
     @property
-    def fault(self) -> str:
-        """Why no measurement with it is reliable, as a clause; empty if it did not fail.
+    def fault(self) -> Finding | None:
+        """Why no measurement with it is reliable; None if it did not fail.
 
         A calibration with warnings is within the limits in which its stated uncertainties hold.
         """
-        return failure(self.quality)
+        return calibration_fault(self.quality)
 
 
 def sensor_stack(sensor: SensorData, plane: TopPlane) -> LayerStack:

@@ -16,6 +16,7 @@ from app.live.overlay import Overlay
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.finding import Verdict
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.translation import tr
 
@@ -47,7 +48,9 @@ def detect_background(
             lines=circle.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
         )
         result = judged(marks, found.quality.figures, good)
-        return result if compared else replace(result, warns=True)
+        if result.good and not compared:  # nothing shows whether something touches it
+            return replace(result, finding=replace(result.finding, verdict=Verdict.WARN))
+        return result
 
     return or_refusal(detect, marks=circle)
 

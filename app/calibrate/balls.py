@@ -20,10 +20,9 @@ from app.calibrate.detection import (
     judged,
     or_refusal,
     refuse_size,
-    sentence_of,
     too_early,
 )
-from app.calibrate.image_step import WAITING, ImageStep, Judgement
+from app.calibrate.image_step import ImageStep
 from app.calibrate.marks import ball_contour, ball_handle, working_circle
 from app.calibrate.step import Parts
 from app.calibrate.step_data import step_of
@@ -38,6 +37,7 @@ from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS, TOP_POSE
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.finding import Finding, Verdict, refused, worst_of
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.resampling import ResamplingTable, seen_at
 from gelpolight_core.reflectance.press import BallPress, find_ball
@@ -129,7 +129,7 @@ def detect_ball(
         )
         good = tr("Ball found: contact radius {c:.2f} mm, depth {d:.2f} mm.")
         text = good.format(c=press.contact_radius_mm, d=press.pose.depth_mm)
-        return judged(marks, press.quality.figures, text, press)
+        return judged(marks, press.quality.figures, text)
 
     return or_refusal(detect, marks=Overlay(markers=press_marks(done, there), lines=(circle,)))
 
@@ -175,7 +175,7 @@ def placed_ball(_rgb: Rgb, *, circle: PlacedCircle, marks: Overlay) -> Detection
     """Show a contact that was placed by hand."""
     mark = Circle(circle.u_px, circle.v_px, circle.radius_px, "good", handle="ball")
     marks = replace(marks, circles=(mark,))
-    return Detection(marks, tr("The contact was placed by hand."), True)
+    return Detection(marks, Finding("placed", tr("The contact was placed by hand.")))
 
 
 def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
@@ -187,7 +187,8 @@ def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
     circle = Circle(columns / 2.0, rows / 2.0, FIRST_RADIUS * rows, "bad", handle="ball")
     marks = replace(found.overlay, circles=(circle,))
     by_hand = tr("Exclude the image, or drag the circle onto the edge of the contact.")
-    return replace(found, overlay=marks, sentence=f"{found.sentence} {by_hand}")
+    remedy = f"{found.finding.remedy}. {by_hand}"
+    return Detection(marks, replace(found.finding, remedy=remedy))
 
 
 class RadiusRow(QWidget):
@@ -284,14 +285,15 @@ class BallsStep(ImageStep):
         """Return the radius of the shown or of the next press."""
         return (self.radius.radius_mm,)
 
-    def judge(self, path: Path) -> Judgement:
+    def judge(self, path: Path) -> Finding | None:
         """Return how a press was judged."""
         return judge_ball(path.name, self.model.project)
 
-    @property
-    def residual_heading(self) -> str:
-        """The difference between the shading of a press and that of its ball."""
-        return tr("Shading error, %")
+    def note(self, name: str) -> str:
+        """Return the diameter of the ball of a press."""
+        session = self.model.project.session
+        radius_mm = session.ball_radii_mm.get(name, session.ball_default_radius_mm)
+        return "" if radius_mm is None else tr("⌀ {d:g} mm").format(d=2.0 * radius_mm)
 
     # The radius
 
@@ -403,31 +405,29 @@ def setting_of(results: Results) -> BallSetting | None:
     )
 
 
-def judge_ball(name: str, project: Project) -> Judgement:
-    """Return how a ball press was judged."""
+def judge_ball(name: str, project: Project) -> Finding | None:
+    """Return how a ball press was judged: the error of its shading. None: not yet."""
     balls = project.results.get(BALLS)
     seen = () if balls is None else balls.seen
     ball = next((ball for ball in seen if ball.file == name), None)
-    if ball is None:
-        return WAITING
-    if ball.fault is not None:
-        return Judgement("fail", sentence_of(ball.fault), tr("not used"))
-    if ball.press is None:
-        return WAITING
-    text = _disagreement(ball.press, project)
-    if text:
-        return Judgement("fail", text, tr("check it"), 100.0 * ball.press.shading_misfit)
-    quality = ball.press.quality
-    note = tr("⌀ {d:g} mm").format(d=2.0 * ball.press.pose.radius_mm)
-    advice = ". ".join(quality.remedies)
-    return Judgement(quality.verdict.value, advice, note, 100.0 * ball.press.shading_misfit)
+    if ball is not None and ball.fault is not None:
+        return refused(ball.fault)
+    if ball is None or ball.press is None:
+        return None
+    press = ball.press
+    error_percent = 100.0 * press.shading_misfit
+    found = Finding("shading_error_percent", tr("Shading error"), error_percent, "%")
+    if (odd := _disagreement(press, project)) is not None:
+        return replace(found, verdict=Verdict.FAIL, remedy=odd.line)
+    worst = worst_of(press.quality.figures)
+    return found if worst is None else replace(found, verdict=worst.verdict, remedy=worst.remedy)
 
 
-def _disagreement(press: BallPress, project: Project) -> str:
+def _disagreement(press: BallPress, project: Project) -> Finding | None:
     """Return why a press disagrees with the others, if it was compared with its present radius."""
     compared = project.results.get(REFLECTANCE)
     for agreement in () if compared is None else compared.table.agreements:
         same = agreement.stated_radius_mm == press.pose.radius_mm
-        if agreement.name == press.name and same and agreement.fault:
-            return f"{agreement.fault}."
-    return ""
+        if agreement.name == press.name and same:
+            return agreement.fault
+    return None

@@ -18,10 +18,8 @@ from app.calibrate.detection import (
     or_refusal,
     read_raw,
     refuse_size,
-    sentence_of,
     too_early,
 )
-from app.calibrate.image_step import WAITING, Judgement
 from app.calibrate.maps import Panel
 from app.calibrate.states import is_done
 from app.calibrate.step_data import step_of
@@ -37,7 +35,7 @@ from gelpolight_core.calibration.in_place_session import (
     stated_grid,
 )
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.finding import QualityTable
+from gelpolight_core.finding import Finding, QualityTable, refused
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.calibrate import LEAST_PRESSES, contact_in
@@ -117,8 +115,7 @@ def detect_closed_ball(
         text = tr("Ball found: contact radius {c:.2f} mm.")
         return Detection(
             Overlay(markers=marks, circles=(contact,)),
-            text.format(c=found.radius * grid.pitch_mm),
-            True,
+            Finding("found", text.format(c=found.radius * grid.pitch_mm)),
         )
 
     return or_refusal(detect, marks=Overlay(markers=marks))
@@ -277,26 +274,19 @@ class ClosedBallsStep(BallsStep):
         present = self.model.statuses["balls"].state is not StageState.STALE
         return progress_of(run) if run is not None and present else None
 
-    def judge(self, path: Path) -> Judgement:
+    def judge(self, path: Path) -> Finding | None:
         """Return how well the other presses explain a press."""
         run = self._run()
         if run is None:
-            return WAITING
+            return None
         fault = run.result.refused.get(path.name)
         if fault is not None:
-            return Judgement("fail", sentence_of(fault), tr("not used"))
+            return refused(fault)
         for press in run.result.presses:
             if press.name == path.name:
                 error = press.held_out.normal_deg
-                text = tr("Without this press, its normals are found with an error of {e:.1f} deg.")
-                note = tr("{e:.1f} deg").format(e=error)
-                return Judgement("pass", text.format(e=error), note, error)
-        return WAITING
-
-    @property
-    def residual_heading(self) -> str:
-        """The error of the normals of a press that the others predict."""
-        return tr("Normal error, deg")
+                return Finding("normal_error_deg", tr("Normal error"), error, "deg")
+        return None
 
     def is_finished(self, state: str) -> bool:
         """Return whether more presses do not help."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from app.theme import theme
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, Verdict, value_text
 from gelpolight_core.image.file import decode_image
 from gelpolight_core.translation import tr
 
@@ -31,21 +33,49 @@ class Capture:
     ----------
     path : Path
         Its image file.
-    state : str
-        A stage state, or ``excluded``.
-    sentence : str
-        Message about the capture.
+    finding : Finding or None
+        How it was judged. Its value is how far it is from the result of its stage.
     note : str
-        Short text below the name, such as ``3.00 mm``.
-    residual : float or None
-        How far it is from the result of its stage; None if it was not compared.
+        Short text below the name instead of the finding, such as ``⌀ 3 mm``.
+    excluded : bool
+        Whether the user excluded it.
     """
 
     path: Path
-    state: str
-    sentence: str
+    finding: Finding | None = None
     note: str = ""
-    residual: float | None = None
+    excluded: bool = False
+
+    @property
+    def state(self) -> str:
+        """A stage state; an excluded capture is ``empty``."""
+        if self.excluded:
+            return "empty"
+        return "waiting" if self.finding is None else self.finding.verdict.value
+
+    @property
+    def used(self) -> bool:
+        """Whether its stage can use it."""
+        return not self.excluded and self.state != Verdict.FAIL
+
+    @property
+    def word(self) -> str:
+        """The state as a text."""
+        return tr("excluded") if self.excluded else state_word(self.state)
+
+    @property
+    def residual(self) -> float:
+        """How far it is from the result of its stage; NaN if it was not compared."""
+        return math.nan if self.finding is None else self.finding.value
+
+    @property
+    def caption(self) -> str:
+        """Short text below the name."""
+        if self.finding is None:
+            return self.word
+        if math.isfinite(self.residual):
+            return self.note or value_text(self.finding)
+        return tr("not used") if self.finding.verdict is Verdict.FAIL else self.note or self.word
 
 
 class FilmStrip(QListWidget):
@@ -87,12 +117,11 @@ class FilmStrip(QListWidget):
         self.blockSignals(True)
         self.clear()
         for capture in captures:
-            word = tr("excluded") if capture.state == "excluded" else state_word(capture.state)
-            item = QListWidgetItem(
-                self._icon(capture), f"{capture.path.stem}\n{capture.note or word}"
-            )
+            word = capture.word
+            sentence = "" if capture.finding is None else capture.finding.sentence
+            item = QListWidgetItem(self._icon(capture), f"{capture.path.stem}\n{capture.caption}")
             item.setData(Qt.ItemDataRole.UserRole, capture)
-            item.setToolTip(plain_tip(f"{capture.path.name}: {word}. {capture.sentence}".strip()))
+            item.setToolTip(plain_tip(f"{capture.path.name}: {word}. {sentence}".strip()))
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{capture.path.stem}, {word}")
             self.addItem(item)
             if capture.path.name == keep:
@@ -142,7 +171,7 @@ class FilmStrip(QListWidget):
             self.chosen.emit(self.current_name)
 
     def _toggle(self, capture: Capture) -> None:
-        self.excluded.emit(capture.path.name, capture.state != "excluded")
+        self.excluded.emit(capture.path.name, not capture.excluded)
 
     def _on_menu(self, position: QPoint) -> None:
         item = self.itemAt(position)
@@ -150,7 +179,7 @@ class FilmStrip(QListWidget):
             return
         capture = _capture_of(item)
         menu = QMenu(self)
-        text = tr("Include") if capture.state == "excluded" else tr("Exclude")
+        text = tr("Include") if capture.excluded else tr("Exclude")
         menu.addAction(text, lambda: self._toggle(capture))
         menu.exec(self.mapToGlobal(position))
         menu.deleteLater()
@@ -158,16 +187,15 @@ class FilmStrip(QListWidget):
     def _icon(self, capture: Capture) -> QIcon:
         pixmap = QPixmap(self._thumb(capture.path))
         painter = QPainter(pixmap)
-        if capture.state == "excluded":
+        if capture.excluded:
             painter.fillRect(pixmap.rect(), Qt.GlobalColor.black)
             painter.setOpacity(0.35)
             painter.drawPixmap(0, 0, self._thumb(capture.path))
             painter.setOpacity(1.0)
-        sign = "empty" if capture.state == "excluded" else capture.state
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(self.palette().base())
         painter.drawEllipse(2, 2, 20, 20)
-        state_icon(sign).paint(painter, 3, 3, 18, 18)
+        state_icon(capture.state).paint(painter, 3, 3, 18, 18)
         painter.end()
         return QIcon(pixmap)
 

@@ -5,23 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from app.calibrate.detection import Detection, Detector, read_raw
+from app.calibrate.detection import Detector, read_raw
 from app.calibrate.film_strip import Capture
 from app.calibrate.states import OPEN
 from app.calibrate.step import Parts, StepPresenter, no_camera
 from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
-from app.live.live_detection import Seen
+from app.live.live_detection import Detection, Seen
 from app.live.overlay import Overlay
 from app.services.jobs import Job
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
 from gelpolight_core.calibration.recipe import Stage
-from gelpolight_core.calibration.status import StageState
+from gelpolight_core.calibration.status import StageState, StageStatus
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
@@ -29,16 +30,11 @@ from gelpolight_core.translation import tr
 PAUSE_S = 1.5
 
 
-class Judgement(NamedTuple):
-    """How a capture was judged; the attributes are those of :class:`Capture`."""
-
-    state: str
-    sentence: str
-    note: str = ""
-    residual: float | None = None
-
-
-WAITING = Judgement("waiting", "")
+def judged_stage(status: StageStatus) -> Finding | None:
+    """Return how a stage was judged; None without an up-to-date result."""
+    if status.state in (StageState.STALE, StageState.WAITING, StageState.EMPTY):
+        return None
+    return Finding("stage", status.sentence, verdict=Verdict(status.state.value))
 
 
 class ImageStep(StepPresenter):
@@ -68,16 +64,12 @@ class ImageStep(StepPresenter):
         """Return what the detection depends on, beside decisions and results."""
         return ()
 
-    def judge(self, path: Path) -> Judgement:
-        """Return how a capture was judged: by default as its stage."""
-        status = self.model.statuses[self.stage]
-        if status.state in (StageState.STALE, StageState.WAITING, StageState.EMPTY):
-            return WAITING
-        return Judgement(status.state.value, status.sentence)
+    def judge(self, path: Path) -> Finding | None:
+        """Return how a capture was judged: by default as its stage. None: not yet."""
+        return judged_stage(self.model.statuses[self.stage])
 
-    @property
-    def residual_heading(self) -> str:
-        """What the residual of a capture is, with its unit; empty in steps without one."""
+    def note(self, name: str) -> str:
+        """Return a text about a capture that is shown instead of its verdict; empty by default."""
         return ""
 
     @property
@@ -116,7 +108,7 @@ class ImageStep(StepPresenter):
 
     def captures(self) -> tuple[Capture, ...]:
         """Return the images of the step with their states."""
-        return captures_of(self.model.project.session, self.step.folder, self.judge)
+        return captures_of(self.model.project.session, self.step.folder, self.judge, note=self.note)
 
     def enter(self) -> None:
         """Show the live image of the step."""
@@ -129,9 +121,7 @@ class ImageStep(StepPresenter):
     def refresh(self) -> None:
         """Update to changed results and corrections, also after undo."""
         super().refresh()
-        self.panel.residuals.show_captures(
-            self.captures(), heading=self.residual_heading, shown=self.model.shown
-        )
+        self.panel.residuals.show_captures(self.captures(), shown=self.model.shown)
         self._point_to_captures()
         self.arm()
 
@@ -317,11 +307,15 @@ def plain_step(stage: Stage[Any]) -> type[ImageStep]:
 
 
 def _accept(_rgb: Rgb) -> Detection:
-    return Detection(Overlay(), tr("The image can be captured."), True)
+    return Detection(Overlay(), Finding("any", tr("The image can be captured.")))
 
 
 def captures_of(
-    session: Session, folder: str, judge: Callable[[Path], Judgement]
+    session: Session,
+    folder: str,
+    judge: Callable[[Path], Finding | None],
+    *,
+    note: Callable[[str], str] = lambda _name: "",
 ) -> tuple[Capture, ...]:
     """Return all captures of a stage with their states, including the excluded ones.
 
@@ -333,12 +327,14 @@ def captures_of(
         Folder of the stage.
     judge : callable
         Judges an image that is not excluded.
+    note : callable, optional
+        Text about an image, by its name.
     """
     used = {path.name for path in session.found(folder)}
     return tuple(
-        Capture(path, *judge(path))
+        Capture(path, judge(path), note=note(path.name))
         if path.name in used
-        else Capture(path, "excluded", tr("Excluded."), tr("excluded"))
+        else Capture(path, excluded=True)
         for path in session.captured(folder)
     )
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.calibrate.detection import Detection, Detector, as_image, or_refusal
-from app.calibrate.image_step import WAITING, ImageStep, Judgement
+from app.calibrate.image_step import ImageStep
 from app.calibrate.marks import board_corners, board_outline
 from app.calibrate.step import Parts
 from app.calibrate.step_data import step_of
@@ -23,7 +23,7 @@ from app.live.overlay import Line, Marker, Overlay
 from app.services.jobs import Job
 from gelpolight_core.calibration.open_sensor import LENS
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Finding, judge
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
     blur_error,
@@ -149,14 +149,14 @@ def detect_board(
         marks = Overlay(
             markers=board_corners(view), lines=(*faint.lines, board_outline(view, "good"))
         )
-        text, ready = _next_view(view, earlier)
-        if not ready:  # shows where to move the board
+        finding = _next_view(view, earlier)
+        if finding.verdict is Verdict.FAIL:  # shows where to move the board
             marks = replace(
                 marks,
                 lines=(*marks.lines, *wanted.lines),
                 markers=(*marks.markers, *wanted.markers),
             )
-        return Detection(marks, text, ready, _view_figures(view, earlier), view)
+        return Detection(marks, finding)
 
     return or_refusal(detect, marks=searching)
 
@@ -191,29 +191,26 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
     )
 
 
-def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> tuple[str, bool]:
-    """Return the message for a detected view, and whether the view adds information."""
+def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> Finding:
+    """Return what a detected view adds to the earlier ones; a failure adds nothing."""
     if any(_moved_px(view, other) < SAME_VIEW_OF_SQUARE * view.square_px for other in earlier):
-        return tr(
-            "Board found, but the view is like an earlier one. Move or tilt the board."
-        ), False
+        text = tr("Board found, but the view is like an earlier one. Move or tilt the board.")
+        return Finding("same_view", text, verdict=Verdict.FAIL)
     if view.saturated_share > 0.0:
         text = tr(
             "Board found, but {p:.0f} % of its light squares are saturated. Shorten the exposure."
         )
-        return text.format(p=max(100.0 * view.saturated_share, 1.0)), True
+        return Finding("saturated", text.format(p=max(100.0 * view.saturated_share, 1.0)))
     flat = sum(other.tilt_deg < LEAST_TILT_DEG for other in earlier)
     if view.tilt_deg < LEAST_TILT_DEG and flat >= FLAT_VIEWS:
         text = tr(
             "Board found. Tilt it more: now {t:.0f} degrees, best 15 to 40 degrees to any side."
         )
-        return text.format(t=view.tilt_deg), False
-    area = _uncovered_area([*earlier, view])
-    if area:
-        return tr("Board found. The {place} of the image has no corners yet.").format(
-            place=area
-        ), True
-    return tr("Board found. The corners cover the whole image."), True
+        return Finding("tilt", text.format(t=view.tilt_deg), verdict=Verdict.FAIL)
+    text = tr("Board found. The corners cover the whole image.")
+    if area := _uncovered_area([*earlier, view]):
+        text = tr("Board found. The {place} of the image has no corners yet.").format(place=area)
+    return Finding("coverage", text)
 
 
 def _moved_px(view: BoardView, other: BoardView) -> float:
@@ -233,21 +230,6 @@ def _uncovered_area(views: Sequence[BoardView]) -> str:
     )
     ninth = uncovered_ninth(views)
     return "" if ninth is None else names[ninth[0]][ninth[1]]
-
-
-def _view_figures(view: BoardView, earlier: Sequence[BoardView]) -> tuple[Finding, ...]:
-    covered = coverage_counts([*earlier, view], view.image_size) > 0
-    return (
-        judge("tilt", tr("Tilt"), view.tilt_deg, "deg"),
-        judge("edge_width", tr("Edge width"), view.edge_width_px, "px",
-              warn=edge_limit_px(view.image_size[0])),
-        judge("grid_rms", tr("Deviation from a flat grid"), view.grid_rms_px, "px"),
-        judge("contrast", tr("Contrast"), 100.0 * view.contrast, "%"),
-        judge("saturated", tr("Saturated light squares"), 100.0 * view.saturated_share, "%",
-              warn=0.0),
-        judge("coverage", tr("Image covered by corners"), 100.0 * float(covered.mean()), "%"),
-        judge("views", tr("Captured views"), len(earlier)),
-    )  # fmt: skip
 
 
 class LensStep(ImageStep):
@@ -299,14 +281,9 @@ class LensStep(ImageStep):
         """Return the names of the analysed views."""
         return (frozenset(self.views()),)
 
-    def judge(self, path: Path) -> Judgement:
+    def judge(self, path: Path) -> Finding | None:
         """Return what was found in a view."""
         return judge_view(self.views().get(path.name))
-
-    @property
-    def residual_heading(self) -> str:
-        """The reprojection error of a view."""
-        return tr("Corner error, px")
 
     def _on_captured(self, stage: str, _name: str) -> None:
         if stage == "lens":
@@ -328,14 +305,12 @@ class LensStep(ImageStep):
         )
 
 
-def judge_view(view: LensView | None) -> Judgement:
+def judge_view(view: LensView | None) -> Finding | None:
     """Return how a lens view was judged; None: it was not analysed yet."""
     if view is None:
-        return WAITING
+        return None
     if not view.used:
-        return Judgement("fail", view.reason, tr("not used"))
+        return Finding("view", view.reason, verdict=Verdict.FAIL)
     if math.isnan(view.rms_px):
-        return Judgement("pass", tr("Board found."), tr("board found"))
-    note = tr("{r:.2f} px").format(r=view.rms_px)
-    sentence = tr("Corner error {r:.3f} px.").format(r=view.rms_px)
-    return Judgement("pass", sentence, note, view.rms_px)
+        return Finding("view", tr("Board found"))
+    return Finding("corner_error_px", tr("Corner error"), view.rms_px, "px")

@@ -63,7 +63,7 @@ def detect_mirror(
                       warn=LED_OFF_OF_WIDTH * rgb.shape[1],
                       remedy=tr("Check the channel of each LED, and that the mirror is flat")),
             )  # fmt: skip
-        return judged(marks, figures, tr("All three LED reflections were found."), spots)
+        return judged(marks, figures, tr("All three LED reflections were found."))
 
     return or_refusal(detect, marks=Overlay(markers=expected))
 
@@ -74,7 +74,7 @@ def placed_spots(rgb: Rgb, session: Session) -> Detection:
     def detect() -> Detection:
         spots = find_mirror_spots(as_image(rgb), placed=session.decisions.spots_px)
         marks = Overlay(markers=spot_markers(spots, editable=True))
-        return judged(marks, spots.quality.figures, tr("The spots were placed by hand."), spots)
+        return judged(marks, spots.quality.figures, tr("The spots were placed by hand."))
 
     return or_refusal(detect)
 

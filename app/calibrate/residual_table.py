@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRectF, Qt, Signal
@@ -51,7 +52,6 @@ class ResidualTable(QWidget):
         super().__init__()
         named(self, "calibrate.residuals", tr("Residuals of the captures"))
         self._captures: tuple[Capture, ...] = ()
-        self._heading = ""
         self._table = named(
             QTableWidget(0, 2), "calibrate.residuals.table", tr("Captures, worst first")
         )
@@ -84,39 +84,39 @@ class ResidualTable(QWidget):
         """Name of the capture with the largest residual."""
         return self._captures[0].path.name
 
-    def show_captures(self, captures: Sequence[Capture], *, heading: str, shown: str) -> None:
+    def show_captures(self, captures: Sequence[Capture], *, shown: str) -> None:
         """Show the captures that have a residual.
 
         Parameters
         ----------
         captures : sequence of Capture
             All captures of the step.
-        heading : str
-            What the residual is, with its unit.
         shown : str
             Name of the shown capture, which is selected; empty for the live image.
         """
-        judged = [capture for capture in captures if capture.residual is not None]
-        self._captures = tuple(sorted(judged, key=_residual, reverse=True))
-        self._heading = heading
+        judged = [capture for capture in captures if math.isfinite(capture.residual)]
+        self._captures = tuple(sorted(judged, key=lambda c: c.residual, reverse=True))
         there = len(judged) >= LEAST_CAPTURES
         self.setVisible(there)
         if not there:
             return
-        self._table.setHorizontalHeaderLabels([tr("Capture"), heading])
+        finding = self._captures[0].finding
+        assert finding is not None
+        self._table.setHorizontalHeaderLabels([tr("Capture"), f"{finding.text}, {finding.unit}"])
         self._table.setRowCount(len(self._captures))
-        largest = max(_residual(self._captures[0]), 1e-12)
+        largest = max(self._captures[0].residual, 1e-12)
         for row, capture in enumerate(self._captures):
             name = QTableWidgetItem(state_icon(capture.state), capture.path.stem)
             name.setData(
                 Qt.ItemDataRole.AccessibleTextRole,
                 f"{capture.path.stem}, {state_word(capture.state)}",
             )
-            value = QTableWidgetItem(f"{_residual(capture):.3g}")
+            value = QTableWidgetItem(f"{capture.residual:.3g}")
             value.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            value.setData(SHARE, _residual(capture) / largest)
+            value.setData(SHARE, capture.residual / largest)
+            tip = "" if capture.finding is None else plain_tip(capture.finding.sentence)
             for column, item in ((NAME_COLUMN, name), (RESIDUAL_COLUMN, value)):
-                item.setToolTip(plain_tip(capture.sentence))
+                item.setToolTip(tip)
                 self._table.setItem(row, column, item)
         self.select(shown)
         rows = min(len(self._captures), 6)
@@ -143,7 +143,7 @@ class ResidualTable(QWidget):
         if event.type() == QEvent.Type.PaletteChange and not self.isHidden():
             chosen = self._table.selectionModel().selectedRows()
             shown = self._captures[chosen[0].row()].path.name if chosen else ""
-            self.show_captures(self._captures, heading=self._heading, shown=shown)
+            self.show_captures(self._captures, shown=shown)
 
     def _choose(self, item: QTableWidgetItem) -> None:
         self.chosen.emit(self._captures[item.row()].path.name)
@@ -165,7 +165,3 @@ class _Bars(QStyledItemDelegate):
         colour.setAlphaF(0.25)
         painter.fillRect(area, colour)
         super().paint(painter, option, index)
-
-
-def _residual(capture: Capture) -> float:
-    return 0.0 if capture.residual is None else capture.residual

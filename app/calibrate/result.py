@@ -8,14 +8,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QPushButton,
     QToolButton,
     QWidget,
 )
 
-from app.calibrate.model import WizardModel
 from app.calibrate.states import (
     RUNNING,
     StepState,
@@ -27,7 +26,6 @@ from app.calibrate.states import (
 )
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
-from app.context.context import AppContext
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
 from app.widgets.label import PlainLabel, RoomyLabel
@@ -40,7 +38,8 @@ from app.workspace.report import stated_validation
 from gelpolight_core.calibration.missing import OPEN_FOLDERS
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.finding import QualityTable
+from gelpolight_core.causes import with_one_cause
+from gelpolight_core.finding import Finding, QualityTable
 from gelpolight_core.translation import tr
 
 FAIL = StageState.FAIL
@@ -64,6 +63,8 @@ class ResultView(QWidget):
         self._name = ""
         self.headline = named(PlainLabel(wrap=True), "result.headline", tr("Verdict"))
         make_bold(self.headline, size=1.2)
+        self.cause = named(PlainLabel(wrap=True), "result.cause", tr("Most likely cause"))
+        make_bold(self.cause)
         inside = QWidget()
         rows = vbox(of=inside)
         for step in steps:
@@ -84,7 +85,14 @@ class ResultView(QWidget):
             button.setMinimumHeight(38)
         self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        vbox(self.headline, (scroll, 1), hbox(self.save, self.report), self.saved, of=self)
+        vbox(
+            self.headline,
+            self.cause,
+            (scroll, 1),
+            hbox(self.save, self.report),
+            self.saved,
+            of=self,
+        )
 
     def show_saved(self, sentence: str, role: str = "pass") -> None:
         """Show where the calibration or its report was saved, or why it was not."""
@@ -115,31 +123,30 @@ class ResultView(QWidget):
         if self._name and not saved:
             self.show_saved("")  # what was saved is no longer what the captures give
         self._name = saved
+        cause, tables = with_one_cause({stage: statuses[stage].quality for stage in self._rows})
+        self.cause.setText(f"{cause}." if cause else "")
+        self.cause.setVisible(bool(cause))
         for stage, row in self._rows.items():
-            row.show_state(*states[row.step.key], statuses[stage].quality)
-        done = all(is_done(statuses[stage].state.value) for stage in self._rows)
-        failed = [row.step.title for s, row in self._rows.items() if statuses[s].state is FAIL]
-        made = all(
-            is_done(statuses[s].state.value) or statuses[s].state is FAIL for s in self._rows
-        )
-        open_steps = [s for s in statuses.values() if not is_done(s.state.value)]
-        if done:
-            warned = sum(s.state is StageState.WARN for s in statuses.values())
+            state, sentence = states[row.step.key]
+            # The cause is shown once, above all stages.
+            sentence = sentence.removeprefix(f"{cause}.").strip() if cause else sentence
+            row.show_state(state, sentence, tables[stage])
+        done = [stage for stage in self._rows if is_done(statuses[stage].state.value)]
+        failed = [stage for stage in self._rows if statuses[stage].state is FAIL]
+        complete, made = len(done) == len(self._rows), len(done + failed) == len(self._rows)
+        warned = sum(s.state is StageState.WARN for s in statuses.values())
+        open_count = sum(not is_done(s.state.value) for s in statuses.values())
+        if complete and saved:
+            text = tr("All stages are complete and saved as {name}. Validate the calibration next.")
+        elif complete and warned:
+            text = tr("All stages are complete, {n} with a warning. Read the advice, then save.")
+        elif complete:
             text = tr("All stages are complete. Save the calibration, then validate it.")
-            if saved:
-                text = tr(
-                    "All stages are complete and saved as {name}. Validate the calibration next."
-                )
-                text = text.format(name=saved)
-            elif warned:
-                text = tr(
-                    "All stages are complete, {n} with a warning. Read the advice, then save."
-                ).format(n=warned)
         elif busy and saved:
             text = tr(
                 "Saved as {name}. You can validate it now; the stages are being recomputed in the "
                 "background."
-            ).format(name=saved)
+            )
         elif busy:
             text = tr("Computing. Please wait.")
         elif made:
@@ -147,21 +154,24 @@ class ResultView(QWidget):
                 "Failed: {titles}. Correct this. Until then the calibration can be saved only as a "
                 "draft, which is not used for measuring."
             )
-            text = text.format(titles=", ".join(failed))
+        elif any(s.state is StageState.STALE for s in statuses.values()):
+            text = tr(
+                "Outdated stages: {n}. The captures have changed since they were computed. "
+                "Click Recompute."
+            )
         else:
             text = self._missing_sentence(statuses)
-            if any(s.state is StageState.STALE for s in open_steps):
-                text = tr(
-                    "Outdated stages: {n}. The captures have changed since they were computed. "
-                    "Click Recompute."
-                )
-            text = text.format(n=len(open_steps))
+        text = text.format(
+            name=saved,
+            n=warned if complete else open_count,
+            titles=", ".join(self._rows[stage].step.title for stage in failed),
+        )
         self.headline.setText(text)
         show_meaning(self.headline, "fail" if failed else "")
         self.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
         running = any(states[row.step.key][0] == RUNNING for row in self._rows.values())
-        self.save.setEnabled(done or (made and not running))
-        self.save.setStyleSheet("font-weight: bold;" if done else "")
+        self.save.setEnabled(complete or (made and not running))
+        self.save.setStyleSheet("font-weight: bold;" if complete else "")
         # The report waits for the stages by itself.
         self.report.setEnabled(self.save.isEnabled() or bool(busy and saved))
 
@@ -219,99 +229,20 @@ class _StageRow(QWidget):
         self._word.setText(state_word(state).capitalize())
         show_meaning(self._word, state_meaning(state))
         self._sentence.setText(sentence)
-        self._sentence.setVisible(state != StageState.PASS.value)
+        self._sentence.setVisible(bool(sentence) and state != StageState.PASS.value)
         self.table.set_table(quality)
         self.more.setVisible(bool(quality.figures))
 
 
-class Saving(QObject):
-    """Handles the Save and Report buttons of the result step.
-
-    Parameters
-    ----------
-    model : WizardModel
-        Model of the wizard.
-    view : ResultView
-        The buttons, and where it is shown what was saved.
-    context : AppContext
-        Context with the library.
-    """
-
-    def __init__(self, model: WizardModel, view: ResultView, *, context: AppContext) -> None:
-        super().__init__(view)
-        self._model, self._view, self._context = model, view, context
-        view.save.clicked.connect(self.save)
-        view.report.clicked.connect(self.report)
-
-    def save(self) -> None:
-        """Write the calibration into the library, and use it from now on unless it failed."""
-        project, workspace = self._model.project, self._context.workspace
-
-        def work(_progress: object) -> tuple[Path, str]:
-            calibration = project.finish().calibration
-            name = f"{calibration.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
-            path = workspace.keep_calibration(calibration, name)
-            if not calibration.fault:
-                workspace.use(path)
-            return path, calibration.fault
-
-        def done(saved: tuple[Path, str]) -> None:
-            path, fault = saved
-            text = tr("Saved as {path} and now in use. Validate it next.")
-            if fault:
-                text = tr("Saved as a draft, {path}, and not in use: {fault}.")
-            self._view.show_saved(text.format(path=path, fault=fault), "fail" if fault else "pass")
-            self._context.requests.calibrations_changed.emit()
-            self._model.saved_as.emit(str(path))
-
-        self._submit(tr("Saving the calibration"), work, done)
-
-    def _submit(
-        self, title: str, work: Callable[[object], Any], done: Callable[[Any], None]
-    ) -> None:
-        self._view.show_saved(title + "…")
-
-        def failed(sentence: str) -> None:
-            self._view.show_saved(sentence, "fail")
-
-        self._model.jobs.submit(Job(title, work, done, failed, stopped=failed))
-
-    def report(self) -> None:
-        """Ask for a file name and write the report there."""
-        name = f"{self._model.project.session.serial}-report.pdf"
-        title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
-        path = ask_save(self._view, self._context.settings, "report", title, name, patterns)
-        if path is not None:
-            self.write_report(path)
-
-    def write_report(self, path: Path) -> None:
-        """Write the report of the session in its present state."""
-        project, workspace = self._model.project, self._context.workspace
-
-        def work(_progress: object) -> Run:
-            from gelpolight_core.report.build import run_report  # slow to import
-            from gelpolight_core.report.file import write_report
-
-            run = project.finish()
-            saved = workspace.entry_of(run.calibration.identity)
-            validation = None if saved is None else stated_validation(saved)
-            write_report(run_report(run, validation=validation), path)
-            return run
-
-        def done(_run: Run) -> None:
-            self._view.show_saved(tr("Report saved as {path}").format(path=path))
-
-        self._submit(tr("Writing the report"), work, done)
-
-
 class ResultStep(StepPresenter):
-    """Shows every stage, and saves the calibration."""
+    """Shows every stage, and saves the calibration and its report."""
 
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
         self.view = ResultView(parts.steps)
         self.view.step_wanted.connect(self.step_wanted)
-        self.saving = Saving(self.model, self.view, context=self.context)
+        self.view.save.clicked.connect(self.save)
+        self.view.report.clicked.connect(self.report)
 
     step = Step(
         "result",
@@ -349,3 +280,67 @@ class ResultStep(StepPresenter):
         super().refresh()
         model = self.model
         self.view.show_states(model.states, model.statuses, busy=model.jobs.busy, saved=model.saved)
+
+    # Saving
+
+    def save(self) -> None:
+        """Write the calibration into the library, and use it from now on unless it failed."""
+        project, workspace = self.model.project, self.context.workspace
+
+        def work(_progress: object) -> tuple[Path, Finding | None]:
+            calibration = project.finish().calibration
+            name = f"{calibration.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
+            path = workspace.keep_calibration(calibration, name)
+            if not calibration.fault:
+                workspace.use(path)
+            return path, calibration.fault
+
+        def done(saved: tuple[Path, Finding | None]) -> None:
+            path, fault = saved
+            if fault is None:
+                text = tr("Saved as {path} and now in use. Validate it next.").format(path=path)
+            else:
+                text = tr("Saved as a draft, {path}, and not in use: {fault}.")
+                text = text.format(path=path, fault=fault.text)
+            self.view.show_saved(text, "pass" if fault is None else "fail")
+            self.context.requests.calibrations_changed.emit()
+            self.model.saved_as.emit(str(path))
+
+        self._submit(tr("Saving the calibration"), work, done)
+
+    def _submit(
+        self, title: str, work: Callable[[object], Any], done: Callable[[Any], None]
+    ) -> None:
+        self.view.show_saved(title + "…")
+
+        def failed(sentence: str) -> None:
+            self.view.show_saved(sentence, "fail")
+
+        self.model.jobs.submit(Job(title, work, done, failed, stopped=failed))
+
+    def report(self) -> None:
+        """Ask for a file name and write the report there."""
+        name = f"{self.model.project.session.serial}-report.pdf"
+        title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
+        path = ask_save(self.view, self.context.settings, "report", title, name, patterns)
+        if path is not None:
+            self.write_report(path)
+
+    def write_report(self, path: Path) -> None:
+        """Write the report of the session in its present state."""
+        project, workspace = self.model.project, self.context.workspace
+
+        def work(_progress: object) -> Run:
+            from gelpolight_core.report.build import run_report  # slow to import
+            from gelpolight_core.report.file import write_report
+
+            run = project.finish()
+            saved = workspace.entry_of(run.calibration.identity)
+            validation = None if saved is None else stated_validation(saved)
+            write_report(run_report(run, validation=validation), path)
+            return run
+
+        def done(_run: Run) -> None:
+            self.view.show_saved(tr("Report saved as {path}").format(path=path))
+
+        self._submit(tr("Writing the report"), work, done)

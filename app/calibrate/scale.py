@@ -15,6 +15,7 @@ from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from gelpolight_core.calibration.in_place import SCALE
 from gelpolight_core.calibration.in_place_session import stated_grid
+from gelpolight_core.finding import Finding
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.scale import find_pins, find_punch
@@ -57,7 +58,7 @@ def detect_scale(
             marks = Overlay(circles=(circle,))
             wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
             said = tr("Contact of the punch found: a pixel is {s:.4f} mm wide.").format(s=wide)
-        return Detection(marks, said, True)
+        return Detection(marks, Finding("found", said))
 
     return or_refusal(detect)
 

@@ -22,8 +22,6 @@ from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.translation import tr
 
-UNUSED = ("excluded", StageState.FAIL.value)
-
 
 @dataclass(frozen=True)
 class Parts:
@@ -115,7 +113,7 @@ class StepPresenter(QObject):
 
     def count(self) -> int:
         """Return the number of usable images."""
-        return sum(capture.state not in UNUSED for capture in self.captures())
+        return sum(capture.used for capture in self.captures())
 
     def is_finished(self, state: str) -> bool:
         """Return whether nothing is left to do in the step."""

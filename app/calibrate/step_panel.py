@@ -158,7 +158,7 @@ class StepPanel(QWidget):
         if step is not self._step:
             # The message belongs to the previous step; remove it, even during a computation.
             self._show_figures(())
-            self.residuals.show_captures((), heading="", shown="")
+            self.residuals.show_captures((), shown="")
         self._step = step
         self._show_finished(False)
         self.title.setText(step.title)

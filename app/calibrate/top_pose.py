@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from app.calibrate.detection import Detection, Detector, as_image, judged, or_refusal, too_early
-from app.calibrate.image_step import WAITING, ImageStep, Judgement
+from app.calibrate.image_step import ImageStep, judged_stage
 from app.calibrate.lens import glance
 from app.calibrate.marks import board_corners, board_outline, foot_point
 from app.calibrate.step_data import step_of
@@ -14,7 +14,8 @@ from app.live.image_checks import Rgb
 from app.live.overlay import Overlay
 from gelpolight_core.calibration.open_sensor import LENS, TOP_POSE
 from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.status import StageState, StageStatus
+from gelpolight_core.calibration.status import StageStatus
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.pose import estimate_top_pose
 from gelpolight_core.session.board import BoardSpec
@@ -52,7 +53,6 @@ def detect_top_pose(
             marks,
             pose.quality.figures,
             good.format(d=pose.plane.distance_mm, t=pose.tilt_deg),
-            view,
         )
 
     return or_refusal(detect)
@@ -81,18 +81,16 @@ class TopPoseStep(ImageStep):
         board = project.session.top_pose
         return partial(detect_top_pose, board=board, camera=lens.camera, patient=bool(name))
 
-    def judge(self, path: Path) -> Judgement:
+    def judge(self, path: Path) -> Finding | None:
         """Return whether a view is used."""
         return judge_top_view(path.name, self.model.project, self.model.statuses[self.stage])
 
 
-def judge_top_view(name: str, project: Project, status: StageStatus) -> Judgement:
+def judge_top_view(name: str, project: Project, status: StageStatus) -> Finding | None:
     """Return how a view of the top surface was judged."""
-    if status.state in (StageState.STALE, StageState.WAITING, StageState.EMPTY):
-        return WAITING
-    top = project.results.get(TOP_POSE)
-    found = None if top is None else top.pose
-    for view in () if found is None or not status.quality.figures else found.views:
-        if view.name == name and not view.used:
-            return Judgement("fail", view.reason, tr("not used"))
-    return Judgement(status.state.value, status.sentence)
+    found, top = judged_stage(status), project.results.get(TOP_POSE)
+    if found is not None and status.quality.figures and top is not None:
+        for view in top.pose.views:
+            if view.name == name and not view.used:
+                return Finding("view", view.reason, verdict=Verdict.FAIL)
+    return found

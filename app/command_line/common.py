@@ -10,7 +10,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from app.command_line.terminal import harmless
-from gelpolight_core.causes import explained
+from gelpolight_core.causes import with_one_cause
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.atomic import refuse_unwritable
@@ -92,8 +92,8 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
 
 def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:
     """Return the quality tables of all stages as lines of text."""
-    cause, follow = explained(tables)
-    lines = [tr("Most likely cause: {remedy}.").format(remedy=cause)] if cause else []
+    cause, tables = with_one_cause(tables)
+    lines = [f"{cause}."] if cause else []
     for stage, table in tables.items():
         lines.append(f"{harmless(stage)}: {table.verdict.value}")
         for figure in table.figures:
@@ -103,6 +103,6 @@ def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:
             )
             value = f"{figure.value:>10.4g} {harmless(figure.unit):<4}"
             lines.append(f"  {mark} {harmless(figure.text):<58} {value} {limit}".rstrip())
-            if figure.verdict is not Verdict.PASS and figure.remedy and figure.key not in follow:
+            if figure.verdict is not Verdict.PASS and figure.remedy:
                 lines.append(f"      {harmless(figure.remedy)}.")
     return lines

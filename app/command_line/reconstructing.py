@@ -101,7 +101,7 @@ def report_failure(calibration: Calibration, path: Path) -> None:
     """Warn of a calibration that failed."""
     if calibration.fault:
         text = tr("{path}: FAIL: {fault}. Everything measured with it is doubtful.")
-        say(f"gelpolight: {text.format(path=path, fault=calibration.fault)}", file=sys.stderr)
+        say(f"gelpolight: {text.format(path=path, fault=calibration.fault.text)}", file=sys.stderr)
 
 
 def read_frame(path: Path, reconstructor: Reconstructor) -> NDArray[np.float32]:

@@ -23,11 +23,11 @@ def show_in_use(context: AppContext) -> None:
     used = read_entry(path, in_use=True)
     note, role = used.state
     advice = not_validated() if role == "warn" else ""
-    if used.summary is not None and used.failed:
+    if used.summary is not None and (fault := used.summary.fault):
         advice = tr(
             "The calibration in use is not reliable: {fault}. Calibrate again, or use another "
             "calibration on the Sensors page."
-        ).format(fault=used.summary.fault)
+        ).format(fault=fault.text)
     context.status.update(
         calibration=used.name,
         calibration_note=note,
@@ -82,13 +82,14 @@ def put_into_use(
             write_remark(path, "accepted", line.text())
             act()
 
-    if entry is None or entry.summary is None or not entry.failed or entry.summary.accepted:
+    summary = None if entry is None else entry.summary
+    if entry is None or summary is None or summary.fault is None or summary.accepted:
         act()
         return
     text = tr(
         "{name} is not reliable: {fault}. Measurements with it are marked as doubtful. Enter the "
         "reason why you use it all the same: it is kept in the calibration file and in its report."
-    ).format(name=entry.name, fault=entry.summary.fault)
+    ).format(name=entry.name, fault=summary.fault.text)
     question = Question(
         parent, tr("Use a failed calibration"), text, ((tr("Use it all the same"), accept),)
     )

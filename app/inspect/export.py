@@ -312,4 +312,4 @@ class ExportControl(QObject):
 
     def _on_exported(self, files: list[Path]) -> None:
         text = tr("{n} files written to {folder}").format(n=len(files), folder=files[0].parent)
-        self._context.toasts.show(text, "pass")
+        self._context.toasts.show(text)

@@ -15,7 +15,6 @@ from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.height_map import Flag
-from gelpolight_core.reconstruction.modes import PAPER
 from gelpolight_core.translation import tr
 
 TELL_EVERY = 10
@@ -61,7 +60,7 @@ class QualityPanel(QWidget):
             return  # the frame is older than the selection
         if shown.quality is None:
             sentence = tr("Pause to see the uncertainty.")
-            if still and shown.heightmap.model == PAPER:
+            if still and shown.without_uncertainty:
                 sentence = tr("This model gives no uncertainty. Calibrate with the full model.")
             elif still:
                 sentence = tr("Computing the uncertainty of this image…")

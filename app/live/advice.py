@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gelpolight_core.finding import Finding
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
 
 Size = tuple[int, int]
 ZERO_CORRECTS = ("exposure", "led_weak", "room_light")
 """Faults of the light that a new background corrects."""
+BUTTONS = {
+    "virtual": tr("Use the virtual sensor"),
+    "calibrate": tr("Calibrate the virtual sensor now"),
+    "sensors": tr("Choose or calibrate a sensor"),
+    "fitting": tr("Use a matching calibration"),
+    "same_camera": tr("It is the same camera"),
+    "reopen": tr("Reconnect"),
+    "zero": tr("Set to zero"),
+    "live": tr("Back to the camera"),
+}
+"""The text of the button of every action. An advice with such a key has a button."""
+PREPARING = Finding("preparing", tr("Preparing the calibration. Please wait."))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,79 +72,57 @@ class LiveState:
     fault: Finding | None = None
     reading: bool = False
 
-
-@dataclass(frozen=True, slots=True)
-class Advice:
-    """A text and the action of the button next to it.
-
-    Attributes
-    ----------
-    text : str
-        Empty if there is nothing to do.
-    act, button : str
-        Name and label of the button. Empty if there is none.
-    role : str
-        Colour of the text.
-    usable : bool
-        Whether the calibration may be used for these images.
-    """
-
-    text: str = ""
-    act: str = ""
-    button: str = ""
-    role: str = "text"
-    usable: bool = True
+    @property
+    def usable(self) -> bool:
+        """Whether the calibration in use may be used for these images."""
+        used = self.used
+        fits = used is not None and used.fits(self.serial, self.size)
+        return bool(self.kind) and fits and not self.other_camera
 
 
-def advise(now: LiveState) -> Advice:
-    """Return what to do next."""
+def action_of(advice: Finding | None) -> str:
+    """Return the action that an advice offers; empty if there is none."""
+    if advice is None:
+        return ""
+    action = "zero" if advice.key in ZERO_CORRECTS else advice.key
+    return action if action in BUTTONS else ""
+
+
+def advise(now: LiveState) -> Finding | None:
+    """Return what to do next: its key is the action. None if there is nothing to do."""
     if not now.kind:
-        return Advice(
-            tr("No camera is selected. Choose an image source, or try the virtual sensor."),
-            "virtual",
-            tr("Use the virtual sensor"),
-            usable=False,
-        )
+        text = tr("No camera is selected. Choose an image source, or try the virtual sensor.")
+        return Finding("virtual", text)
     if now.used is None and now.reading:
-        return preparing()
+        return PREPARING
     if now.used is None:
         text = tr("No calibration is in use. Only the camera image can be shown.")
-        return Advice(text, *_remedy(now), usable=False)
+        return Finding(_way_to_fitting(now), text)
     if not now.used.fits(now.serial, None):
         text = tr(
             "The calibration in use belongs to sensor {one}, but the images come from sensor "
             "{other}."
         ).format(one=now.used.serial, other=now.serial)
-        return Advice(text, *_remedy(now), role="fail", usable=False)
+        return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if not now.used.fits("", now.size):
         assert now.size is not None
         text = tr(
             "The images are {a} pixels, but the calibration in use is for {b} pixels."
         ).format(a="x".join(map(str, now.size)), b="x".join(map(str, now.used.size)))
-        return Advice(text, *_remedy(now), role="fail", usable=False)
+        return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
     if now.other_camera:
-        remedy = _remedy(now) if _fits(now) else ("same_camera", tr("It is the same camera"))
-        return Advice(now.other_camera, *remedy, role="fail", usable=False)
+        key = "fitting" if _fits(now) else "same_camera"
+        return Finding(key, now.other_camera, verdict=Verdict.FAIL)
     if now.trouble:
-        return Advice(now.trouble, "reopen", tr("Reconnect"), role="fail")
-    if now.fault is not None:
-        button = ("zero", tr("Set to zero")) if now.fault.key in ZERO_CORRECTS else ("", "")
-        return Advice(now.fault.line, *button, role=now.fault.verdict.value)
-    return Advice()
+        return Finding("reopen", now.trouble, verdict=Verdict.FAIL)
+    return now.fault
 
 
-def preparing() -> Advice:
-    """Return what to say while the calibration in use is being read."""
-    return Advice(tr("Preparing the calibration. Please wait."), usable=False)
-
-
-def _remedy(now: LiveState) -> tuple[str, str]:
-    """Return how to get a calibration that fits."""
+def _way_to_fitting(now: LiveState) -> str:
+    """Return the action that gives a calibration that fits."""
     if _fits(now):
-        return "fitting", tr("Use a matching calibration")
-    if now.kind == "virtual":
-        return "calibrate", tr("Calibrate the virtual sensor now")
-    return "sensors", tr("Choose or calibrate a sensor")
+        return "fitting"
+    return "calibrate" if now.kind == "virtual" else "sensors"
 
 
 def _fits(now: LiveState) -> bool:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
-from app.live.advice import Advice
+from app.live.advice import BUTTONS, action_of
 from app.services.jobs import Jobs
 from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
 
 # Short work needs no progress bar.
 SHOWN_FROM = 0.005
+ROLES = {Verdict.PASS: "text", Verdict.WARN: "warn", Verdict.FAIL: "fail"}
 
 
 class Banner(QWidget):
@@ -39,11 +41,12 @@ class Banner(QWidget):
     def __init__(self, jobs: Jobs, *, idle: str) -> None:
         super().__init__()
         named(self, "inspect.banner", tr("What to do next"))
-        self._advice, self._idle = Advice(), idle
+        self._advice: Finding | None = None
+        self._idle = idle
         self._text = named(PlainLabel(wrap=True), "inspect.advice", tr("Advice"))
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._button = named(QPushButton(), "inspect.advised", tr("Do this"))
-        self._button.clicked.connect(lambda: self.act_wanted.emit(self._advice.act))
+        self._button.clicked.connect(lambda: self.act_wanted.emit(action_of(self._advice)))
         self._bar = named(QProgressBar(), "inspect.progress", tr("Progress"))
         self._bar.setFixedWidth(220)
         self._stop = push_button(
@@ -56,10 +59,10 @@ class Banner(QWidget):
         self._working = False
         self._show()
 
-    def advise(self, advice: Advice) -> None:
+    def advise(self, advice: Finding | None) -> None:
         """Show an advice, with a button for its action."""
         self._advice = advice
-        self._button.setText(advice.button)
+        self._button.setText(BUTTONS.get(action_of(advice), ""))
         self._show()
 
     def show_work(self, title: str, share: float) -> None:
@@ -73,8 +76,8 @@ class Banner(QWidget):
     def _show(self) -> None:
         advice, role = self._advice, ""
         if not self._working:
-            self._text.setText(advice.text or self._idle)
-            role = advice.role if advice.text else "muted"
+            self._text.setText(self._idle if advice is None else advice.line)
+            role = "muted" if advice is None else ROLES[advice.verdict]
         # A text that is longer than the banner starts in it, and the tooltip shows all of it.
         room = self._text.rect().adjusted(0, 0, 0, 10 * self.height())
         wrap = Qt.TextFlag.TextWordWrap
@@ -84,6 +87,6 @@ class Banner(QWidget):
         self._text.setAlignment(Qt.AlignmentFlag.AlignLeft | vertical)
         self._text.setToolTip(plain_tip(self._text.text()))
         show_meaning(self._text, role)
-        self._button.setVisible(bool(advice.act) and not self._working)
+        self._button.setVisible(bool(action_of(advice)) and not self._working)
         self._bar.setVisible(self._working)
         self._stop.setVisible(self._working)

@@ -171,7 +171,7 @@ class CalibrationChoice(QObject):
                 self.loaded.emit(*found[1:])
 
         title = tr("Preparing the calibration")
-        failed = partial(self._context.toasts.show, kind="fail")
+        failed = partial(self._context.toasts.show, verdict="fail")
         reading = Job(title, work, done, failed)
         self._reading = reading
         self._jobs.submit(reading)

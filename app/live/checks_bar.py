@@ -9,11 +9,11 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF, QResiz
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QSizePolicy, QWidget
 
 from app.live.drawing import ROLE_COLOURS
-from app.live.image_checks import Exposure
 from app.live.overlay import Role
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
 from app.widgets.quality_table import SIGNS
+from gelpolight_core.finding import Finding
 from gelpolight_core.translation import tr
 
 # Below this width the advice and the focus bar do not fit side by side.
@@ -95,9 +95,9 @@ class ChecksBar(QWidget):
         lines = 2 if narrow else 1
         self._exposure.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
 
-    def show_exposure(self, exposure: Exposure | None) -> None:
+    def show_exposure(self, exposure: Finding | None) -> None:
         """Show the advice about the exposure; None for no text."""
-        text = f"{SIGNS[exposure.verdict]} {exposure.advice}" if exposure else ""
+        text = f"{SIGNS[exposure.verdict]} {exposure.text}" if exposure else ""
         if text != self._exposure.text():
             self._exposure.setText(text)
             self._exposure.setToolTip(plain_tip(text))

@@ -8,7 +8,7 @@ from collections import Counter, deque
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.context.context import AppContext
-from app.live.advice import Known, LiveState, Size, advise
+from app.live.advice import Known, LiveState, Size
 from app.live.calibration_choice import CalibrationBox, CalibrationChoice
 from app.live.first_calibration import begin_first_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
@@ -186,7 +186,7 @@ class LiveDepth(QObject):
 
     def update(self) -> None:
         """Use the calibration only if it fits the images, and announce the state."""
-        live, best = self._chosen if advise(self.state).usable else (None, None)
+        live, best = self._chosen if self.state.usable else (None, None)
         if live is not self._maker.live:
             self._use(live, best)
         self.changed.emit()

@@ -21,7 +21,6 @@ from app.live.overlay import (
     Line,
     Marker,
     Mask,
-    Note,
     Overlay,
     Role,
     drag,
@@ -40,8 +39,6 @@ ROLE_COLOURS: dict[Role, str] = {
     "led2": "#8fb4ff",
     "info": "#e8eef5",
 }
-# A word before each note, for users who cannot distinguish the colours.
-NOTE_SIGNS: dict[Role, str] = {"good": "\u2713", "bad": "\u2715", "expected": "?"}
 HALO = QColor(0, 0, 0, 170)
 PLATE = QColor(0, 0, 0, 150)
 # How near to a handle the pointer must be, in screen pixels.
@@ -156,7 +153,6 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
             _paint_circle(painter, circle, to_screen, circle.handle == self.selected)
         for marker in self._overlay.markers:
             _paint_marker(painter, marker, to_screen, marker.handle == self.selected)
-        _paint_notes(painter, self._overlay.notes)
         painter.restore()
 
     def _paint_masks(self, painter: QPainter) -> None:
@@ -272,11 +268,3 @@ def _paint_text(painter: QPainter, at: QPointF, text: str, role: Role, *, gap: f
     painter.drawRoundedRect(plate, 3.0, 3.0)
     painter.setPen(QColor(ROLE_COLOURS[role]))
     painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, text)
-
-
-def _paint_notes(painter: QPainter, notes: tuple[Note, ...]) -> None:
-    y = 16.0
-    for note in notes:
-        sign = NOTE_SIGNS.get(note.role, "")
-        _paint_text(painter, QPointF(8.0, y), f"{sign} {note.text}".strip(), note.role)
-        y += QFontMetricsF(painter.font()).height() + 6.0

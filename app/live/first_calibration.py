@@ -25,7 +25,7 @@ def begin_first_calibration(jobs: Jobs, *, context: AppContext) -> None:
         return
 
     def done(_path: Path) -> None:
-        context.toasts.show(tr("The virtual sensor is calibrated."), "pass")
+        context.toasts.show(tr("The virtual sensor is calibrated."))
         context.requests.calibrations_changed.emit()
 
     jobs.submit(

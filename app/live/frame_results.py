@@ -124,6 +124,8 @@ class Shown:
         Images over the extent of the grid.
     quality_top : float
         Value at the upper end of the quality image's colours: mm, or a share.
+    without_uncertainty : bool
+        Whether the uncertainty was requested and the model states none.
     misfit : (rows, columns) float32 or None
         How far the image is from that of the depth, as a share of the flat membrane's brightness.
     surface : Surface or None
@@ -145,6 +147,7 @@ class Shown:
     normals: NDArray[np.uint8] | None = None
     quality: NDArray[np.uint8] | None = None
     quality_top: float = 0.0
+    without_uncertainty: bool = False
     misfit: Map | None = None
     surface: Surface | None = None
     cut: Cut | None = None
@@ -207,6 +210,7 @@ class Maker:
             normals=shown.normals() if wanted.normals else None,
             quality=quality,
             quality_top=top,
+            without_uncertainty=wanted.needs_uncertainty and raw.depth_sd_mm is None,
             misfit=misfit,
             surface=surface,
             cut=None if wanted.section is None else cut(heightmap, wanted.section, wanted.region),

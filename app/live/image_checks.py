@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.finding import Verdict
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]  # or one channel of it
@@ -26,25 +25,6 @@ DARK_SHARE_OF_SCALE = 0.25
 BRIGHTEST_PIXELS = 12
 # Seconds in which an old best focus loses half of its lead.
 BEST_HALF_LIFE_S = 20.0
-
-
-@dataclass(frozen=True, slots=True)
-class Exposure:
-    """The exposure of an image.
-
-    Attributes
-    ----------
-    saturated_share : float
-        Pixels with a channel at the end of scale, 0..1.
-    verdict : Verdict
-        Verdict on the exposure.
-    advice : str
-        Message for the user.
-    """
-
-    saturated_share: float
-    verdict: Verdict
-    advice: str
 
 
 def end_of_scale(rgb: Rgb) -> int:
@@ -68,8 +48,8 @@ def saturated(rgb: Rgb) -> NDArray[np.uint8]:
     return (brightest_channel(rgb) > limit).view(np.uint8) * np.uint8(255)
 
 
-def measure_exposure(rgb: Rgb) -> Exposure:
-    """Judge the exposure of an image.
+def measure_exposure(rgb: Rgb) -> Finding:
+    """Judge the exposure of an image. The value is the share of saturated pixels in percent.
 
     Parameters
     ----------
@@ -79,20 +59,21 @@ def measure_exposure(rgb: Rgb) -> Exposure:
     full = saturated(rgb)
     share = cv2.countNonZero(full) / full.size
     brightest = _level_of_brightest(rgb)
+    verdict = Verdict.PASS
     if share > SATURATED_WARN:
         verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
         text = tr("Too bright: {p} % of the pixels are saturated. Shorten the exposure.")
-        return Exposure(share, verdict, text.format(p=_percent(100.0 * share)))
-    if brightest < DARK_SHARE_OF_SCALE:
+        text = text.format(p=_percent(100.0 * share))
+    elif brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
         text = tr("Too dark: maximum {p} % of the scale. Lengthen the exposure.")
-        return Exposure(share, verdict, text.format(p=_percent(100.0 * brightest)))
-    if brightest >= 1.0:
-        return Exposure(
-            share, Verdict.PASS, tr("Good exposure, except for saturated bright spots.")
-        )
-    text = tr("Good exposure: the brightest areas reach {p} % of the scale.")
-    return Exposure(share, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))
+        text = text.format(p=_percent(100.0 * brightest))
+    elif brightest >= 1.0:
+        text = tr("Good exposure, except for saturated bright spots.")
+    else:
+        text = tr("Good exposure: the brightest areas reach {p} % of the scale.")
+        text = text.format(p=_percent(100.0 * brightest))
+    return Finding("saturated", text, 100.0 * share, "%", verdict=verdict)
 
 
 def _level_of_brightest(rgb: Rgb) -> float:

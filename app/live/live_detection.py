@@ -4,14 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from PySide6.QtCore import QObject
 
 from app.live.image_checks import Rgb
+from app.live.overlay import Overlay
 from app.live.session import LiveSession
 from app.sources.source import Frame
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.session.movement import MOVING_SHARE, moving_share
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """What is found in one frame.
+
+    Attributes
+    ----------
+    overlay : Overlay
+        Marks on the image.
+    finding : Finding
+        What was found. After a failure the frame cannot be captured; a warning is to be read first.
+    """
+
+    overlay: Overlay
+    finding: Finding
+
+    @property
+    def ready(self) -> bool:
+        """Whether the frame may be captured."""
+        return self.finding.verdict is not Verdict.FAIL
+
+    @property
+    def good(self) -> bool:
+        """Whether the frame may be captured, and there is nothing to read first."""
+        return self.finding.verdict is Verdict.PASS
+
+    @property
+    def sentence(self) -> str:
+        """What was found, or the problem and what to do."""
+        return self.finding.sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +53,7 @@ class Seen:
     `moved` counts from the last :meth:`LiveDetection.forget_movement`.
     """
 
-    detection: Any
+    detection: Detection
     still: bool
     moved: bool
 
@@ -40,7 +72,7 @@ class LiveDetection(QObject):
         self._live, self._movement = live, StillnessDetector()
         live.switched.connect(self._movement.restart)
 
-    def set_detector(self, detect: Callable[[Rgb], Any] | None) -> None:
+    def set_detector(self, detect: Callable[[Rgb], Detection] | None) -> None:
         """Use a detector from the next frame on. None: no detector."""
         # The processing thread must not hold a QObject: after a slow frame it would be the last one
         # that does, and would delete it outside the GUI thread.

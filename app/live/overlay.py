@@ -75,14 +75,6 @@ class Mask:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
-    """A line of text in the corner of the view."""
-
-    text: str
-    role: Role
-
-
-@dataclass(frozen=True, slots=True)
 class Overlay:
     """Everything that is drawn on one image."""
 
@@ -90,7 +82,6 @@ class Overlay:
     circles: tuple[Circle, ...] = ()
     lines: tuple[Line, ...] = ()
     masks: tuple[Mask, ...] = ()
-    notes: tuple[Note, ...] = ()
 
 
 # Below this radius a circle could not be distinguished from its centre, or grabbed.

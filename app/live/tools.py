@@ -14,29 +14,16 @@ from app.widgets.naming import named
 from app.widgets.tool_key import add_tool_key
 from gelpolight_core.translation import tr
 
-# name: (key, stays pressed, icon)
+# name: (label, key, stays pressed, icon)
 TOOLS = {
-    "fit": ("F", False, "fit"),
-    "full_size": ("1", False, "full-size"),
-    "freeze": ("Space", True, "pause"),
-    "snapshot": ("P", False, "picture"),
-    "zebra": ("Z", True, "zebra"),
-    "histogram": ("H", True, "histogram"),
-    "overlay": ("O", True, "marks"),
+    "fit": (tr("Fit to view"), "F", False, "fit"),
+    "full_size": (tr("Full size, 100 %"), "1", False, "full-size"),
+    "freeze": (tr("Freeze"), "Space", True, "pause"),
+    "snapshot": (tr("Save snapshot"), "P", False, "picture"),
+    "zebra": (tr("Mark saturated pixels"), "Z", True, "zebra"),
+    "histogram": (tr("Histogram"), "H", True, "histogram"),
+    "overlay": (tr("Show marks"), "O", True, "marks"),
 }
-
-
-def tool_texts() -> dict[str, str]:
-    """Return the label of each tool."""
-    return {
-        "fit": tr("Fit to view"),
-        "full_size": tr("Full size, 100 %"),
-        "freeze": tr("Freeze"),
-        "snapshot": tr("Save snapshot"),
-        "zebra": tr("Mark saturated pixels"),
-        "histogram": tr("Histogram"),
-        "overlay": tr("Show marks"),
-    }
 
 
 class ImageTools(QWidget):
@@ -59,14 +46,14 @@ class ImageTools(QWidget):
         self._buttons: dict[str, QToolButton] = {}
         self._zoom = named(PlainLabel(), "live.zoom", tr("Magnification"))
         row = hbox(of=self, margins=(4, 2, 8, 2), spacing=2)
-        for name, text in tool_texts().items():
-            row.addWidget(self._make_button(name, text, owner))
+        for name in TOOLS:
+            row.addWidget(self._make_button(name, owner))
         row.addStretch(1)
         row.addWidget(self._zoom)
         self._buttons["overlay"].setChecked(True)
 
-    def _make_button(self, name: str, text: str, owner: QWidget) -> QToolButton:
-        key, stays, sign = TOOLS[name]
+    def _make_button(self, name: str, owner: QWidget) -> QToolButton:
+        text, key, stays, sign = TOOLS[name]
         button = named(QToolButton(autoRaise=True), f"live.{name}", text, text, key)
         button.setIconSize(QSize(20, 20))
         button.setIcon(icon(sign))

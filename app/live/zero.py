@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from app.services.jobs import Job, Jobs
 from app.workspace.workspace import ENDING, Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Verdict
+from gelpolight_core.finding import Verdict, worst_of
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.background_shift import (
     BackgroundShift,
@@ -29,25 +28,6 @@ from gelpolight_core.translation import tr
 FRAMES = 8
 SUFFIX = "-zero"
 """End of the name of a calibration set to zero."""
-
-
-@dataclass(frozen=True, slots=True)
-class Zeroed:
-    """A calibration set to zero, and how far the background had moved before.
-
-    Attributes
-    ----------
-    path : Path
-        The calibration with the present background.
-    origin : Path
-        The original calibration, which is kept.
-    before : BackgroundShift
-        The image compared with the original background.
-    """
-
-    path: Path
-    origin: Path
-    before: BackgroundShift
 
 
 class ZeroControl(QObject):
@@ -95,17 +75,17 @@ class ZeroControl(QObject):
     def _on_failed(self, sentence: str) -> None:
         self._context.toasts.show(sentence, "fail")
 
-    def _on_zeroed(self, done: Zeroed) -> None:
+    def _on_zeroed(self, done: tuple[Path, BackgroundShift]) -> None:
+        path, before = done
         self._context.requests.calibrations_changed.emit()
-        poor = [f for f in done.before.quality.figures if f.verdict is not Verdict.PASS]
+        worst = worst_of(before.quality.figures)
         text = tr("Zero is set. The original calibration is kept.")
-        if poor:
-            text += " " + tr("The background had changed: {what} {v:.2g} {unit}.").format(
-                what=poor[0].label, v=poor[0].value, unit=poor[0].unit
-            )
+        if worst is not None:
+            text += " " + tr("The background had changed: {what}.").format(what=worst.stated)
         # A calibration that was itself made by Zero is overwritten. Only the original remains.
-        undo = (tr("Undo"), lambda: self._use(done.origin))
-        self._context.toasts.show(text, "warn" if poor else "pass", actions=(undo,))
+        undo = (tr("Undo"), lambda: self._use(original_of(path)))
+        verdict = Verdict.PASS if worst is None else Verdict.WARN
+        self._context.toasts.show(text, verdict, actions=(undo,))
 
     def _use(self, path: Path) -> None:
         try:
@@ -115,7 +95,9 @@ class ZeroControl(QObject):
         self._context.requests.calibrations_changed.emit()
 
 
-def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[Any]]) -> Zeroed:
+def zero_calibration(
+    workspace: Workspace, used: Path, frames: Sequence[NDArray[Any]]
+) -> tuple[Path, BackgroundShift]:
     """Write the calibration in use with the present background, and put it into use.
 
     The new file is next to the original, which is not changed. Zeroing again replaces the new file.
@@ -128,6 +110,13 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
         The calibration in use, which may itself be one set to zero.
     frames : sequence of (height, width, 3)
         Images of the untouched sensor.
+
+    Returns
+    -------
+    path : Path
+        The calibration with the present background.
+    before : BackgroundShift
+        The first image compared with the original background.
 
     Raises
     ------
@@ -142,7 +131,7 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
     path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")
     write_calibration(changed, path)
     workspace.use(path)
-    return Zeroed(path, origin, before)
+    return path, before
 
 
 def original_of(used: Path) -> Path:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from app.live.advice import Advice, LiveState, advise, preparing
-from gelpolight_core.finding import Finding
+from app.live.advice import PREPARING, LiveState, advise
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
 
 
 def measuring_advice(
     now: LiveState, *, frozen: bool, refused: str, findings: tuple[Finding, ...] = ()
-) -> Advice:
+) -> Finding | None:
     """Return what to do next.
 
     Parameters
@@ -23,24 +23,23 @@ def measuring_advice(
     findings : tuple of Finding
         About its height map.
     """
-    live = advise(now)
     if now.used is None and (frozen or not now.kind):
         if now.reading:
-            return preparing()
+            return PREPARING
         text = tr("No calibration is in use. Depth cannot be measured without one.")
-        return Advice(text, "sensors", tr("Choose or calibrate a sensor"), usable=False)
+        return Finding("sensors", text)
+    if frozen and refused:
+        return Finding("live", refused, verdict=Verdict.FAIL)
     if frozen:
-        if refused:
-            return Advice(refused, "live", tr("Back to the camera"), "fail", live.usable)
         text = " ".join(finding.line for finding in findings)
-        return Advice(text, role="warn" if text else "text", usable=live.usable)
+        return Finding("height_map", text, verdict=Verdict.WARN) if text else None
     if not now.kind:
         text = tr("No camera is selected. Choose one, open an image, or try the virtual sensor.")
-        return Advice(text, "virtual", tr("Use the virtual sensor"), usable=False)
-    if live.text:
+        return Finding("virtual", text)
+    if (live := advise(now)) is not None:
         return live
     if now.kind == "virtual":
-        return Advice(
-            tr("Place a ball, cylinder or cuboid on the virtual bench. It is then pressed in.")
-        )
-    return Advice(tr("Press an object into the membrane and hold it still."))
+        text = tr("Place a ball, cylinder or cuboid on the virtual bench. It is then pressed in.")
+    else:
+        text = tr("Press an object into the membrane and hold it still.")
+    return Finding("press", text)

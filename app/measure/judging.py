@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
+from app.measure.figures_text import unit_behind, unit_of
 from app.services.preferences import Limits
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.result import Quantity, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.records.entry import MeasurementRecord, indenter_record, verdict_of
+from gelpolight_core.records.entry import MeasurementRecord, verdict_of
 from gelpolight_core.translation import tr
 
 DEPTH_FIGURES = frozenset({"step_height", "height", "depth_difference", "mean_depth", "deepest"})
@@ -36,53 +36,77 @@ class Stated:
     height_mm: float | None = None
     name: str = ""
 
-    def truth(self, shape: str) -> Truth:
-        """Return the true sizes of an indenter."""
-        known = (math.nan if x is None else x for x in (self.size_mm, self.height_mm))
-        return Truth(shape, *known)
 
-
-def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Quantity, ...]:
-    """Compare a result with its true values.
-
-    Returns
-    -------
-    tuple of Quantity
-        Those with a true value: size and height of an indenter, the first figure of another tool.
+def quantities_of(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Quantity, ...]:
+    """Return the measured values of a result, with their true values where they are known.
 
     Raises
     ------
     InputError
         If a given length is not greater than zero.
     """
-    if result.measurement is not None:
-        truth = stated.truth(result.measurement.shape)
-        both = compare(result.measurement, truth, limits.percent)
-        return tuple(quantity for quantity in both if quantity.truth is not None)
-    true = stated.size_mm
-    if true is None:
-        return ()
-    if not (math.isfinite(true) and true > 0.0):
+    size_mm, height_mm = (_checked(x) for x in (stated.size_mm, stated.height_mm))
+    fit = result.measurement
+    if fit is not None:
+        return compare(fit, _truth(fit.shape, size_mm, height_mm), limits.percent)
+    first, *others = (Quantity(f"{f.name}_{f.unit}", f.value, f.sd) for f in result.figures)
+    if size_mm is None:
+        return (first, *others)
+    # The sign of a step only depends on the order of the clicks.
+    in_depth = result.figures[0].name in DEPTH_FIGURES
+    value = abs(first.value) if in_depth else first.value
+    limit = limits.percent[in_depth]
+    return (replace(first, value=value, truth=size_mm, limit_percent=limit), *others)
+
+
+def _truth(shape: str, *sizes_mm: float | None) -> Truth:
+    return Truth(shape, *(math.nan if size is None else size for size in sizes_mm))
+
+
+def _checked(true: float | None) -> float | None:
+    if true is not None and not (math.isfinite(true) and true > 0.0):
         raise InputError(
             tr("The true value is {value}").format(value=true),
             where=tr("True value"),
             advice=tr("Enter a value greater than zero"),
         )
-    figure = result.figures[0]
-    in_depth = figure.name in DEPTH_FIGURES
-    # The sign of a step only depends on the order of the clicks.
-    value = abs(figure.value) if in_depth else figure.value
-    limit = limits.percent[in_depth]
-    return (replace(_quantity(figure), value=value, truth=true, limit_percent=limit),)
+    return true
 
 
-def _quantity(figure: Measured) -> Quantity:
-    return Quantity(f"{figure.name}_{figure.unit}", figure.value, figure.sd)
+def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Finding, ...]:
+    """Compare a result with its true values.
+
+    Returns
+    -------
+    tuple of Finding
+        The error of every value whose true value is known, in percent.
+
+    Raises
+    ------
+    InputError
+        If a given length is not greater than zero.
+    """
+    fit = result.measurement
+    if fit is None:
+        labels = [figure.label for figure in result.figures]
+    else:
+        labels = [tr("mean side") if fit.shape == "cuboid" else tr("diameter"), tr("depth")]
+    return tuple(
+        Finding(
+            quantity.name,
+            f"{label}: {quantity.error:+.3f}{unit_behind(unit_of(quantity.name))}",
+            quantity.error_percent,
+            "%",
+            fail_limit=quantity.limit_percent,
+            verdict=Verdict.PASS if quantity.passed else Verdict.FAIL,
+        )
+        for label, quantity in zip(labels, quantities_of(result, stated, limits), strict=True)
+        if quantity.error_percent is not None
+    )
 
 
 def record_of(
     result: ToolResult,
-    judged: tuple[Quantity, ...],
     stated: Stated,
     heightmap: HeightMap,
     *,
@@ -97,8 +121,6 @@ def record_of(
     ----------
     result : ToolResult
         Result of a tool.
-    judged : tuple of Quantity
-        Comparison with the true values. Empty if there are none.
     stated : Stated
         The true values as entered.
     heightmap : HeightMap
@@ -110,28 +132,25 @@ def record_of(
     operator, note : str
         Operator, and their note.
     """
+    fit, quantities = result.measurement, quantities_of(result, stated, limits)
+    if fit is None:
+        shape, details = result.tool.name.replace("-", "_"), result_as_dict(result)
+    else:
+        shape = fit.shape
+        details = fit.as_json(_truth(shape, stated.size_mm, stated.height_mm))
     settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
     if stated.name:
         settings["indenter"] = stated.name
-    context: dict[str, Any] = {
-        "serial": serial,
-        "calibration_id": heightmap.calibration_id,
-        "operator": operator,
-        "picture": heightmap.source,
-        "note": note,
-        "settings": settings,
-    }
-    fit, doubtful = result.measurement, result.verdict != "ok"
-    if fit is not None:
-        truth = stated.truth(fit.shape)
-        record = indenter_record(fit, truth, limits_percent=limits.percent, **context)
-        return replace(record, verdict=verdict_of(record.quantities, doubtful=doubtful))
-    quantities = (*judged, *map(_quantity, result.figures[len(judged) :]))
     return MeasurementRecord(
-        shape=result.tool.name.replace("-", "_"),
+        serial=serial,
+        calibration_id=heightmap.calibration_id,
+        shape=shape,
         quantities=quantities,
-        verdict=verdict_of(quantities, doubtful=doubtful),
+        verdict=verdict_of(quantities, doubtful=result.verdict != "ok"),
         reason=result.reason,
-        details=result_as_dict(result),
-        **context,
+        settings=settings,
+        details=details,
+        operator=operator,
+        picture=heightmap.source,
+        note=note,
     )

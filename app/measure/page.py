@@ -163,7 +163,7 @@ class MeasurePage(QWidget):
         def done(number: int) -> None:
             if number:
                 text = tr("The evaluation is in the records as number {n}.")
-                self.context.toasts.show(text.format(n=number), "pass")
+                self.context.toasts.show(text.format(n=number))
 
         self.book.add_once(record, done)
 

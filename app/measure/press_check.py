@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.live.live_detection import Detection
 from app.live.overlay import Line, Marker, Overlay, Role
 from app.measure.placing import kind_label
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.steadiness import find_contact
@@ -82,25 +84,6 @@ def object_name(truth: Truth) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class PressSeen:
-    """Result of checking a frame of a press.
-
-    Attributes
-    ----------
-    overlay : Overlay
-        Marks on the image.
-    sentence : str
-        What to do.
-    at_mark : bool
-        Whether the object is pressed in at its position.
-    """
-
-    overlay: Overlay
-    sentence: str
-    at_mark: bool = False
-
-
 class PressCheck:
     """Checks live frames for one press. Called in the processing thread.
 
@@ -122,30 +105,35 @@ class PressCheck:
         self.phase = "lift"
         self._target, self._bare = target, bare
 
-    def __call__(self, rgb: NDArray[Any]) -> PressSeen:
-        """Check a frame of the press."""
+    def __call__(self, rgb: NDArray[Any]) -> Detection:
+        """Check a frame of the press: it passes if the object is pressed in at its position."""
         target, bare = self._target, self._bare
         if rgb.shape != bare.shape or rgb.dtype != bare.dtype:
             text = tr("The size of the camera image has changed. Capture the bare membrane again.")
-            return PressSeen(target.overlay("bad"), text)
+            return Detection(target.overlay("bad"), _not_yet("size", text))
         contact = find_contact(bare, rgb)
         if self.phase == "lift":
             if not contact.lifted:
-                return PressSeen(target.overlay(), tr("Lift everything off the sensor."))
+                text = tr("Lift everything off the sensor.")
+                return Detection(target.overlay(), _not_yet("lift", text))
             self.phase = "press"
         if not contact.pressed:
             self.phase = "press"
             text = tr("Press the object in at the mark until its base touches.")
-            return PressSeen(target.overlay(), text)
+            return Detection(target.overlay(), _not_yet("press", text))
         away_mm = math.dist(contact.centre_px, target.centre_px) / target.pixels_per_mm
         if away_mm > TOLERANCE_MM:
             self.phase = "press"
             text = tr(
                 "The object is {away:.1f} mm from the mark. Lift it and press it at the mark."
             )
-            return PressSeen(target.overlay("bad"), text.format(away=away_mm))
+            return Detection(target.overlay("bad"), _not_yet("away", text.format(away=away_mm)))
         self.phase = "hold"
-        return PressSeen(target.overlay("good"), tr("Hold it still."), at_mark=True)
+        return Detection(target.overlay("good"), Finding("hold", tr("Hold it still.")))
+
+
+def _not_yet(key: str, text: str) -> Finding:
+    return Finding(key, text, verdict=Verdict.WARN)
 
 
 def _face(press: Press) -> Array:

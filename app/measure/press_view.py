@@ -21,7 +21,6 @@ from app.view2d.display import Display
 from app.view3d.saving import ViewSaving
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
-from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.sensor_calibration import Calibration
@@ -240,7 +239,6 @@ class PressView(PressViewFrame):
             return
         record = record_of(
             result,
-            self.judged(),
             self.panel.truth.stated,
             heightmap,
             limits=self.context.settings.limits,
@@ -250,21 +248,16 @@ class PressView(PressViewFrame):
         )
         self.kept.emit(record)
 
-    def judged(self) -> tuple[Quantity, ...]:
-        """Return the comparison of the chosen tool's result with the true values."""
-        result = self.work.result
-        if result is None:
-            return ()
-        return judge(result, self.panel.truth.stated, self.context.settings.limits)
-
     def judge_again(self) -> None:
         """Compare with the true values again after they, the result or the limits changed."""
-        try:
-            rows = self.judged()
-        except InputError as error:
-            self.panel.truth.show_refusal(str(error))
+        truth, result = self.panel.truth, self.work.result
+        if result is None:
+            truth.say("")
             return
-        self.panel.truth.show_verdict(rows, self.work.result)
+        try:
+            truth.show_verdict(judge(result, truth.stated, self.context.settings.limits))
+        except InputError as error:
+            truth.say(str(error), "fail")
 
     def _refresh(self) -> None:
         can_freeze = self._shown is not None

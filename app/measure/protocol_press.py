@@ -176,18 +176,18 @@ class PressingView(QWidget):
         target = self._target
         if target is None or self._bare is None:
             return
-        judged = judge_press(
+        fault = judge_press(
             frames,
             self._bare,
             position_px=target.centre_px,
             tolerance_px=TOLERANCE_MM * target.pixels_per_mm,
         )
-        if not judged.accepted:
+        if fault is not None:
             # An identical press would be refused again. If it moved, holding still is enough.
-            self._must_move = not judged.moved
+            self._must_move = fault.key != "moved"
             self._detection.forget_movement()
-            self._work.refuse(target.press, judged.reason)
-            self.panel.show_live(tr("Refused: {why}").format(why=judged.reason))
+            self._work.refuse(target.press, fault.line)
+            self.panel.show_live(tr("Refused: {why}").format(why=fault.line))
             return
         if self._work.accept(target.press, frames):
             self._aim()
@@ -225,7 +225,7 @@ class PressingView(QWidget):
             return
         self.image.set_overlay(seen.detection.overlay)
         # Observations of the previous press do not apply to this one.
-        at_mark = self._check.phase == "hold" and seen.detection.at_mark
+        at_mark = self._check.phase == "hold" and seen.detection.good
         if self._must_move and at_mark and not seen.moved:
             return
         self._must_move = False

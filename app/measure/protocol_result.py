@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtGui import QDesktopServices, QPainter, QPaintEvent
+from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -17,7 +18,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.context.context import AppContext
-from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
 from app.services.file_dialogs import ask_folder
 from app.widgets.buttons import Slot, push_button
@@ -33,6 +33,22 @@ from gelpolight_core.report.evaluation import evaluation_document, evaluation_se
 from gelpolight_core.translation import tr
 
 ROW_HEIGHT = 24
+
+
+class Drawing(QWidget):
+    """A drawing of the report on white paper, as large as fits."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._renderer = QSvgRenderer(self, aspectRatioMode=Qt.AspectRatioMode.KeepAspectRatio)
+        self.load = self._renderer.load
+        self._renderer.repaintNeeded.connect(self.update)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw it."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), Qt.GlobalColor.white)
+        self._renderer.render(painter, self.rect())
 
 
 class ResultView(QWidget):
@@ -80,7 +96,9 @@ class ResultView(QWidget):
             tip=tr("Leave the run. Everything is saved"),
         )
         self.sentence = named(PlainLabel(wrap=True), "protocol.sentence", tr("Results"))
-        self.figure = Fig13()
+        self.figure = named(
+            Drawing(), "protocol.figure", tr("Errors by size and height, as in the paper's Fig. 13")
+        )
         self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
         split = splitter(Qt.Orientation.Vertical, (self.figure, 3), (self._tabs, 2))
         self.progress = named(QProgressBar(), "protocol.result.progress", tr("Running work"))
@@ -117,7 +135,7 @@ class ResultView(QWidget):
         self.verdict.setText(f"{serial}: {word} ({state})")
         show_meaning(self.verdict, document.verdict.value)
         self.sentence.setText(evaluation_sentence(evaluation) + ".")
-        self.figure.show_evaluation(evaluation)
+        self.figure.load(document.sections[0].drawings[0].svg.encode())
         self._show_tables(document)
         self._back.setEnabled(self._work.run.next() is not None)
 

@@ -218,7 +218,7 @@ class ResultsView(QWidget):
 
         def done(count: int) -> None:
             text = tr("{n} measurements saved to {path}").format(n=count, path=path)
-            self._context.toasts.show(text, "pass")
+            self._context.toasts.show(text)
 
         self._book.export(path, self.sensor.currentData() or None, done)
 

@@ -18,9 +18,7 @@ from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
-from gelpolight_core.measurement.measured import figure_labels
-from gelpolight_core.measurement.result import Quantity
-from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -211,37 +209,25 @@ class TruthForm(QGroupBox):
 
     # Comparison
 
-    def show_verdict(self, rows: tuple[Quantity, ...], result: ToolResult | None) -> None:
-        """Show the errors of the measurement. No rows: show what to do to see them."""
-        if not rows:
-            text = tr("Enter the true values to see the error.") if result is not None else ""
-            self._say(text, "muted")
-            return
-        self.verdict.setText("<br>".join(_sentence(row) for row in rows))
+    def show_verdict(self, findings: tuple[Finding, ...]) -> None:
+        """Show the errors of the measurement. Without any: show what to do to see them."""
+        if findings:
+            self.verdict.setText("<br>".join(map(_sentence, findings)))
+        else:
+            self.say(tr("Enter the true values to see the error."))
 
-    def show_refusal(self, sentence: str) -> None:
-        """Show why no comparison is possible."""
-        self._say(sentence, "fail")
-
-    def _say(self, text: str, role: str) -> None:
+    def say(self, text: str, role: str = "muted") -> None:
+        """Show a text in place of the errors."""
         self.verdict.setText(f"<span style='color:@{role}'>{escaped(text)}</span>")
 
 
-def _sentence(row: Quantity) -> str:
-    role, name = "pass" if row.passed else "fail", row.name.rpartition("_")[0]
-    labels = figure_labels() | {"side": tr("mean side"), "height": tr("depth")}
-    label = labels.get(name, name)
-    return tr(
-        "{label}: {error:+.3f}{unit}, <b style='color:@{role}'>{percent:+.2f} %: {word}"
-        " {limit:g} %</b>"
-    ).format(
-        label=escaped(label[:1].upper() + label[1:]),
-        error=row.error,
-        unit=escaped(UNITS.get(row.unit, row.unit)),
-        role=role,
-        percent=row.error_percent,
-        word=tr("within") if row.passed else tr("outside"),
-        limit=row.limit_percent,
+def _sentence(finding: Finding) -> str:
+    return tr("{text}, <b style='color:@{role}'>{percent:+.2f} %: {word} {limit:g} %</b>").format(
+        text=escaped(finding.text[:1].upper() + finding.text[1:]),
+        role=finding.verdict.value,
+        percent=finding.value,
+        word=tr("within") if finding.verdict is Verdict.PASS else tr("outside"),
+        limit=finding.fail_limit,
     )
 
 

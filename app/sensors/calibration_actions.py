@@ -60,7 +60,7 @@ class CalibrationActions:
                 text = tr("{name} is now in the library of sensor {serial}.").format(
                     name=imported.name, serial=imported.parent.name
                 )
-                self._context.toasts.show(text, "pass")
+                self._context.toasts.show(text)
         if imported is not None:
             self._context.requests.calibrations_changed.emit()
         return imported
@@ -129,7 +129,7 @@ class CalibrationActions:
             lambda: removals.append(workspace.remove(removal.old_path)),
         ):
             text = tr("{name} is in the library again.").format(name=removal.old_path.name)
-            self._context.toasts.show(text, "pass")
+            self._context.toasts.show(text)
 
     def _remove(self, entry: Entry) -> None:
         workspace, removals = self._context.workspace, list[Removal]()

@@ -6,7 +6,7 @@ import logging
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, QTimer, Signal
@@ -25,6 +25,7 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.native import give_own_window, native_windows
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
 
 log = logging.getLogger(__name__)
@@ -34,31 +35,25 @@ MARGIN = 12
 # Allows half the speed of a slow reader (180 words a minute), and a minimum time.
 LEAST_MS = 5000
 MS_A_WORD = 650
-ICONS = {"info": ("info", "accent"), "pass": ("pass", "pass"), "warn": ("warn", "warn")}
-ICONS["fail"] = ("fail", "fail")
-LEVELS = {"info": logging.INFO, "pass": logging.INFO, "warn": logging.WARNING}
-WORDS = {"info": tr("Note"), "pass": tr("Done"), "warn": tr("Warning"), "fail": tr("Error")}
+ICONS = {
+    Verdict.PASS: ("info", "accent"),
+    Verdict.WARN: ("warn", "warn"),
+    Verdict.FAIL: ("fail", "fail"),
+}
+LEVELS = {
+    Verdict.PASS: logging.INFO,
+    Verdict.WARN: logging.WARNING,
+    Verdict.FAIL: logging.ERROR,
+}
+WORDS = {Verdict.PASS: tr("Note"), Verdict.WARN: tr("Warning"), Verdict.FAIL: tr("Error")}
 
 
 @dataclass(frozen=True, slots=True)
-class Notice:
-    """A message in the history.
+class Message:
+    """A finding in the history: local time of its last repetition, and how often it was shown."""
 
-    Attributes
-    ----------
-    when : datetime
-        Local time of the message, or of its last repetition.
-    kind : str
-        ``info``, ``pass``, ``warn`` or ``fail``.
-    text : str
-        The message.
-    times : int
-        How often it was shown in succession.
-    """
-
+    finding: Finding
     when: datetime
-    kind: str
-    text: str
     times: int = 1
 
 
@@ -68,20 +63,19 @@ class Toast(QWidget):
     gone = Signal()
 
     def __init__(
-        self, parent: QWidget, text: str, kind: str, actions: tuple[tuple[str, Callable], ...]
+        self, parent: QWidget, finding: Finding, actions: tuple[tuple[str, Callable], ...]
     ) -> None:
         super().__init__(parent)
-        self.text = text
-        self.kind = kind
+        self.finding, self.text = finding, finding.text
         self.times = 1
-        named(self, "toast", f"{WORDS[kind]}: {text}")
+        named(self, "toast", f"{WORDS[finding.verdict]}: {self.text}")
         give_own_window(self)  # over the 3D view, which has a native window
-        self._label = PlainLabel(text, self, wrap=True)
+        self._label = PlainLabel(self.text, self, wrap=True)
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         sign = PlainLabel(parent=self)
         self._label.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
-        sign.setPixmap(icon(*ICONS[kind]).pixmap(22, 22))
+        sign.setPixmap(icon(*ICONS[finding.verdict]).pixmap(22, 22))
         sign.setAlignment(Qt.AlignmentFlag.AlignTop)
         close = named(QToolButton(self), "toast.close", tr("Close this message"), tr("Close"))
         close.setIcon(icon("close"))
@@ -118,7 +112,7 @@ class Toast(QWidget):
 
     def _restart(self) -> None:
         # An error stays until it is closed: the user may be at the sensor, not at the screen.
-        if self.kind != "fail":
+        if self.finding.verdict is not Verdict.FAIL:
             self._timer.start(max(LEAST_MS, MS_A_WORD * len(self.text.split())))
 
     def dismiss(self) -> None:
@@ -144,7 +138,7 @@ class Toast(QWidget):
         painter.setBrush(theme.colour("base"))
         painter.drawRoundedRect(self.rect().adjusted(0, 0, -1, -1), 6, 6)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(theme.colour(ICONS[self.kind][1]))
+        painter.setBrush(theme.colour(ICONS[self.finding.verdict][1]))
         painter.drawRect(0, 6, 4, self.height() - 12)
 
 
@@ -164,7 +158,7 @@ class Toasts(QObject):
         self._host: QWidget | None = None
         self._over: QWidget | None = None
         self._shown: list[Toast] = []
-        self._history: deque[Notice] = deque(maxlen=200)
+        self._history: deque[Message] = deque(maxlen=200)
         self._show_log: Callable[[], None] | None = None
         # A native window that appears later would cover the messages.
         native_windows.appeared.connect(self._raise_all)
@@ -191,7 +185,7 @@ class Toasts(QObject):
     def show(
         self,
         text: str,
-        kind: str = "info",
+        verdict: str = Verdict.PASS,
         *,
         actions: tuple[tuple[str, Callable[[], object]], ...] = (),
         with_log: bool = False,
@@ -202,25 +196,26 @@ class Toasts(QObject):
         ----------
         text : str
             One or two sentences.
-        kind : str
-            ``info``, ``pass``, ``warn`` or ``fail``. The last one stays until it is closed.
+        verdict : str
+            ``pass``, ``warn`` or ``fail``. The last one stays until it is closed.
         actions : tuple of (label, callable)
             Buttons, such as "Undo".
         with_log : bool
             Whether a button opens the log.
         """
-        log.log(LEVELS.get(kind, logging.ERROR), "%s", text)
-        self._remember(text, kind)
+        finding = Finding("message", text, verdict=Verdict(verdict))
+        log.log(LEVELS[finding.verdict], "%s", text)
+        self._remember(finding)
         if self._host is None:
             return
         for toast in self.shown():
-            if (toast.text, toast.kind) == (text, kind) and not actions:
+            if toast.finding == finding and not actions:
                 toast.again()
                 self._arrange()
                 return
         if with_log and self._show_log is not None:
             actions = (*actions, (tr("Show log"), self._show_log))
-        toast = Toast(self._host, text, kind, actions)
+        toast = Toast(self._host, finding, actions)
         toast.gone.connect(lambda: self._forget(toast))
         self._shown.append(toast)
         for old in self._shown[:-MOST]:
@@ -241,17 +236,15 @@ class Toasts(QObject):
         return list(self._shown)
 
     @property
-    def history(self) -> tuple[Notice, ...]:
+    def history(self) -> tuple[Message, ...]:
         """The last messages of this run, oldest first."""
         return tuple(self._history)
 
-    def _remember(self, text: str, kind: str) -> None:
-        notice = Notice(datetime.now().astimezone(), kind, text)
-        last = self._history[-1] if self._history else None
-        if last is not None and (last.text, last.kind) == (text, kind):
-            notice = replace(notice, times=last.times + 1)
-            self._history.pop()
-        self._history.append(notice)
+    def _remember(self, finding: Finding) -> None:
+        times = 1
+        if self._history and self._history[-1].finding == finding:
+            times += self._history.pop().times
+        self._history.append(Message(finding, datetime.now().astimezone(), times))
         self.history_changed.emit()
 
     def _detach(self) -> None:

@@ -14,10 +14,8 @@ from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
+from gelpolight_core.finding import Finding, worst_of
 from gelpolight_core.translation import tr
-
-# From the least to the most important.
-ORDER = ("pass", "info", "warn", "fail")
 
 
 class NotificationsButton(QToolButton):
@@ -40,7 +38,7 @@ class NotificationsButton(QToolButton):
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._toasts, self._show_log = toasts, show_log
-        self._new: list[str] = []
+        self._new: list[Finding] = []
         toasts.history_changed.connect(self._on_message)
         self.clicked.connect(self.show_list)
         self._show()
@@ -58,12 +56,12 @@ class NotificationsButton(QToolButton):
         return panel
 
     def _on_message(self) -> None:
-        self._new.append(self._toasts.history[-1].kind)
+        self._new.append(self._toasts.history[-1].finding)
         self._show()
 
     def _show(self) -> None:
-        worst = max(self._new, key=ORDER.index, default="")
-        self.setIcon(icon(*ICONS[worst]) if worst else icon("info"))
+        worst = worst_of(self._new)
+        self.setIcon(icon("info") if worst is None else icon(*ICONS[worst.verdict]))
         self.setText(str(len(self._new)) if self._new else "")
         text = tr("Notifications: {n} new").format(n=len(self._new))
         self.setAccessibleName(text if self._new else tr("Notifications"))
@@ -81,12 +79,11 @@ class NotificationList(QFrame):
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.setSelectionMode(QListWidget.SelectionMode.NoSelection)
-        for notice in reversed(toasts.history):
-            times = f"  ({notice.times}x)" if notice.times > 1 else ""
-            item = QListWidgetItem(
-                icon(*ICONS[notice.kind]), f"{notice.when:%H:%M:%S}  {notice.text}{times}"
-            )
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{WORDS[notice.kind]}: {notice.text}")
+        for message in reversed(toasts.history):
+            times = f"  ({message.times}x)" if message.times > 1 else ""
+            text, verdict = message.finding.text, message.finding.verdict
+            item = QListWidgetItem(icon(*ICONS[verdict]), f"{message.when:%H:%M:%S}  {text}{times}")
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{WORDS[verdict]}: {text}")
             self.list.addItem(item)
         empty = PlainLabel(tr("No messages in this run"), self)
         empty.setVisible(not toasts.history)

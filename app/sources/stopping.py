@@ -69,12 +69,11 @@ class Worker:
         )
         self._thread.start()
 
-    def stop(self) -> None:
-        """Stop the thread after its present frame; may be called twice."""
+    def stop(self, timeout_s: float = STOP_S) -> bool:
+        """Stop the thread after its present work, if it runs; return whether it has stopped."""
         self._end.set()
-        if self._thread is not None:
-            join(self._thread)
-            self._thread = None
+        thread, self._thread = self._thread, None
+        return thread is None or join(thread, timeout_s)
 
     def _run(self, end: threading.Event) -> None:
         raise NotImplementedError

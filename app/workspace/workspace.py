@@ -245,7 +245,7 @@ class Workspace:
             self._refuse_outside(path)
             if summary.fault and not summary.accepted:
                 raise InputError(
-                    summary.fault,
+                    summary.fault.text,
                     where=str(path),
                     advice=tr("Calibrate again, or use it on the Sensors page with a reason"),
                 )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.finding import Finding, QualityTable, Verdict, failure, worst_verdict
+from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, worst_verdict
 from gelpolight_core.io.reading import (
     brief,
     check_version,
@@ -86,9 +86,9 @@ class CalibrationSummary:
         return worst_verdict(self.quality)
 
     @property
-    def fault(self) -> str:
-        """Which figures failed, as a clause; empty if none did."""
-        return failure(self.quality)
+    def fault(self) -> Finding | None:
+        """Which figures failed; None if none did."""
+        return calibration_fault(self.quality)
 
 
 def read_summary(path: Path) -> CalibrationSummary:

@@ -17,6 +17,7 @@ from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.calibration.recipe import Progress, Recipe, Results, Stage, StageInputs
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
+from gelpolight_core.causes import with_one_cause
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
 from gelpolight_core.session.session import Session
@@ -180,7 +181,13 @@ class Project(EditableSession):
         """Return the present status of every stage, by its key."""
         with self._lock:
             inputs = self._inputs()
-            return {s.key: self._status(s, inputs[s.key]) for s in self.recipe.of(self._session)}
+            found = {s.key: self._status(s, inputs[s.key]) for s in self.recipe.of(self._session)}
+        cause, tables = with_one_cause({key: status.quality for key, status in found.items()})
+        if cause:
+            for key, table in tables.items():
+                if table.figures:
+                    found[key] = judged_by(table, cause=cause)
+        return found
 
     def stale(self, *, upto: str | None = None) -> tuple[str, ...]:
         """Return the keys of the stages that can and need to be computed, in order.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from gelpolight_core.finding import QualityTable
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -40,8 +40,17 @@ class StageStatus:
     quality: QualityTable = field(default_factory=QualityTable)
 
 
-def judged_by(table: QualityTable) -> StageStatus:
-    """Return the status of a stage by the figures of its up-to-date result."""
-    advice = ". ".join(table.remedies)
+def judged_by(table: QualityTable, *, cause: str = "") -> StageStatus:
+    """Return the status of a stage by the figures of its up-to-date result.
+
+    Parameters
+    ----------
+    table : QualityTable
+        The figures.
+    cause : str, optional
+        From which the findings without a remedy follow.
+    """
+    follows = any(f.verdict is not Verdict.PASS and not f.remedy for f in table.figures)
+    advice = ". ".join(((cause,) if cause and follows else ()) + table.remedies)
     sentence = f"{advice}." if advice else tr("Everything is within its limits.")
     return StageStatus(StageState(table.verdict.value), sentence, table)

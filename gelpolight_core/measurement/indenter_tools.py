@@ -14,7 +14,7 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.spread import MODE_ERRORS, MODE_PITCH_MM, ModeError
 from gelpolight_core.measurement.tool import Point, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.near_light.settings import SETTINGS
+from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.translation import tr
 
 AUTO = "auto"
@@ -72,18 +72,15 @@ def mode_error(heightmap: HeightMap) -> ModeError:
     heightmap : HeightMap
         If it does not state its effort, the fastest is assumed.
     """
-    if heightmap.model == "paper":
-        return replace(MODE_ERRORS["paper"], lateral_per_mm=heightmap.lateral_per_mm)
     effort = "fast" if heightmap.trace is None else heightmap.trace.effort
-    found, finer = MODE_ERRORS[effort], heightmap.pitch_mm / MODE_PITCH_MM
-    full = heightmap.model == "full"
-    node_mm = heightmap.pitch_mm * (SETTINGS[effort].factor if full else 1)
+    found = MODE_ERRORS[Mode(heightmap.model, effort)]
+    node_mm = heightmap.pitch_mm * found.node_mm
     return replace(
         found,
-        depth_per_slope=found.depth_per_slope * finer**2,
+        depth_per_slope=found.depth_per_slope * (heightmap.pitch_mm / MODE_PITCH_MM) ** 2,
+        lateral_per_mm=heightmap.lateral_per_mm,
         node_mm=node_mm,
-        # Of the mean over a node's pixels, and of linear interpolation between nodes.
-        blur_mm2=node_mm**2 / 3.0 if full else 0.0,
+        blur_mm2=found.blur_mm2 * node_mm**2 / 3.0,
     )
 
 

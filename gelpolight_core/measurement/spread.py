@@ -28,6 +28,8 @@ from numpy.typing import NDArray
 from gelpolight_core.measurement.fit import FitResult, WindowData
 from gelpolight_core.measurement.measured import noise_at
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
+from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -69,18 +71,26 @@ WIDTH_BY_NODES = 0.7
 virtual and rendered sensors it is 26 to 52 um with nodes of 0.2 mm, 8 to 15 um with nodes of 0.1
 mm."""
 MODE_PITCH_MM = 0.025
-MODE_ERRORS: Mapping[str, ModeError] = MappingProxyType(
+_PER_SLOPE = {"best": 0.001, "balanced": 0.0015, "fast": 0.003}
+MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
     {
-        "best": ModeError(0.0, 0.001),
-        "balanced": ModeError(0.0, 0.0015),
-        "fast": ModeError(0.0, 0.003),
-        "paper": ModeError(0.03, 0.0),
+        **{
+            # The mean over a node's pixels, and linear interpolation between nodes.
+            Mode(FULL, effort): ModeError(0.0, share, 0.0, SETTINGS[effort].factor, 1.0)
+            for effort, share in _PER_SLOPE.items()
+        },
+        **{
+            Mode(IN_PLACE, effort): ModeError(0.0, share, 0.0, 1.0)
+            for effort, share in _PER_SLOPE.items()
+        },
+        **{Mode(PAPER, effort): ModeError(0.03, 0.0) for effort in _PER_SLOPE},
     }
 )
-"""Chosen by hand to cover the errors of flat presses of 3 to 7 mm, 0.3 to 1.5 mm deep, into virtual
-and rendered sensors, on grids of `MODE_PITCH_MM`: coarse nodes round the upper end of walls, with
-the square of the pitch. The paper's model uses the lights of the undeformed surface, and the point
-where a ray meets that surface."""
+"""On a grid of pitch 1: `node_mm` in pitches, `blur_mm2` over a third of its square. Chosen by hand
+to cover the errors of flat presses of 3 to 7 mm, 0.3 to 1.5 mm deep, into virtual and rendered
+sensors, on grids of `MODE_PITCH_MM`: coarse nodes round the upper end of walls, with the square of
+the pitch. The paper's model uses the lights of the undeformed surface, and the point where a ray
+meets that surface."""
 
 
 def noise_of_fit(

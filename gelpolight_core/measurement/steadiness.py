@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.session.movement import BLOCK_PX, MOVING_SHARE, changed_blocks, moving_share
 from gelpolight_core.translation import tr
 
@@ -53,33 +54,6 @@ class Contact:
         return self.share < LIFTED_SHARE
 
 
-@dataclass(frozen=True, slots=True)
-class PressJudgement:
-    """Whether frames show a press that can be used.
-
-    Attributes
-    ----------
-    accepted : bool
-        Whether they do.
-    reason : str
-        Why not, and what to do; empty when accepted.
-    moving_share : float
-        Largest share of the image that changed between two of the frames.
-    contact : Contact
-        What is pressed.
-    """
-
-    accepted: bool
-    reason: str
-    moving_share: float
-    contact: Contact
-
-    @property
-    def moved(self) -> bool:
-        """Whether it was moving; false if this is unknown."""
-        return self.moving_share > MOVING_SHARE
-
-
 def find_contact(bare: Frame, now: Frame) -> Contact:
     """Return what is pressed in a frame.
 
@@ -107,8 +81,8 @@ def judge_press(
     *,
     position_px: tuple[float, float] | None = None,
     tolerance_px: float = math.inf,
-) -> PressJudgement:
-    """Check whether consecutive frames show a press without movement.
+) -> Finding | None:
+    """Return why consecutive frames do not show a usable press; None if they do.
 
     Parameters
     ----------
@@ -121,36 +95,31 @@ def judge_press(
     tolerance_px : float, optional
         Largest distance of the middle of the press from it.
     """
-    nowhere = Contact(0.0, (math.nan, math.nan))
     if len(frames) < 2:
-        return PressJudgement(
-            False, tr("More than one frame is needed to detect movement."), math.nan, nowhere
-        )
+        return _fault("one_frame", tr("More than one frame is needed to detect movement"))
     if any(f.shape != bare.shape or f.dtype != bare.dtype for f in frames):
-        reason = tr("The camera image and the image of the bare membrane have different sizes.")
-        return PressJudgement(False, reason, math.nan, nowhere)
+        text = tr("The camera image and the image of the bare membrane have different sizes")
+        return _fault("size", text)
+    contact = find_contact(bare, frames[-1])
+    if not contact.pressed:
+        remedy = tr("Press the object in until its base touches")
+        return _fault("not_pressed", tr("Nothing is pressed"), remedy=remedy)
     # Also the first and the last frame: between consecutive frames, slow creep is not visible.
     pairs = [*pairwise(frames), (frames[0], frames[-1])]
     moving = max(moving_share(*pair) for pair in pairs)
-    contact = find_contact(bare, frames[-1])
-    reason = _reason(contact, moving, position_px, tolerance_px)
-    return PressJudgement(not reason, reason, moving, contact)
-
-
-def _reason(
-    contact: Contact, moving: float, position_px: tuple[float, float] | None, tolerance_px: float
-) -> str:
-    """Return why a press is refused; empty where it is not."""
-    if not contact.pressed:
-        return tr("Nothing is pressed: press the object in until its base touches.")
     if moving > MOVING_SHARE:
-        return tr("It moved ({share:.1f} % of the image changed): hold it still.").format(
-            share=100.0 * moving
-        )
+        percent = 100.0 * moving
+        text = tr("It moved: {share:.1f} % of the image changed").format(share=percent)
+        return _fault("moved", text, percent, "%", remedy=tr("Hold it still"))
     if position_px is not None:
-        away = math.dist(contact.centre_px, position_px)
-        if away > tolerance_px:
-            return tr("It is {px:.0f} pixels away from the circle: move it to the circle.").format(
-                px=away
-            )
-    return ""
+        away_px = math.dist(contact.centre_px, position_px)
+        if away_px > tolerance_px:
+            text = tr("It is {px:.0f} pixels away from the circle").format(px=away_px)
+            return _fault("away", text, away_px, "px", remedy=tr("Move it to the circle"))
+    return None
+
+
+def _fault(
+    key: str, text: str, value: float = math.nan, unit: str = "", *, remedy: str = ""
+) -> Finding:
+    return Finding(key, text, value, unit, verdict=Verdict.FAIL, remedy=remedy)

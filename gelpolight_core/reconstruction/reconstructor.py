@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import failed_calibration
+from gelpolight_core.finding import calibration_fault
 from gelpolight_core.health.finding import KEYS, Health
 from gelpolight_core.reconstruction.checks import accepted
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -268,7 +268,8 @@ class Reconstructor:
             frame, self._wanted(health, normals=normals, uncertainty=uncertainty)
         )
         known = health or Health()
-        failed = failed_calibration(self.calibration.quality)
+        fault = calibration_fault(self.calibration.quality)
+        failed = () if fault is None else (fault,)
         grid, noise = self.calibration.table.grid, solved.noise
         return HeightMap(
             depth_mm=solved.depth_mm,

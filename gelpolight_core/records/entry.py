@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from gelpolight_core.measurement.result import Measurement, Quantity, Truth, compare
+from gelpolight_core.measurement.result import Quantity
 
 PASSED, FAILED, DOUBTFUL, UNJUDGED = "pass", "fail", "doubtful", ""
 
@@ -83,35 +83,3 @@ def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool = False) -> str
     if not judged:
         return UNJUDGED
     return PASSED if all(judged) else FAILED
-
-
-def indenter_record(
-    measurement: Measurement,
-    truth: Truth | None = None,
-    *,
-    limits_percent: tuple[float, float],
-    **context: Any,
-) -> MeasurementRecord:
-    """Return the record of a fitted indenter.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        The fit; for a cuboid the mean side is stored as ``side_mm``, because its error is judged by
-        it.
-    truth : Truth, optional
-        Nominal sizes, as far as they are known.
-    limits_percent : (float, float)
-        Largest errors of size and height that pass.
-    **context
-        Further fields of :class:`MeasurementRecord`.
-    """
-    quantities = compare(measurement, truth, limits_percent)
-    return MeasurementRecord(
-        shape=measurement.shape,
-        quantities=quantities,
-        verdict=verdict_of(quantities, doubtful=measurement.verdict != "ok"),
-        reason=measurement.reason,
-        details=measurement.as_json(truth),
-        **context,
-    )

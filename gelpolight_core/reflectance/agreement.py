@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from gelpolight_core.finding import Finding, judge
+from gelpolight_core.finding import Finding, Verdict, judge
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -73,31 +73,38 @@ class PressAgreement:
         return 100.0 * (max(ratio, 1.0 / ratio) - 1.0)
 
     @property
-    def fault(self) -> str:
-        """The most probable cause, with the remedy; empty if the press agrees."""
-        limit = ODD_WARN_PERCENT / 100.0
+    def fault(self) -> Finding | None:
+        """The most probable cause, with the remedy; None if the press agrees."""
+        name, limit = self.name, ODD_WARN_PERCENT / 100.0
         if self.usual_odd_share > limit:
-            return tr(
-                "no press follows a single reflectance curve. On a very glossy membrane this is"
-                " normal if the figures of the joint refinement pass; otherwise check the LEDs, the"
-                " exposure and the ball radii, and repeat mirror, whiteboard and background"
+            text = tr("No press follows a single reflectance curve")
+            remedy = tr(
+                "On a very glossy membrane this is normal if the figures of the joint refinement"
+                " pass; otherwise check the LEDs, the exposure and the ball radii, and repeat"
+                " mirror, whiteboard and background"
             )
-        if self.odd_share > limit:
-            return tr(
-                "{share:.0f} % of the contact in {name} does not look like a ball: remove dirt,"
-                " clean the membrane and press again, or leave the capture out"
-            ).format(name=self.name, share=100.0 * self.odd_share)
-        if self.radius_off_percent > RADIUS_WARN_PERCENT:
-            return tr(
-                "the radius of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
-                " other presses: correct the radius (not the diameter), or check the circle"
-            ).format(name=self.name, stated=self.stated_radius_mm, fitted=self.radius_mm)
-        if self.moved_share > MOVED_SHARE:
-            return tr(
-                "the circle of {name} is misplaced by {share:.0f} % of its radius: drag it onto the"
-                " contact's edge"
-            ).format(name=self.name, share=100.0 * self.moved_share)
-        return ""
+        elif self.odd_share > limit:
+            text = tr("{share:.0f} % of the contact in {name} does not look like a ball")
+            text = text.format(name=name, share=100.0 * self.odd_share)
+            remedy = tr("Remove dirt, clean the membrane and press again, or leave the capture out")
+        elif self.radius_off_percent > RADIUS_WARN_PERCENT:
+            text = tr(
+                "The radius of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
+                " other presses"
+            ).format(name=name, stated=self.stated_radius_mm, fitted=self.radius_mm)
+            remedy = tr("Correct the radius (not the diameter), or check the circle")
+        elif self.moved_share > MOVED_SHARE:
+            text = tr("The circle of {name} is misplaced by {share:.0f} % of its radius")
+            text = text.format(name=name, share=100.0 * self.moved_share)
+            remedy = tr("Drag it onto the contact's edge")
+        else:
+            return None
+        return Finding("agreement", text, verdict=Verdict.FAIL, remedy=remedy)
+
+    @property
+    def remedy(self) -> str:
+        """The cause and the remedy without a full stop; empty if the press agrees."""
+        return "" if self.fault is None else self.fault.line[:-1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +176,7 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ..
             # If no press follows a curve, as with a glossy membrane, the curve cannot show a wrong
             # radius. The joint refinement compares the presses again.
             fail=None if odd.usual_odd_share > ODD_WARN_PERCENT / 100.0 else RADIUS_FAIL_PERCENT,
-            remedy=_sentence(odd.fault),
+            remedy=odd.remedy,
         ),
         judge(
             "press_dirt_percent",
@@ -177,13 +184,9 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ..
             100.0 * poor.odd_share,
             "%",
             warn=ODD_WARN_PERCENT,
-            remedy=_sentence(poor.fault),
+            remedy=poor.remedy,
         ),
     )
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _gather(

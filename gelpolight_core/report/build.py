@@ -13,6 +13,7 @@ from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.recipes import JOINT, recipe_named, stage_title
 from gelpolight_core.calibration.scatter import gather_scatter
+from gelpolight_core.causes import with_one_cause
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.report import drawings, tables
@@ -149,22 +150,24 @@ def _assemble(c: Calibration, run: Run | None, validation: Validation | None) ->
         if show := SHOWN.get(stage):
             parts |= show(c.data, run)
     validation = validation or _not_validated()
+    cause, quality = with_one_cause(c.quality)
     sections = tuple(
         Section(
             key,
             stage_title(key),
             recipe.tables[key].about if key in recipe.tables else "",
-            quality,
+            table,
             facts.get(key, ()),
             *parts.get(key, ((), ())),
         )
-        for key, quality in c.quality.items()
+        for key, table in quality.items()
     )
     sources = tuple(sorted(c.provenance.sources.items()))
     return Report(
         title=tr("Calibration of sensor {serial}").format(serial=c.serial),
         verdict=Verdict.FAIL if validation.verdict is Verdict.FAIL else c.verdict,
         sections=sections,
+        cause=cause,
         facts=head_facts(c),
         validation=validation,
         listings=(Listing(tr("Source files"), (tr("file"), "SHA-256"), sources),),

@@ -138,6 +138,8 @@ class Report:
         Verdict on all of it.
     sections : tuple of Section
         In their order.
+    cause : str
+        The most likely cause of what is not within its limits, as a sentence without a full stop.
     facts : tuple of (label, value)
         Sensor and provenance.
     validation : Validation or None
@@ -153,6 +155,7 @@ class Report:
     title: str
     verdict: Verdict
     sections: tuple[Section, ...]
+    cause: str = ""
     facts: Facts = ()
     validation: Validation | None = None
     listings: tuple[Listing, ...] = ()

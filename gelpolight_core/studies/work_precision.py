@@ -29,6 +29,7 @@ from gelpolight_core.measurement.score import (
     scored_radius_mm,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.modes import MODES, PAPER, Mode
 from gelpolight_core.report.drawing import png
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
@@ -84,11 +85,9 @@ class Point:
     size_percent: float
 
 
-def mode_label(mode: str) -> str:
-    """Return a mode's name for people."""
-    if mode == "paper":
-        return tr("paper's model")
-    return tr("full model, {effort}").format(effort=mode)
+def modes() -> dict[str, Mode]:
+    """Return each mode by its name: the model's, or the effort of the full model."""
+    return {PAPER: MODES[-1], **{mode.effort: mode for mode in MODES[:-1]}}
 
 
 def measure_virtual(
@@ -206,7 +205,7 @@ def measure_session(
     for name in solvers:
         median, p95 = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
         means = np.abs(errors[name]).mean(axis=0).tolist()
-        label, width = mode_label(name), calibration.camera.width
+        label, width = modes()[name].label, calibration.camera.width
         sensor, pitch_mm = calibration.serial, calibration.table.grid.pitch_mm
         points.append(Point(sensor, name, label, width, pitch_mm, len(rows), median, p95, *means))
     return tuple(points)

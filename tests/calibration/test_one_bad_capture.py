@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from app.calibrate.balls import judge_ball
-from app.calibrate.image_step import Judgement
 from app.calibrate.lens import judge_view
 from app.calibrate.top_pose import judge_top_view
 from gelpolight_core.calibration.open_sensor import LENS
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
+from gelpolight_core.finding import Finding, Verdict
 
 SEVERAL = ("lens", "top_pose", "balls")
 
@@ -57,19 +57,18 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
     lens = project.results.get(LENS)
     assert lens is not None
     views = {view.name: view for view in lens.views}
-    judges: dict[str, Callable[[str], Judgement]] = {
+    judges: dict[str, Callable[[str], Finding | None]] = {
         "lens": lambda name: judge_view(views.get(name)),
         "top_pose": lambda name: judge_top_view(name, project, status),
         "balls": lambda name: judge_ball(name, project),
     }
     for path in project.session.found(project.recipe[stage].folder):
-        state, sentence, *_ = judges[stage](path.name)
+        finding = judges[stage](path.name)
+        assert finding is not None
+        assert (finding.verdict is Verdict.FAIL) is (path.name in reasons)
         if path.name in reasons:
-            assert state == "fail"
-            assert reasons[path.name] in sentence
+            assert reasons[path.name] in finding.sentence
             assert path.name in left_out.remedy
-        else:
-            assert state in ("pass", "warn")
 
 
 def test_a_stage_of_nothing_but_bad_captures_fails(

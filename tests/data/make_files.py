@@ -89,13 +89,16 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
     measure_heightmap = named("gelpolight_core.measurement.indenter_tools:measure_heightmap")
     reconstructor = named("gelpolight_core.reconstruction.reconstructor:Reconstructor")
     records = named("gelpolight_core.records.records:Records")
-    record_of = named("gelpolight_core.records.entry:indenter_record")
+    entry = named("gelpolight_core.records.entry:MeasurementRecord")
+    verdict_of = named("gelpolight_core.records.entry:verdict_of")
+    compare = named("gelpolight_core.measurement.result:compare")
     image = rgb_of(session / f"presses/{PRESS}.png")
     measurement = measure_heightmap(reconstructor(calibration).depth(image), shape="cylinder")
-    record = record_of(
-        measurement, TRUTH, serial="small-1",
-        calibration_id=calibration.identity, limits_percent=(5.0, 8.0),
-        settings={"model": calibration.model}, operator="A. Tester", picture=f"{PRESS}.png",
+    quantities = compare(measurement, TRUTH, (5.0, 8.0))
+    record = entry(
+        serial="small-1", calibration_id=calibration.identity, shape=measurement.shape,
+        quantities=quantities, verdict=verdict_of(quantities, doubtful=False),
+        details=measurement.as_json(TRUTH), settings={"model": calibration.model}, operator="A. Tester", picture=f"{PRESS}.png",
         note="first press",
     )  # fmt: skip
     with records.open(workspace / "records.sqlite") as book:

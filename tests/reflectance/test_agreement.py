@@ -42,7 +42,7 @@ def test_good_presses_agree_with_each_other(small_project: Project) -> None:
     results = small_project.results
     found = compared(results, results[BALLS].images)
     assert len(found) == len(results[BALLS].presses)
-    assert [a.fault for a in found] == [""] * len(found)
+    assert [a.fault for a in found] == [None] * len(found)
     assert max(a.radius_off_percent for a in found) < 8.0
     assert max(a.odd_share for a in found) < 0.05
 
@@ -63,9 +63,9 @@ def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
     (odd,) = [a for a in reflectance.agreements if a.fault]
     assert odd.name.endswith(ODD)
     assert odd.radius_mm == pytest.approx(4.0, rel=0.08)
-    assert "radius" in odd.fault
+    assert "radius" in odd.remedy
     presses = project.session.found("balls")
-    assert [p.name for p in presses if judge_ball(p.name, project)[0] == "fail"] == [ODD]
+    assert [p.name for p in presses if judge_ball(p.name, project).verdict == "fail"] == [ODD]
     project.set_ball_radius(ODD, 4.0)
     assert recomputed(project).quality["press_radius_percent"].verdict is Verdict.PASS
 
@@ -96,4 +96,4 @@ def test_dirt_on_a_contact_is_named(small_project: Project) -> None:
     images = (results[BALLS].images[0], dirty, *results[BALLS].images[2:])
     (odd,) = [a for a in compared(results, images) if a.fault]
     assert odd.name.endswith(ODD)
-    assert "dirt" in odd.fault
+    assert "dirt" in odd.remedy

@@ -23,6 +23,7 @@ from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.scatter import gather_scatter
+from gelpolight_core.causes import MODEL
 from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
 from gelpolight_core.measurement.result import Quantity
 from gelpolight_core.report.build import calibration_report, run_report
@@ -275,3 +276,13 @@ def test_the_command_refuses_what_it_cannot_write_before_any_work(
     missing = tmp_path / "none" / "r.pdf"
     assert main(["report", str(virtual_session), "-o", str(missing)]) == MENDABLE
     assert "folder does not exist" in capsys.readouterr().err
+
+
+def test_the_most_likely_cause_is_first_and_what_follows_from_it_has_no_remedy(
+    tmp_path: Path,
+) -> None:
+    poor = [judge(key, key, 2.0, warn=1.0, remedy="Coat it again") for key in MODEL]
+    calibration = replace(small(), quality={"joint": QualityTable(tuple(poor))})
+    text = " ".join(report_text(written(calibration_report(calibration), tmp_path)).split())
+    assert text.index("Most likely cause: Check the LED height.") < text.index("Not validated")
+    assert "Coat it again" not in text

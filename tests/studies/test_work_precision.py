@@ -137,7 +137,7 @@ def test_one_calibration_is_measured_on_the_presses_of_a_session(
     write_calibration(virtual_calibration, file)
     arguments = ["work-precision", str(two_presses), "--calibration", str(file), "-o", str(out)]
     assert main([*arguments, "--repeats", "1"]) == 0
-    assert "full model, best" in capsys.readouterr().out
+    assert "Full model, best" in capsys.readouterr().out
     with (out / "work-precision.csv").open() as stream:
         rows = {row["mode"]: row for row in csv.DictReader(stream)}
     assert float(rows["best"]["rms_um"]) > 0.0 and rows["best"]["on_front"] == "True"

@@ -92,7 +92,7 @@ class LivePanel(QWidget):
     def stop(self) -> bool:
         """Stop the thread; return whether it has stopped."""
         self._timer.stop()
-        return self._worker.stop()
+        return self._worker.stop(timeout_s=5.0)
 
     def apply_theme(self) -> None:
         """Apply the colours of the present theme."""

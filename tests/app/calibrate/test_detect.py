@@ -13,16 +13,17 @@ from boards import BOARD, CAMERA, board_pose, render_board, true_corners
 
 from app.calibrate.background import detect_background
 from app.calibrate.balls import BallSetting, detect_ball
-from app.calibrate.detection import Detection
+from app.calibrate.detection import as_image
 from app.calibrate.lens import detect_board
 from app.calibrate.lights import detect_mirror
 from app.calibrate.marks import mirror_positions_px
 from app.calibrate.radiance import detect_whiteboard
 from app.calibrate.top_pose import detect_top_pose
+from app.live.live_detection import Detection
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import BoardView
+from gelpolight_core.optics.checkerboard import find_board
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.sensor_calibration import sensor_stack
@@ -49,12 +50,6 @@ def frame(image: LinearImage) -> np.ndarray:
 def board_frame(**pose: float) -> np.ndarray:
     """Return a frame of the 9 x 6 board in a pose."""
     return frame(render_board(CAMERA, board_pose(**pose)))
-
-
-def view_of(detection: Detection) -> BoardView:
-    """Return the detected board."""
-    assert isinstance(detection.found, BoardView)
-    return detection.found
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +128,7 @@ def test_the_next_view_is_requested_where_no_corners_are() -> None:
 
 def test_after_two_flat_views_a_tilted_one_is_requested() -> None:
     flat = [
-        view_of(detect_board(board_frame(tilt_deg=2.0, roll_deg=roll), BOARD))
+        find_board(as_image(board_frame(tilt_deg=2.0, roll_deg=roll)), BOARD)
         for roll in (5.0, 40.0)
     ]
     third = board_frame(tilt_deg=2.0, roll_deg=-30.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -13,20 +14,28 @@ from test_wizard import Made
 from app.calibrate.film_strip import Capture
 from app.calibrate.residual_table import ResidualTable
 from gelpolight_core.calibration.ball_stage import BALLS
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.session.session import read_session
 
+
+def capture(name: str, value: float, verdict: Verdict = Verdict.PASS) -> Capture:
+    """Return a capture with its residual."""
+    finding = Finding("corner_error_px", "Corner error", value, "px", verdict=verdict)
+    return Capture(Path(name), finding)
+
+
 CAPTURES = (
-    Capture(Path("a.png"), "pass", "Good.", "", 0.1),
-    Capture(Path("b.png"), "warn", "Bad.", "", 0.4),
-    Capture(Path("c.png"), "fail", "No board."),
-    Capture(Path("d.png"), "pass", "Good.", "", 0.25),
+    capture("a.png", 0.1),
+    capture("b.png", 0.4, Verdict.WARN),
+    capture("c.png", math.nan, Verdict.FAIL),
+    capture("d.png", 0.25),
 )
 
 
 def shown(qtbot: QtBot) -> ResidualTable:
     table = ResidualTable()
     qtbot.addWidget(table)
-    table.show_captures(CAPTURES, heading="Corner error, px", shown="d.png")
+    table.show_captures(CAPTURES, shown="d.png")
     table.show()
     return table
 

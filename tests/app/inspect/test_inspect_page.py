@@ -265,7 +265,7 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     context.settings.prefer(recording_limit_gb=1e-6)  # it stops by itself
     qtbot.waitUntil(lambda: not page.recorder.busy, timeout=4 * WAIT_MS)
     assert page.recorder.action.text() == "Record"
-    assert any("size limit" in notice.text for notice in context.toasts.history)
+    assert any("size limit" in message.finding.text for message in context.toasts.history)
     (path,) = context.workspace.folder.glob("sensors/*/recordings/*.gplrec")
     page.open_path(path)
     _wait_for_depth(page, qtbot)
@@ -306,18 +306,21 @@ def test_undo_of_a_second_zero_restores_the_original(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    workspace, offered = context.workspace, []
+    workspace, shown = context.workspace, []
     path = workspace.calibration_path(small_calibration.serial, "mine")
     write_calibration(small_calibration, path)
     kept = path.read_bytes()
     image = min((small_session / "background").glob("*.png"))
     frames = [read_image(image).rgb] * FRAMES
     first = zero_calibration(workspace, path, frames)
-    second = zero_calibration(workspace, first.path, frames)
-    assert workspace.in_use == first.path == second.path != path
-    monkeypatch.setattr(context.toasts, "show", lambda *_, actions: offered.extend(actions))
+    second = zero_calibration(workspace, first[0], [0.9 * rgb for rgb in frames])
+    assert workspace.in_use == first[0] == second[0] != path
+    monkeypatch.setattr(
+        context.toasts, "show", lambda *said, actions: shown.append((said, actions))
+    )
     page.zero._on_zeroed(second)
-    ((_, undo),) = offered
+    (((text, verdict), ((_, undo),)),) = shown
+    assert verdict == "warn" and "The background had changed" in text
     undo()
     assert workspace.in_use == path
     assert path.read_bytes() == kept

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.live.advice import Known, LiveState, advise
+from app.live.advice import BUTTONS, Known, LiveState, action_of, advise
 from gelpolight_core.finding import Finding, Verdict
 
 MINE = Known("A", (1280, 960))
@@ -34,25 +34,29 @@ def test_advice_names_what_is_missing_and_offers_an_action(
     now: LiveState, act: str, usable: bool
 ) -> None:
     advice = advise(now)
-    assert advice.text and advice.button
-    assert (advice.act, advice.usable) == (act, usable)
+    assert advice is not None and advice.text
+    assert (action_of(advice), now.usable) == (act, usable)
+    assert act in BUTTONS
 
 
 def test_a_fault_of_the_image_is_shown_in_one_line_and_zero_is_offered_where_it_helps() -> None:
     dim = advise(LiveState("camera", size=MINE.size, used=MINE, fault=DIM))
     off = advise(LiveState("camera", size=MINE.size, used=MINE, fault=OFF))
-    assert (dim.text, dim.act, dim.role) == (DIM.line, "zero", "warn")
-    assert (off.text, off.act, off.role) == (OFF.line, "", "fail")
+    assert (dim, action_of(dim)) == (DIM, "zero")
+    assert (off, action_of(off)) == (OFF, "")
 
 
 def test_a_calibration_of_another_sensor_or_size_is_named() -> None:
-    other = advise(LiveState("recording", "B", used=MINE)).text
-    assert "A" in other and "B" in other
-    size = advise(LiveState("folder", size=(640, 480), used=MINE)).text
-    assert "640x480" in size and "1280x960" in size
+    other = advise(LiveState("recording", "B", used=MINE))
+    assert other is not None
+    assert "A" in other.text and "B" in other.text
+    size = advise(LiveState("folder", size=(640, 480), used=MINE))
+    assert size is not None
+    assert "640x480" in size.text and "1280x960" in size.text
 
 
 def test_a_calibration_being_read_is_not_reported_missing() -> None:
     for now in (LiveState("camera", reading=True), LiveState("virtual", "V", reading=True)):
         advice = advise(now)
-        assert "calibration" in advice.text and not advice.usable and not advice.act
+        assert advice is not None and not now.usable and not action_of(advice)
+        assert "calibration" in advice.text

@@ -42,16 +42,16 @@ def test_three_percent_of_saturation_are_reported_with_advice(dtype: type) -> No
     count = round(0.03 * 120 * 160)
     rgb.reshape(-1, 3)[:count, 1] = np.iinfo(dtype).max
     exposure = measure_exposure(rgb)
-    assert exposure.saturated_share == pytest.approx(0.03, abs=1e-4)
+    assert exposure.value == pytest.approx(3.0, abs=0.01)
     assert exposure.verdict is Verdict.FAIL
-    assert exposure.advice == ("Too bright: 3 % of the pixels are saturated. Shorten the exposure.")
+    assert exposure.text == ("Too bright: 3 % of the pixels are saturated. Shorten the exposure.")
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
 def test_a_dark_image_needs_a_longer_exposure(dtype: type) -> None:
     exposure = measure_exposure(image(0.1, dtype))
     assert exposure.verdict is Verdict.WARN
-    assert "Lengthen the exposure" in exposure.advice
+    assert "Lengthen the exposure" in exposure.text
 
 
 def test_a_black_image_with_three_bright_spots_is_well_exposed() -> None:
@@ -64,7 +64,7 @@ def test_a_black_image_with_three_bright_spots_is_well_exposed() -> None:
 def test_a_few_hot_pixels_do_not_hide_a_dark_image() -> None:
     rgb = image(0.05)
     rgb[::40, ::60] = 180
-    assert "Too dark" in measure_exposure(rgb).advice
+    assert "Too dark" in measure_exposure(rgb).text
 
 
 @given(st.sampled_from(DEPTHS), st.floats(0.3, 0.95))

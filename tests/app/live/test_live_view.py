@@ -19,7 +19,7 @@ from pytestqt.qtbot import QtBot
 from app.live.drawing import ROLE_COLOURS
 from app.live.image_checks import pixel_text
 from app.live.live_view import LiveView
-from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay
+from app.live.overlay import Circle, Line, Marker, Mask, Overlay
 from gelpolight_core.errors import InputError
 
 HEIGHT, WIDTH = 60, 80
@@ -146,14 +146,13 @@ def test_every_kind_of_mark_shows_and_can_be_switched_off(view: LiveView) -> Non
         "circles": Circle(40.0, 30.0, 12.0, "expected", handle="ball"),
         "lines": Line(np.array([[5.0, 50.0], [70.0, 50.0], [70.0, 55.0]]), "info", closed=True),
         "masks": Mask(area, "bad"),
-        "notes": Note("Ball found", "good"),
     }
     for kind, item in items.items():
         view.set_overlay(Overlay(**{kind: (item,)}))
         assert (pixels(image_view) != bare).any(), kind
     child(view, "live.overlay").click()
     np.testing.assert_array_equal(pixels(image_view), bare)
-    view.set_overlay(Overlay(notes=(Note("later", "bad"),)))
+    view.set_overlay(Overlay(masks=(Mask(area, "good"),)))
     np.testing.assert_array_equal(pixels(image_view), bare)
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from app.measure.judging import Stated, judge, record_of
 from app.services.preferences import Limits
-from gelpolight_core.finding import doubt
+from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
@@ -48,9 +48,8 @@ def _record(
     flat = np.zeros((2, 2), np.float32)
     axis, flags = np.arange(2.0), flat.astype(np.uint8)
     heightmap = HeightMap(flat, axis, axis, 1.0, None, flags, "A-1", "full", "p.png")
-    judged = judge(result, stated, limits)
     return record_of(
-        result, judged, stated, heightmap, limits=limits, serial="A", operator="Ada", note="by hand"
+        result, stated, heightmap, limits=limits, serial="A", operator="Ada", note="by hand"
     )
 
 
@@ -58,21 +57,21 @@ def _record(
 def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
     found = compare(FIT, Truth("cylinder", size, height))
     rows = judge(PRESSED, Stated(size, height), Limits())
-    assert [row.error_percent for row in rows] == [length.error_percent for length in found]
+    assert [row.value for row in rows] == [length.error_percent for length in found]
     record = _record(PRESSED, Stated(size, height))
-    assert [q.error_percent for q in record.quantities] == [row.error_percent for row in rows]
+    assert [q.error_percent for q in record.quantities] == [row.value for row in rows]
     assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
 
 
 def test_only_what_is_known_is_judged() -> None:
     assert judge(PRESSED, Stated(), Limits()) == ()
     (row,) = judge(PRESSED, Stated(size_mm=5.0), Limits())
-    assert (row.name, row.limit_percent) == ("diameter_mm", 5.0)
+    assert (row.key, row.fail_limit) == ("diameter_mm", 5.0)
     (row,) = judge(PRESSED, Stated(height_mm=1.0), Limits())
-    assert (row.name, row.limit_percent) == ("height_mm", 8.0)
+    assert (row.key, row.fail_limit) == ("height_mm", 8.0)
     (row,) = judge(APART, Stated(size_mm=2.0), Limits())
-    assert row.error_percent == pytest.approx(50.0)
-    assert not row.passed
+    assert row.value == pytest.approx(50.0)
+    assert row.verdict is Verdict.FAIL
 
 
 def test_the_verdict_follows_the_limits() -> None:

@@ -69,9 +69,8 @@ def test_the_live_image_is_followed_from_lifting_to_holding() -> None:
     beside = (2.0 + 2 * TOLERANCE_MM, 1.0)
     assert "mm from the mark" in check(frame(beside, 3)).sentence
     assert check.phase == "press"
-    at_mark = check(frame(press.position_mm, 4))
-    assert at_mark.at_mark and check.phase == "hold"
-    assert not check(np.zeros((12, 16, 3), np.uint8)).at_mark
+    assert check(frame(press.position_mm, 4)).good and check.phase == "hold"
+    assert not check(np.zeros((12, 16, 3), np.uint8)).good
 
 
 def test_the_bench_presses_once_about_where_it_should() -> None:

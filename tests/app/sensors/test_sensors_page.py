@@ -122,7 +122,7 @@ def test_using_one_that_is_not_validated_warns(
     assert chosen.in_use
     assert context.workspace.in_use == chosen.path
     assert not chosen.validated
-    assert context.toasts.shown()[-1].kind == "warn"
+    assert context.toasts.shown()[-1].finding.verdict == "warn"
     assert not page.use.isEnabled()
 
 
@@ -307,7 +307,7 @@ def test_a_failed_report_is_shown_to_the_user(
     page.open_path(source)
     page.report.trigger()
     qtbot.waitUntil(lambda: page.report.isEnabled(), timeout=20000)
-    assert context.toasts.shown()[-1].kind == "fail"
+    assert context.toasts.shown()[-1].finding.verdict == "fail"
     assert str(place.parent) in context.toasts.shown()[-1].text
 
 

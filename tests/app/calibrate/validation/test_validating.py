@@ -140,7 +140,7 @@ def test_reports_of_the_window_and_of_the_command_state_the_validation(
     step.import_press(small_session / PRESS)
     technician.until(lambda: "Diameter" in step.form.result.text())
     step.keep()
-    technician.wizard.at("result").saving.write_report(tmp_path / "window.pdf")
+    technician.wizard.at("result").write_report(tmp_path / "window.pdf")
     technician.rest()
     assert main(["report", str(path), "-o", str(tmp_path / "command.pdf")]) == 0
     window, command = (report_data(tmp_path / f"{n}.pdf") for n in ("window", "command"))
