@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from gelpolight_core.translation import joined, pattern, tr
+from gelpolight_core.translation import joined, pattern, tr, translated
 
 TINY = 1e-9
 """Rounding error only: no figure's limit is this close to 0."""
@@ -179,7 +179,7 @@ def judge(
         verdict = Verdict.FAIL
     else:
         verdict = Verdict.WARN if beyond(warn) else Verdict.PASS
-    return Finding(key, text, float(value), unit, warn, fail, verdict, remedy)
+    return Finding(key, text, float(value), unit, warn, fail, verdict, translated(remedy))
 
 
 def judge_left_out(key: str, text: str, reasons: Sequence[str]) -> Finding:

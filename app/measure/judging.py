@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from app.services.preferences import Limits
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -93,9 +93,9 @@ def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Judged, .
     true = stated.size_mm
     if not (math.isfinite(true) and true > 0.0):
         raise InputError(
-            tr("The true value is {value}").format(value=true),
+            tr("The true value is {value}, not greater than zero").format(value=true),
             where=tr("True value"),
-            advice=tr("Enter a value greater than zero"),
+            advice=Remedy.CORRECT_VALUE,
         )
     # The sign of a step only depends on the order of the clicks.
     measured = abs(figure.value) if figure.name in DEPTH_FIGURES else figure.value

@@ -40,11 +40,7 @@ def read_presses(folder: Path) -> dict[str, int]:
         data = read_file(path, 4_000_000)
     except FileNotFoundError:
         return {}
-    with refusing(
-        tr("The list of presses cannot be read ({error})"),
-        path,
-        advice=tr("Repair the file, or delete it to count from 0"),
-    ):
+    with refusing(tr("The list of presses cannot be read ({error})"), path):
         content = parse_json(data)
         check_version(content, FORMAT, VERSION, path)
         rows = content["calibrations"].items()

@@ -124,11 +124,7 @@ def read_validation(calibration: Path) -> Validation | None:
         data = read_file(path, 1_000_000)
     except FileNotFoundError:
         return None
-    with refusing(
-        tr("The validation cannot be read ({error})"),
-        path,
-        advice=tr("Validate the calibration again"),
-    ):
+    with refusing(tr("The validation cannot be read ({error})"), path):
         content = parse_json(data)
         check_version(content, FORMAT, VERSION, path)
         return _parse(content)

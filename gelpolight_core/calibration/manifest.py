@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, QualityTable, Verdict, failure, worst_verdict
 from gelpolight_core.io.reading import (
     brief,
     check_version,
+    missing_file,
     open_file,
     parse_json,
     read_member,
@@ -249,16 +249,8 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         stream = open_file(path)
     except FileNotFoundError as error:
-        raise InputError(
-            tr("The file does not exist"),
-            where=str(path),
-            advice=tr("Create it with gelpolight calibrate"),
-        ) from error
-    with refusing(
-        tr("The file is damaged, or is not a calibration ({error})"),
-        path,
-        advice=tr("Use a backup copy, or calibrate again from the session"),
-    ):
+        raise missing_file(path) from error
+    with refusing(tr("The file is damaged, or is not a calibration ({error})"), path):
         try:
             with stream, zipfile.ZipFile(stream) as archive:
                 yield archive

@@ -16,7 +16,7 @@ from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.calibration.recipe import Progress, Recipe, Results, Stage, StageInputs
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
 from gelpolight_core.session.missing import refuse_missing_stages
 from gelpolight_core.session.session import Session, read_session
@@ -264,8 +264,8 @@ class Project(EditableSession):
                 if not self._is_current(key, found):
                     raise InputError(
                         tr("The stage {stage} has no up-to-date result").format(stage=key),
-                        where=str(session.folder),
-                        advice=tr("Complete the stages that are not done yet"),
+                        where=session.folder,
+                        advice=Remedy.COMPLETE_STAGES,
                     )
                 if (fault := self.fault(key)) is not None:
                     raise fault

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.health.finding import as_dict
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, HeightMap
 from gelpolight_core.translation import tr
@@ -100,5 +100,5 @@ def _no_message() -> InputError:
     return InputError(
         tr("it is not a height map message that this program can read"),
         where=tr("stream"),
-        advice=tr("Subscribe to a stream of the same version of the program"),
+        advice=Remedy.UPDATE,
     )

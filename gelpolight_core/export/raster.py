@@ -13,10 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.io.npy import read_arrays
-from gelpolight_core.io.reading import refusing
+from gelpolight_core.io.reading import missing_file, refusing
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
@@ -116,15 +115,12 @@ def read_npz(path: Path) -> HeightMap:
     InputError
         If it cannot be read, or is not a height map.
     """
-    advice = tr("Choose an .npz file exported by this program")
     found = tr("The file is not a height map in npz format, or is damaged ({error})")
-    with refusing(found, path, advice=advice):
+    with refusing(found, path):
         try:
             stored = read_arrays(path, NPZ_NAMES)
         except FileNotFoundError as error:
-            raise InputError(
-                tr("The file does not exist"), where=str(path), advice=advice
-            ) from error
+            raise missing_file(path) from error
         texts = {name: stored[name].tolist() for name in NPZ_TEXTS if name in stored}
         # Files of one earlier state of the program have the faults under another name.
         faults = [*texts.pop("faults", ()), *texts.pop("doubts", ())]

@@ -20,7 +20,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 TEXT_LIMIT = 1_000_000
@@ -84,8 +84,8 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
             tr("The file is larger than {n} bytes, the limit for files of this kind").format(
                 n=limit
             ),
-            where=str(path),
-            advice=tr("Choose another file"),
+            where=path,
+            advice=Remedy.CHOOSE_FILE,
         )
     return data
 
@@ -163,8 +163,8 @@ def read_toml(path: Path, *, missing: InputError | None = None) -> dict[str, Any
     except ValueError as error:
         raise InputError(
             tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct this line"),
+            where=path,
+            advice=Remedy.CORRECT_FILE,
         ) from error
 
 
@@ -224,13 +224,13 @@ def refuse_newer(version: int, newest: int, path: Path) -> None:
             tr("The file has version {v}, but this program only reads up to version {k}").format(
                 v=version, k=newest
             ),
-            where=str(path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
+            where=path,
+            advice=Remedy.UPDATE,
         )
 
 
 @contextmanager
-def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
+def refusing(found: str, path: Path) -> Iterator[None]:
     """Refuse a file whose content turns out to be invalid.
 
     Parameters
@@ -239,8 +239,6 @@ def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
         The sentence of the error, with a placeholder ``{error}`` for the reason.
     path : Path
         The file.
-    advice : str
-        What to do about it.
 
     Raises
     ------
@@ -251,7 +249,9 @@ def refusing(found: str, path: Path, *, advice: str) -> Iterator[None]:
         yield
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
-        raise InputError(found.format(error=reason), where=str(path), advice=advice) from error
+        raise InputError(
+            found.format(error=reason), where=path, advice=Remedy.REPAIR_FILE
+        ) from error
 
 
 def plain_text(value: Any, most: int = 10_000) -> str:
@@ -308,17 +308,15 @@ def brief(value: Any, most: int = 60) -> str:
 
 def missing_file(path: Path) -> InputError:
     """Return the error for a file that does not exist."""
-    return InputError(
-        tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
-    )
+    return InputError(tr("The file does not exist"), where=path, advice=Remedy.CHECK_NAME)
 
 
 def unreadable(error: OSError, path: Path) -> InputError:
     """Return the error for a file that the system cannot read."""
     return InputError(
         tr("The file cannot be read ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check its permissions and the disk, or copy it to your own folder"),
+        where=path,
+        advice=Remedy.CHECK_DISK,
     )
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import append_durably
 from gelpolight_core.io.reading import parse_json, plain_text, read_file
 from gelpolight_core.io.texts import text_of_file
@@ -127,11 +127,7 @@ def _failure(outcome: Any) -> str:
 
 
 def _damaged(path: Path) -> InputError:
-    return InputError(
-        tr("the file is not text in UTF-8"),
-        where=str(path),
-        advice=tr("Move the file away; the presses are then measured again"),
-    )
+    return InputError(tr("the file is not text in UTF-8"), where=path, advice=Remedy.REPAIR_FILE)
 
 
 def _as_json(measurement: Measurement) -> dict[str, Any]:

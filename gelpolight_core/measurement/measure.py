@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.fit import (
     EdgePrior,
     FitResult,
@@ -108,7 +108,7 @@ def measure_object(
         raise InputError(
             tr("unknown shape '{shape}'").format(shape=shape),
             where=tr("shape"),
-            advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
+            advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
     window, region, prior = find_object(
         depth_mm,
@@ -172,7 +172,7 @@ def find_object(
                 x=region.centre_mm[0], y=region.centre_mm[1]
             ),
             where=tr("depth map"),
-            advice=tr("Press it nearer to the middle of the sensor"),
+            advice=Remedy.PRESS_MIDDLE,
         )
     window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
     pixel_mm2 = window.pitch_mm**2
@@ -195,21 +195,17 @@ def _checked(
         raise InputError(
             tr(
                 "the depth map has shape {shape}, but there are positions for {x} "
-                "columns and {y} rows"
+                "columns and {y} rows (8 or more of each are needed)"
             ).format(shape=depth.shape, x=x.size, y=y.size),
             where=tr("depth map"),
-            advice=tr("Give arrays of one grid, at least 8 x 8"),
+            advice=Remedy.CORRECT_VALUE,
         )
     weight = np.isfinite(depth).astype(np.float64)
     if flags is not None:
         weight[(flags & np.uint8(Flag.OUTSIDE)) != 0] = 0.0
         weight[(flags & ~np.uint8(Flag.OUTSIDE)) != 0] *= DOUBTFUL_WEIGHT
     if not weight.any():
-        raise InputError(
-            tr("no pixel is usable"),
-            where=tr("depth map"),
-            advice=tr("Check the image and the working area"),
-        )
+        raise InputError(tr("no pixel is usable"), where=tr("depth map"), advice=Remedy.CHECK_AREA)
     return np.where(weight > 0.0, depth, 0.0), x, y, weight
 
 
@@ -219,9 +215,7 @@ def _chosen_region(
     """Return the object at the seed, or the only one."""
     if not regions:
         raise InputError(
-            tr("no object is pressed"),
-            where=tr("depth map"),
-            advice=tr("Press the object into the membrane and capture the image again"),
+            tr("no object is pressed"), where=tr("depth map"), advice=Remedy.PRESS_DEEPER
         )
     if seed_mm is not None:
         return _region_at(regions, x_mm, y_mm, seed_mm)
@@ -233,7 +227,7 @@ def _chosen_region(
                 count=len(tall), places=places
             ),
             where=tr("depth map"),
-            advice=tr("Choose one: give --seed X Y with a point on it"),
+            advice=Remedy.CHOOSE_OBJECT,
         )
     return tall[0]
 
@@ -248,13 +242,11 @@ def _region_at(
     nearest = min(regions, key=distance)
     if not distance(nearest) <= SEED_REACH_MM:
         raise InputError(
-            tr("no object lies at the seed point ({x:g}, {y:g}) mm").format(
-                x=seed_mm[0], y=seed_mm[1]
-            ),
+            tr(
+                "no object lies at ({x:g}, {y:g}) mm; the nearest is at ({a:.1f}, {b:.1f}) mm"
+            ).format(x=seed_mm[0], y=seed_mm[1], a=nearest.centre_mm[0], b=nearest.centre_mm[1]),
             where=tr("seed"),
-            advice=tr("The nearest is at ({x:.1f}, {y:.1f}) mm").format(
-                x=nearest.centre_mm[0], y=nearest.centre_mm[1]
-            ),
+            advice=Remedy.CHOOSE_OBJECT,
         )
     return nearest
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.reading import brief, is_file_name, read_file
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.io.reading import brief, is_file_name, missing_file, read_file
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement, Truth, percent_error
 from gelpolight_core.translation import tr
@@ -130,20 +130,16 @@ def read_truth(path: Path) -> TruthTable:
         where = tr("{path}, line {line}").format(path=path, line=line)
         file, shape = record.get("file", ""), record.get("shape", "").lower()
         if not file:
-            raise InputError(
-                tr("a row names no file"), where=where, advice=tr("Name the image of the press")
-            )
+            raise InputError(tr("a row names no file"), where=where, advice=Remedy.TRUTH_ROW)
         if not is_file_name(file):
             raise InputError(
                 tr("'{file}' is not the name of an image in this folder").format(file=brief(file)),
                 where=where,
-                advice=tr("Put the image beside truth.csv, and name it without a folder"),
+                advice=Remedy.TRUTH_ROW,
             )
         if file in seen:
             raise InputError(
-                tr("{file} is listed twice").format(file=file),
-                where=where,
-                advice=tr("Keep one row for each image"),
+                tr("{file} is listed twice").format(file=file), where=where, advice=Remedy.TRUTH_ROW
             )
         seen.add(file)
         if shape in MODELS:
@@ -152,9 +148,7 @@ def read_truth(path: Path) -> TruthTable:
             skipped.append(file)
     if not rows:
         raise InputError(
-            tr("no row with a cylinder, cuboid or ball"),
-            where=str(path),
-            advice=tr("Add a row for each press that has a true size"),
+            tr("no row with a cylinder, cuboid or ball"), where=path, advice=Remedy.TRUTH_ROW
         )
     return TruthTable(tuple(rows), tuple(skipped))
 
@@ -164,18 +158,10 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     try:
         text = read_file(path).decode("utf-8-sig")
     except FileNotFoundError as error:
-        raise InputError(
-            tr("The file does not exist"),
-            where=str(path),
-            advice=tr("Put a truth.csv with the columns {names} there").format(
-                names="file,shape,diameter_mm,side_mm,height_mm"
-            ),
-        ) from error
+        raise missing_file(path) from error
     except UnicodeDecodeError as error:
         raise InputError(
-            tr("the file is not text in UTF-8"),
-            where=str(path),
-            advice=tr("Save it again as CSV in UTF-8"),
+            tr("the file is not text in UTF-8"), where=path, advice=Remedy.SAVE_CSV
         ) from error
     reader = csv.reader(text.splitlines())
     try:
@@ -184,7 +170,7 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         raise InputError(
             tr("the file is not a table ({error})").format(error=error),
             where=tr("{path}, line {line}").format(path=path, line=reader.line_num),
-            advice=tr("Save it again as CSV in UTF-8"),
+            advice=Remedy.SAVE_CSV,
         ) from error
     header = [name.strip() for name in numbered[0][1]] if numbered else []
     missing = [name for name in NEEDED if name not in header]
@@ -192,9 +178,9 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         missing.append("diameter_mm")
     if missing:
         raise InputError(
-            tr("the column {names} is missing").format(names=", ".join(missing)),
-            where=str(path),
-            advice=tr("Write the column names in the first line, separated by commas"),
+            tr("the column {names} is missing in the first line").format(names=", ".join(missing)),
+            where=path,
+            advice=Remedy.CORRECT_FILE,
         )
     return [
         (line, dict(zip(header, (cell.strip() for cell in cells), strict=False)))
@@ -218,11 +204,9 @@ def _length(record: dict[str, str], key: str, where: str) -> float:
     if 0.0 < value <= LONGEST_MM:
         return value
     raise InputError(
-        tr("{key} is '{text}'").format(key=key, text=brief(text))
-        if text
-        else tr("{key} is empty").format(key=key),
+        tr("{key} is '{text}', not a length in mm up to {most:g}").format(
+            key=key, text=brief(text), most=LONGEST_MM
+        ),
         where=where,
-        advice=tr("Give a length in mm greater than zero")
-        if not value > LONGEST_MM
-        else tr("Give a length of at most {most:g} mm").format(most=LONGEST_MM),
+        advice=Remedy.CORRECT_VALUE,
     )

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.reading import brief, parse_toml, read_file
 from gelpolight_core.measurement.evaluation import Crossing
@@ -173,34 +173,30 @@ def check_protocol(protocol: Protocol, *, where: str = "protocol") -> Protocol:
         if shape not in SHAPES:
             raise refusal(
                 tr("the protocol has no shape '{shape}'").format(shape=shape),
-                tr("Choose from {shapes}").format(shapes=", ".join(SHAPES)),
+                Remedy.ONE_OF.format(names=", ".join(SHAPES)),
             )
     _check_lengths(protocol, refusal)
     if len(set(protocol.shapes)) < len(protocol.shapes):
-        raise refusal(tr("a shape is named twice"), tr("Name each shape once"))
+        raise refusal(tr("a shape is named twice"), Remedy.CORRECT_VALUE)
     if not protocol.objects:
-        raise refusal(
-            tr("the protocol contains no object"), tr("Choose a shape, and a size or height")
-        )
+        raise refusal(tr("the protocol contains no shape with a size"), Remedy.CORRECT_VALUE)
     counts = {tr("repeats"): protocol.repeats, tr("regions"): protocol.regions}
     for name, count in counts.items():
         if not 0 <= count <= 99:
             raise refusal(
-                tr("the number of {name} is {count}").format(count=count, name=name),
-                tr("Use 0 to 99"),
+                tr("the number of {name} is {count}, not 0 to 99").format(count=count, name=name),
+                Remedy.CORRECT_VALUE,
             )
     if protocol.repeats + protocol.regions == 0:
-        raise refusal(
-            tr("the protocol contains no press"), tr("State a number of repeats or of regions")
-        )
+        raise refusal(tr("the protocol has neither repeats nor regions"), Remedy.CORRECT_VALUE)
     for truth in protocol.objects:
         room = room_mm(truth, protocol.reach_mm)
         if room <= 0.0:
             raise refusal(
-                tr("a {shape} of {size:g} mm does not fit within {reach:.1f} mm").format(
-                    shape=truth.shape, size=truth.size_mm, reach=protocol.reach_mm
+                tr("a {shape} of {size:g} mm is {mm:.1f} mm too large for {reach:.1f} mm").format(
+                    shape=truth.shape, size=truth.size_mm, reach=protocol.reach_mm, mm=-room
                 ),
-                tr("Leave this size out: {mm:.1f} mm are missing").format(mm=-room),
+                Remedy.CORRECT_VALUE,
             )
     return protocol
 
@@ -292,14 +288,14 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
     except FileNotFoundError as error:
         raise InputError(
             tr("there is no {name}").format(name=FILE_NAME),
-            where=str(folder),
-            advice=tr("Name the folder of a run of the evaluation protocol"),
+            where=folder,
+            advice=Remedy.CHOOSE_FOLDER,
         ) from error
     except ValueError as error:
         raise InputError(
             tr("the protocol cannot be read ({reason})").format(reason=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct the file; the presses in the folder are intact"),
+            where=path,
+            advice=Remedy.CORRECT_FILE,
         ) from error
     return _parse(Table(content, "", path))
 

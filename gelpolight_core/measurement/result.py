@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -225,14 +225,14 @@ def compare(measurement: Measurement, truth: Truth) -> Comparison:
                 truth=truth.shape, shape=measurement.shape
             ),
             where=tr("truth"),
-            advice=tr("Measure with the shape that was pressed"),
+            advice=Remedy.CHOOSE_SHAPE,
         )
     for value in (truth.size_mm, truth.height_mm):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(
-                tr("the true size is {value} mm").format(value=value),
+                tr("the true size is {value} mm, not greater than zero").format(value=value),
                 where=tr("truth"),
-                advice=tr("Give sizes greater than zero"),
+                advice=Remedy.CORRECT_VALUE,
             )
     return Comparison(
         truth,

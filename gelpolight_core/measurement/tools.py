@@ -7,7 +7,7 @@ from dataclasses import MISSING, Field, asdict, fields
 from types import MappingProxyType
 from typing import Any, cast
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.feature_tools import EdgeRadius, Pit, Scratch
@@ -88,7 +88,7 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
         raise InputError(
             tr("unknown tool '{name}'").format(name=brief(name)),
             where=tr("measuring tool"),
-            advice=tr("Choose one of {names}").format(names=", ".join(TOOLS)),
+            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     known = {field.name: field for field in fields(cast(Any, kind))}
     given = {key: value for key, value in content.items() if key != "tool"}
@@ -97,11 +97,11 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
     missing = sorted(needed - set(given))
     if wrong or missing:
         raise InputError(
-            tr("{key} is missing").format(key=missing[0])
-            if missing
-            else tr("{key} is not known").format(key=brief(wrong[0])),
+            tr("{key} is missing or not one of {names}").format(
+                key=brief([*missing, *wrong][0]), names=", ".join(known)
+            ),
             where=tr("measuring tool {name}").format(name=name),
-            advice=tr("It needs {names}").format(names=", ".join(known)),
+            advice=Remedy.CORRECT_ENTRY,
         )
     values = {key: _value(known[key], value, name) for key, value in given.items()}
     return kind(**values)
@@ -121,7 +121,7 @@ def tools_from_json(content: Any) -> tuple[Tool, ...]:
         raise InputError(
             tr("there is no measuring tool"),
             where=tr("measuring tools"),
-            advice=tr("Give a list of tools, or results that were stored"),
+            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     tools = []
     for entry in content:
@@ -169,9 +169,11 @@ def _value(field: Field[Any], value: Any, tool: Any) -> Any:
         return _point(value) if kind.startswith(("Point", "Range")) else _number(value)
     except (TypeError, ValueError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("{key} is {value}").format(key=field.name, value=brief(value)),
+            tr("{key} is {value}, not a length in mm or a position of two numbers").format(
+                key=field.name, value=brief(value)
+            ),
             where=tr("measuring tool {name}").format(name=tool),
-            advice=tr("Give lengths in mm as numbers, and a position as two numbers"),
+            advice=Remedy.CORRECT_VALUE,
         ) from error
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.images import SUFFIXES
 from gelpolight_core.translation import tr
 
@@ -69,19 +69,13 @@ def _refusal(folder: Path, missing: Collection[str], tables: Collection[str]) ->
             tables=", ".join(f"[{name}]" for name in tables)
         )
     if not opened:
-        return InputError(
-            found,
-            where=str(folder),
-            advice=tr("Capture these stages, or copy their PNG or TIFF images there"),
-        )
+        return InputError(found, where=folder, advice=Remedy.CAPTURE_STAGE)
     found += tr("; the sensor must be open for: {stages}").format(stages=", ".join(opened))
     return InputError(
         found,
-        where=str(folder),
+        where=folder,
         advice=tr(
-            "Capture these stages; or, if the sensor cannot be opened, calibrate it in place from "
-            "background and balls alone: replace [checkerboard] and [top_pose] in session.toml "
-            "with [in_place] mm_per_px = (size of a pixel on the membrane in mm) and keep only "
-            "the serial in [sensor]"
+            "Capture these images; or calibrate in place, from background and balls alone: replace "
+            "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."
         ),
     )

@@ -214,9 +214,7 @@ def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states
 def test_a_region_that_cannot_hold_a_press_is_refused(
     region: tuple[int, int, int, int],
 ) -> None:
-    with pytest.raises(
-        InputError, match=r"is not inside the image of 320 x 240 pixels or too small"
-    ):
+    with pytest.raises(InputError, match=r"is not inside the image of 320 x 240 pixels or below"):
         WorkingGrid(ImageSize(320, 240), 0.1, region_px=region)
 
 

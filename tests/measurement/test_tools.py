@@ -80,7 +80,7 @@ def test_every_tool_is_stored_as_plain_json_and_read_back() -> None:
         ({}, "unknown tool"),
         ({"tool": "ruler"}, "unknown tool 'ruler'"),
         ({"tool": "distance", "a_mm": [0, 0]}, "b_mm is missing"),
-        ({"tool": "ball", "colour": 1}, "colour is not known"),
+        ({"tool": "ball", "colour": 1}, "colour is missing or not one of "),
         ({"tool": "distance", "a_mm": [0, 0], "b_mm": [0]}, r"b_mm is \[0\]"),
         ({"tool": "distance", "a_mm": [0, 0], "b_mm": [0, "1"]}, "b_mm is"),
         ({"tool": "distance", "a_mm": [0, 0], "b_mm": [0, float("nan")]}, "b_mm is"),
