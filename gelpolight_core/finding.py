@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.translation import joined, pattern, tr
+from gelpolight_core.translation import joined, pattern, tr, translated
 
 TINY = 1e-9
 """Rounding error only: no figure's limit is this close to 0."""
@@ -207,7 +207,7 @@ def judge(
         verdict = Verdict.FAIL
     else:
         verdict = Verdict.WARN if beyond(warn) else Verdict.PASS
-    return Finding(key, text, float(value), unit, warn, fail, verdict, remedy)
+    return Finding(key, text, float(value), unit, warn, fail, verdict, translated(remedy))
 
 
 def worst_of(findings: Iterable[Finding]) -> Finding | None:

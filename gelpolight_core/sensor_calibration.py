@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
 from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, worst_verdict
 from gelpolight_core.image.file import MAX_PIXELS
@@ -547,9 +547,7 @@ class Calibration:
                     model=self.model
                 ),
                 where=self.identity,
-                advice=tr("Use a calibration that knows the optics and lights of the sensor")
-                if kind is OpenSensor
-                else tr("Use a calibration made in place"),
+                advice=Remedy.OTHER_MODEL,
             )
         return self.data
 

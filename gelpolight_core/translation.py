@@ -92,7 +92,7 @@ def english(text: str) -> str:
 
 def tr(text: str) -> str:
     """Return `text` in the user's language; fill placeholders afterwards with ``format``."""
-    return Text(translated(text), text)
+    return translated(text)
 
 
 def pattern(template: str, **values: Any) -> str:
@@ -111,9 +111,11 @@ def marked(text: str) -> str:
     return text
 
 
-def translated(text: str) -> str:
-    """Return a :func:`marked` text in the user's language."""
-    return _catalogue.gettext(text) if text else ""
+def translated(text: str) -> Text:
+    """Return a :func:`marked` text in the user's language; one that already is, unchanged."""
+    if isinstance(text, Text):
+        return text
+    return Text(_catalogue.gettext(text) if text else "", str(text))
 
 
 _catalogue: gettext.NullTranslations

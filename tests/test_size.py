@@ -42,7 +42,7 @@ MOST = {
     "app/theme": 200,
     "app/tools": 363,
     "app/view2d": 1117,
-    "app/view3d": 1556,
+    "app/view3d": 1554,
     "app/widgets": 795,
     "app/workspace": 681,
     "gelpolight_core/.": 1131,

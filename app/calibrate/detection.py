@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.live.image_checks import Rgb, end_of_scale
 from app.live.live_detection import Detection
 from app.live.overlay import Overlay
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.session.images import read_raw_image
@@ -46,7 +46,7 @@ def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
                 a=rgb.shape[1], b=rgb.shape[0], c=size[0], d=size[1]
             ),
             where=tr("Image"),
-            advice=tr("Set the camera to the image size of the earlier stages"),
+            advice=Remedy.SAME_CAMERA,
         )
 
 

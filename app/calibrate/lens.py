@@ -22,7 +22,7 @@ from app.live.image_checks import Rgb
 from app.live.overlay import Line, Marker, Overlay
 from app.services.jobs import Job
 from gelpolight_core.calibration.open_sensor import LENS
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
@@ -187,7 +187,7 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
         where=image.name,
-        advice=tr("Show the whole board, evenly lit, with a light margin around it"),
+        advice=Remedy.SHOW_BOARD,
     )
 
 

@@ -17,7 +17,7 @@ from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb, saturated
 from app.live.overlay import Overlay
 from gelpolight_core.calibration.open_sensor import RADIANCE
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.factors.bare_membrane import (
     CHANGE,
     area_of,
@@ -108,7 +108,7 @@ def _refuse_membrane(small: Float, background: Float, area: Mask2) -> None:
         raise InputError(
             tr("the image looks the same as the background image"),
             where=tr("Image"),
-            advice=tr("Remove the membrane and press the white board onto the elastomer"),
+            advice=Remedy.WITH_MEMBRANE,
         )
 
 

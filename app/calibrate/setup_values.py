@@ -8,7 +8,7 @@ from typing import Any
 
 from app.widgets.fields import choice, number, text
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.in_place.preset import presets
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
@@ -235,9 +235,9 @@ def _region(words: str) -> tuple[int, int, int, int] | None:
         x, y, width, height = map(int, parts)
         return x, y, width, height
     raise InputError(
-        tr("This is not a region: {text}").format(text=words),
+        tr("This is not a region (x, y, width, height in pixels): {text}").format(text=words),
         where=tr("Membrane's region"),
-        advice=tr("Enter x, y, width and height in pixels, separated by commas"),
+        advice=Remedy.CORRECT_VALUE,
     )
 
 

@@ -22,7 +22,7 @@ from gelpolight_core.batch.results import SUMMARY, FrameRow, last_line
 from gelpolight_core.batch.run import BatchProgress, run_batch
 from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.workers import Workers, cluster, processes
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.translation import tr
 
@@ -114,9 +114,7 @@ def _workers(text: str) -> AbstractContextManager[Workers]:
         return cluster(text)
     if int(text) < 1:
         raise InputError(
-            tr("At least one worker is needed"),
-            where="--workers",
-            advice=tr("Give the number of cores to use, or the address of a Dask scheduler"),
+            tr("At least one worker is needed"), where="--workers", advice=Remedy.CORRECT_VALUE
         )
     return processes(int(text))
 
@@ -161,13 +159,11 @@ def _report(progress: BatchProgress, out: Path) -> int:
         raise RuntimeError(f"{progress.internal} frames, see batch.jsonl in {out}")
     if progress.bad:
         raise InputError(
-            tr("{n} of {total} frames could not be used").format(
+            tr("{n} of {total} frames could not be used, for the reason in the last column").format(
                 n=progress.bad, total=progress.total
             ),
-            where=str(out / SUMMARY),
-            advice=tr(
-                "The last column gives the reason. Correct the files and run the same command again"
-            ),
+            where=out / SUMMARY,
+            advice=Remedy.CORRECT_AND_REPEAT,
         )
     return 0
 

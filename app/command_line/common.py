@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from app.command_line.terminal import harmless
 from gelpolight_core.causes import with_one_cause
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.translation import tr
@@ -48,7 +48,7 @@ def points(given: Iterable[Iterable[float]], *, where: str) -> list[tuple[float,
         raise InputError(
             tr("Number of values: {n}, but each point needs two").format(n=len(flat)),
             where=where,
-            advice=tr("Give X and Y in mm for each point"),
+            advice=Remedy.CORRECT_VALUE,
         )
     return list(zip(flat[::2], flat[1::2], strict=True))
 
@@ -58,9 +58,9 @@ def one_point(given: Iterable[Iterable[float]], *, where: str) -> tuple[float, f
     found = points(given, where=where)
     if len(found) != 1:
         raise InputError(
-            tr("Number of points: {n}").format(n=len(found)),
+            tr("Number of points: {n} instead of one").format(n=len(found)),
             where=where,
-            advice=tr("Give one point: X and Y in mm"),
+            advice=Remedy.CORRECT_VALUE,
         )
     return found[0]
 
@@ -73,8 +73,8 @@ def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
         if result in used:
             raise InputError(
                 tr("The result would overwrite a file that is used here"),
-                where=str(path),
-                advice=tr("Choose another name or folder for the result"),
+                where=path,
+                advice=Remedy.CHOOSE_NAME,
             )
         used.add(result)
 

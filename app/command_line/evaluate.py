@@ -10,7 +10,7 @@ from app.command_line.common import stage_progress
 from app.command_line.reconstructing import add_model, load_reconstructor
 from app.command_line.terminal import say
 from gelpolight_core.batch.workers import processes
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.measurement.evaluation_run import (
     evaluate_presses,
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
             tr("None of the {n} presses could be measured ({reason})").format(
                 n=len(evaluation.results), reason=str(evaluation.failed[0].outcome).rstrip(".")
             ),
-            where=str(presses),
-            advice=tr("Check that the calibration belongs to this sensor"),
+            where=presses,
+            advice=Remedy.SAME_SENSOR,
         )
     return 0

@@ -14,7 +14,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from app.command_line.terminal import say
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.recording.matching import recording_notes, require_match
@@ -78,7 +78,7 @@ class Inputs:
                 raise InputError(
                     tr("None of the inputs is a recording"),
                     where="--frames",
-                    advice=tr("Remove the option, or name a recording"),
+                    advice=Remedy.REMOVE_OPTION,
                 )
             self._refuse_twins()
         except BaseException:
@@ -121,9 +121,7 @@ class Inputs:
             raise InputError(
                 tr("Two images have the name {name}").format(name=twins[0]),
                 where=tr("IMAGE"),
-                advice=tr(
-                    "Reconstruct them into different folders, so that neither is overwritten"
-                ),
+                advice=Remedy.SEPARATE_FOLDERS,
             )
 
 
@@ -137,16 +135,16 @@ def frame_range(text: str, count: int, *, where: str) -> range:
     """
     if not count:
         raise InputError(
-            tr("The recording contains no frames"), where=where, advice=tr("Choose another one")
+            tr("The recording contains no frames"), where=where, advice=Remedy.CHOOSE_FILE
         )
     selected = range(count)[frame_slice(text)]
     if not selected:
         raise InputError(
-            tr("{text} selects none of the {count} frames").format(text=text, count=count),
+            tr("{text} selects none of the {count} frames, which are 0:{count}").format(
+                text=text, count=count
+            ),
             where="--frames",
-            advice=tr(
-                "Give the first frame, counted from 0, and the last frame plus one, as in 0:{n}"
-            ).format(n=count),
+            advice=Remedy.CORRECT_VALUE,
         )
     return selected
 
@@ -162,9 +160,9 @@ def frame_slice(text: str) -> slice:
     match = re.fullmatch(r"(\d*)(:?)(\d*)(?::([1-9]\d*))?", text)
     if match is None:
         raise InputError(
-            tr("{text} selects no frames").format(text=text),
+            tr("{text} is not a range of frames such as 0:1000 or 0:1000:10").format(text=text),
             where="--frames",
-            advice=tr("Give whole numbers, as in --frames 0:1000 or --frames 0:1000:10"),
+            advice=Remedy.CORRECT_VALUE,
         )
     first, colon, end, step = match.groups()
     last = int(end) if end else int(first) + 1 if first and not colon else None

@@ -20,7 +20,7 @@ import platformdirs
 from app.command_line.parser import DEMO, MENDABLE, build_parser
 from app.command_line.terminal import say
 from gelpolight_core import __version__
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr, use_language
 
 OUR_FAULT = 1
@@ -86,9 +86,7 @@ def _window(given: list[str]) -> argparse.Namespace | None:
         return None
     for file in files:
         if not file.is_file():
-            raise InputError(
-                tr("The file does not exist"), where=str(file), advice=tr("Check its name")
-            )
+            raise InputError(tr("The file does not exist"), where=file, advice=Remedy.CHECK_NAME)
     return argparse.Namespace(run=_open_desktop, demo=False, files=files)
 
 
@@ -123,8 +121,8 @@ def _environment_fault(error: OSError) -> str:
     _write_log(traceback.format_exc())
     found = InputError(
         tr("The operating system refused it ({reason})").format(reason=error.strerror or error),
-        where=str(error.filename or tr("Files")),
-        advice=tr("Check the name, the permissions and the disk space"),
+        where=error.filename or tr("Files"),
+        advice=Remedy.CHECK_DISK,
     )
     return f"gelpolight: {found}"
 

@@ -18,7 +18,7 @@ from app.command_line.reconstructing import (
 )
 from app.command_line.terminal import say
 from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.health.finding import as_dict
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
@@ -122,15 +122,15 @@ def _truths(options: argparse.Namespace) -> dict[str, Truth]:
         raise InputError(
             tr("Tools cannot be compared with true sizes"),
             where="--truth",
-            advice=tr("Use this option together with --shape"),
+            advice=Remedy.REMOVE_OPTION,
         )
     rows = {row.file: row.truth for row in read_truth(options.truth).rows}
     for image in options.images:
         if image.name not in rows:
             raise InputError(
                 tr("There is no row for {name}").format(name=image.name),
-                where=str(options.truth),
-                advice=tr("Add the image with its shape and true sizes"),
+                where=options.truth,
+                advice=Remedy.TRUTH_ROW,
             )
     return rows
 

@@ -21,7 +21,7 @@ from app.command_line.reconstructing import (
     trace_lines,
 )
 from app.command_line.terminal import say
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.heightmap_files import ending, write_heightmap
 from gelpolight_core.export.preview import write_preview
 from gelpolight_core.io.atomic import make_folder
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             tr("Only npz can contain standard deviations"),
             where="--uncertainty",
-            advice=tr("Add npz to --format, or remove this option"),
+            advice=Remedy.REMOVE_OPTION,
         )
     endings = ["png" if name == PREVIEW else ending(name) for name in options.format]
     with Inputs(options.images, options.frames) as inputs:

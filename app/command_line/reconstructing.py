@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.heightmap_files import FORMATS
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -62,7 +62,7 @@ def add_format(parser: argparse.ArgumentParser, *, preview: bool = False) -> Non
             raise InputError(
                 tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
                 where="--format",
-                advice=tr("Use one or more of {formats}").format(formats=", ".join(names)),
+                advice=Remedy.ONE_OF.format(names=", ".join(names)),
             )
         return found
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from app.command_line.common import check_outputs
 from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.translation import tr
@@ -36,8 +36,8 @@ def run(options: argparse.Namespace) -> int:
     if not path.is_file():
         raise InputError(
             tr("There are no records"),
-            where=str(path),
-            advice=tr("Give the workspace folder with --workspace, or measure something first"),
+            where=path,
+            advice=Remedy.STATE_WITH.format(option="--workspace"),
         )
     check_outputs([options.csv], [path])
     with Records.open(path) as records:

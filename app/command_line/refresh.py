@@ -12,7 +12,7 @@ from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place import in_place_towards
 from gelpolight_core.calibration.in_place_session import with_background
 from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.sensor_calibration import Calibration
@@ -63,9 +63,9 @@ def _refreshed(calibration: Calibration, options: argparse.Namespace) -> Calibra
         recipe = in_place_towards(calibration.in_place.coefficients)
         if not recipe.fits(session):
             raise InputError(
-                tr("the session is of an open sensor"),
-                where=str(options.session),
-                advice=tr("Name a session whose session.toml has a table [in_place]"),
+                tr("the session is of an open sensor: session.toml has no table [in_place]"),
+                where=options.session,
+                advice=Remedy.CHOOSE_SESSION,
             )
         return calibrate(session, recipe).calibration
     images = [read_image(path, response=calibration.response) for path in options.background]

@@ -15,7 +15,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.calibration.recipes import recipe_of
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_measurement
 from gelpolight_core.measurement.protocol_run import presses_folder
@@ -71,9 +71,7 @@ def _presses(given: Path | None) -> Path | None:
         return None
     if not given.is_dir():
         raise InputError(
-            tr("The path is not a folder"),
-            where=str(given),
-            advice=tr("Give the folder that contains truth.csv and its images"),
+            tr("The path is not a folder with truth.csv"), where=given, advice=Remedy.CHOOSE_FOLDER
         )
     return presses_folder(given)
 
@@ -81,9 +79,7 @@ def _presses(given: Path | None) -> Path | None:
 def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report:
     if options.model:
         raise InputError(
-            tr("A calibration already has its model"),
-            where="--model",
-            advice=tr("Remove the option, or give a session folder"),
+            tr("A calibration already has its model"), where="--model", advice=Remedy.REMOVE_OPTION
         )
     refuse_overwriting([options.output], [options.source])
     refuse_unwritable(options.output)

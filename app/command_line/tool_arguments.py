@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import numbers, points
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
@@ -84,18 +84,20 @@ def _geometry(options: argparse.Namespace) -> dict[str, Any]:
     else:
         if len(placed) > len(types):
             raise InputError(
-                tr("Number of points: {n}").format(n=len(placed)),
+                tr("Number of points: {n} instead of {least}").format(
+                    n=len(placed), least=len(types)
+                ),
                 where=tr("Measuring tool {name}").format(name=options.tool),
-                advice=tr("It needs {least}: --at X Y ...").format(least=len(types)),
+                advice=Remedy.STATE_WITH.format(option="--at X Y ..."),
             )
         content = dict(zip(types, placed, strict=False))
     if "Rectangle" not in types.values():
         _refuse_options(options, "size")
     elif len(options.size) not in (2, 3):
         raise InputError(
-            tr("The size is missing"),
+            tr("The size in mm is missing"),
             where=tr("Measuring tool {name}").format(name=options.tool),
-            advice=tr("Give it with --size A B, in mm"),
+            advice=Remedy.STATE_WITH.format(option="--size A B"),
         )
     for name in content:
         if types[name] == "Rectangle":
@@ -123,7 +125,7 @@ def _refuse_options(options: argparse.Namespace, *names: str) -> None:
             raise InputError(
                 tr("This option cannot be used with {name}").format(name=options.tool or "--shape"),
                 where=f"--{name}",
-                advice=tr("Remove the option"),
+                advice=Remedy.REMOVE_OPTION,
             )
 
 
@@ -135,7 +137,5 @@ def _read(path: Path) -> Any:
         raise InputError(
             tr("This is neither a measuring tool nor a JSON file"),
             where=f"--tool {path}",
-            advice=tr("Give one of {names}, or a file as written by measure --json").format(
-                names=", ".join(TOOLS)
-            ),
+            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         ) from error

@@ -19,7 +19,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.question import ask
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.live_message import pack
 from gelpolight_core.translation import tr
 
@@ -246,7 +246,7 @@ class Publisher:
             raise InputError(
                 tr("the address cannot be used ({reason})").format(reason=error.strerror),
                 where=f"{host}:{port}",
-                advice=tr("Choose another port, or close the program that uses it"),
+                advice=Remedy.CLOSE_PROGRAM,
             ) from error
         self.address: str = self._socket.getsockopt_string(self._zmq.LAST_ENDPOINT)
 
@@ -272,7 +272,7 @@ def is_local(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError as error:
         raise InputError(
-            tr("it is not an IP address"), where=host, advice=tr("Enter one such as 127.0.0.1")
+            tr("it is not an IP address such as 127.0.0.1"), where=host, advice=Remedy.CORRECT_VALUE
         ) from error
 
 
@@ -283,6 +283,6 @@ def _library() -> Any:
         raise InputError(
             tr("the package pyzmq is not installed"),
             where=tr("stream"),
-            advice=tr('Install it into the environment of this program: pip install "pyzmq>=26"'),
+            advice=Remedy.INSTALL.format(package="pyzmq>=26"),
         ) from error
     return zmq

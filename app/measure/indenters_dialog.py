@@ -21,7 +21,7 @@ from app.widgets.layout import hbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 NAME, SHAPE, SIZE, SECOND, HEIGHT = range(5)
@@ -125,9 +125,9 @@ class IndentersDialog(Dialog):
         size = self._length(row, SIZE)
         if size is None:
             raise InputError(
-                tr("The size is missing"),
+                tr("The diameter or side in mm is missing"),
                 where=tr("Indenter {name}").format(name=name),
-                advice=tr("Enter its diameter or side in mm"),
+                advice=Remedy.CORRECT_VALUE,
             )
         second = self._length(row, SECOND) if shape.currentData() == "cuboid" else None
         return Indenter(name, shape.currentData(), size, second, self._length(row, HEIGHT))
@@ -144,7 +144,7 @@ class IndentersDialog(Dialog):
             return float(text.replace(",", "."))
         except ValueError as error:
             raise InputError(
-                tr("'{text}' is not a number").format(text=text),
+                tr("'{text}' is not a length in mm such as 5 or 3.5").format(text=text),
                 where=tr("Indenter {name}").format(name=self._text(row, NAME)),
-                advice=tr("Enter lengths in mm, such as 5 or 3.5"),
+                advice=Remedy.CORRECT_VALUE,
             ) from error

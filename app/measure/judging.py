@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from app.measure.figures_text import unit_behind, unit_of
 from app.services.preferences import Limits
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.result import Quantity, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
@@ -66,9 +66,9 @@ def _truth(shape: str, *sizes_mm: float | None) -> Truth:
 def _checked(true: float | None) -> float | None:
     if true is not None and not (math.isfinite(true) and true > 0.0):
         raise InputError(
-            tr("The true value is {value}").format(value=true),
+            tr("The true value is {value}, not greater than zero").format(value=true),
             where=tr("True value"),
-            advice=tr("Enter a value greater than zero"),
+            advice=Remedy.CORRECT_VALUE,
         )
     return true
 

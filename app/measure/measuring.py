@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from app.sources.source import Frame
 from app.view2d.display import Display
 from app.view2d.shading import MapImage, map_image
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -191,7 +191,7 @@ def _require_sensor(image: MeasuredImage, calibration: Calibration) -> None:
                 "sensor {one}"
             ).format(other=image.serial, one=serial),
             where=image.name,
-            advice=tr("Choose a calibration of that sensor"),
+            advice=Remedy.SAME_SENSOR,
         )
 
 

@@ -197,8 +197,7 @@ class MeasurePage(QWidget):
         self, indenters: tuple[Indenter, ...], before: KnownFiles, list_file: Path
     ) -> None:
         with self.context.toasts.errors():
-            again = tr("Open the list again, and repeat your change")
-            before.refuse_changed(list_file, advice=again)
+            before.refuse_changed(list_file)
             write_indenters(indenters, self.context.workspace.folder)
         self._read_indenters()
 

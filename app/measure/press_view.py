@@ -19,7 +19,7 @@ from app.services.file_dialogs import ask_open
 from app.services.jobs import Jobs
 from app.view2d.display import Display
 from app.view3d.saving import ViewSaving
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
@@ -135,8 +135,8 @@ class PressView(PressViewFrame):
         if path.suffix.lower() not in IMAGES:
             raise InputError(
                 tr("The file is neither an image nor a recording"),
-                where=str(path),
-                advice=tr("Open a PNG or TIFF image of the calibrated sensor"),
+                where=path,
+                advice=Remedy.CHOOSE_IMAGES,
             )
         self.context.settings.keep_folder("press", path.parent)
         self._take(MeasuredImage(path.name, path=path))

@@ -22,7 +22,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.user import user_name
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.protocol import Protocol, check_protocol, protocol_reach_mm
@@ -130,8 +130,8 @@ class ProtocolView(QWidget):
                 return entry.path
         raise InputError(
             tr("The calibration {id} of this run is not in the library").format(id=identity),
-            where=str(self.context.workspace.sensors_folder),
-            advice=tr("Import its file on the Sensors page"),
+            where=self.context.workspace.sensors_folder,
+            advice=Remedy.IMPORT_CALIBRATION,
         )
 
     # The run

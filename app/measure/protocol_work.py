@@ -14,7 +14,7 @@ from PySide6.QtCore import QObject, Signal
 from app.services.jobs import Job, Jobs
 from gelpolight_core import __version__
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
 from gelpolight_core.measurement.evaluation import Evaluation
@@ -68,8 +68,8 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
             tr("The run was started with calibration {old}, but this is {new}").format(
                 old=run.content.calibration, new=made.identity
             ),
-            where=str(run.folder),
-            advice=tr("Use that calibration, or start a new run"),
+            where=run.folder,
+            advice=Remedy.START_NEW,
         )
     lock = RunLock(run.folder)
     try:

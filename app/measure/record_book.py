@@ -150,7 +150,7 @@ class RecordBook(QObject):
                     return None, (), ""  # another job reads those of the other workspace
                 raise InputError(
                     tr("{title}: another workspace was chosen meanwhile").format(title=title),
-                    where=str(folder),
+                    where=folder,
                     advice=tr("Choose the previous workspace and try again"),
                 )
             result = change(records)

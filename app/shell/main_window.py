@@ -50,7 +50,7 @@ from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.units import use_length_unit
 from app.workspace.workspace import ENDING
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 from gelpolight_core.translation import tr
 
@@ -305,11 +305,8 @@ class MainWindow(QMainWindow):
         if not is_session(folder):
             error = InputError(
                 tr("The folder is not a session folder: it contains no session.toml"),
-                where=str(folder),
-                advice=tr(
-                    "Choose the folder that contains session.toml and the image folders of "
-                    "the stages"
-                ),
+                where=folder,
+                advice=Remedy.CHOOSE_SESSION,
             )
             self.context.toasts.show(str(error), "fail")
             return

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from app.sources.source import Frame, Rgb, Setting, closed, no_setting
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.images import SUFFIXES, read_image
 from gelpolight_core.translation import tr
 
@@ -52,8 +52,8 @@ class FolderSource:
         if not files:
             raise InputError(
                 tr("there are no PNG or TIFF images"),
-                where=str(self.folder),
-                advice=tr("Choose a folder that contains images"),
+                where=self.folder,
+                advice=Remedy.CHOOSE_IMAGES,
             )
         self.size = read_image(files[0]).size
         self._files = files
@@ -102,8 +102,8 @@ class FolderSource:
                 tr("the image has {a} pixels, but the first image of the folder has {b}").format(
                     a="x".join(map(str, image.size)), b="x".join(map(str, self.size))
                 ),
-                where=str(self._files[index]),
-                advice=tr("Use a folder with images of one size"),
+                where=self._files[index],
+                advice=Remedy.SAME_CAMERA,
             )
         full = 2**image.bit_depth - 1
         kind = np.uint8 if image.bit_depth == 8 else np.uint16

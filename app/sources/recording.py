@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from app.sources.source import Frame, Rgb, Setting, closed, no_setting
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.translation import tr
@@ -116,8 +116,8 @@ class RecordingSource:
                 recording.close()
                 raise InputError(
                     tr("the recording contains no frames"),
-                    where=str(self.path),
-                    advice=tr("Choose another recording"),
+                    where=self.path,
+                    advice=Remedy.CHOOSE_FILE,
                 )
             self._recording, self.size = recording, recording.size
             self._pending, self._number, self._shown = 0, -1, None

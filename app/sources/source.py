@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]
@@ -93,7 +93,7 @@ class SourceLost(InputError):
 
 def closed(where: str) -> SourceLost:
     """Return the refusal of a source that is not open."""
-    return SourceLost(tr("the source is closed"), where=where, advice=tr("Open it again"))
+    return SourceLost(tr("the source is closed"), where=where, advice=Remedy.OPEN_AGAIN)
 
 
 class SourceAway(Exception):
@@ -105,7 +105,7 @@ def no_setting(key: str, settings: Iterable[Setting], where: str) -> InputError:
     return InputError(
         tr("there is no setting {key}").format(key=key),
         where=where,
-        advice=tr("Use one of {keys}").format(keys=", ".join(s.key for s in settings)),
+        advice=Remedy.ONE_OF.format(names=", ".join(s.key for s in settings)),
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame, Source, SourceAway, SourceLost
 from app.sources.stopping import Worker
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
@@ -159,7 +159,7 @@ class Stream(Worker):
                     kind=type(error).__name__
                 ),
                 where=self.source.name,
-                advice=tr("Open the source again"),
+                advice=Remedy.OPEN_AGAIN,
             )
             with self._lock:
                 self._lost = reason
@@ -184,7 +184,7 @@ class Stream(Worker):
                 raise SourceLost(
                     tr("no image has arrived for {s:.0f} seconds").format(s=self._silence_s),
                     where=self.source.name,
-                    advice=tr("Check the camera and its cable, then open it again"),
+                    advice=Remedy.CHECK_CABLE,
                 )
 
     def _wait_for_return(self, away: SourceAway) -> None:
@@ -231,9 +231,7 @@ class Stream(Worker):
 
     def _stopped(self) -> SourceLost:
         return SourceLost(
-            tr("the images were stopped"),
-            where=self.source.name,
-            advice=tr("Start them again, then capture again"),
+            tr("the images were stopped"), where=self.source.name, advice=Remedy.OPEN_AGAIN
         )
 
 

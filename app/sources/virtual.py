@@ -16,6 +16,7 @@ from app.sources.bench_faults import with_faults
 from app.sources.noise import NoiseLevel, noisy, rgb_of
 from app.sources.rendering import Renderer, Rendering
 from app.sources.source import Frame, Rgb, Setting, SourceLost, closed, no_setting
+from gelpolight_core.errors import Remedy
 from gelpolight_core.translation import tr
 
 _SETTINGS: dict[str, tuple[Callable[[], str], str, float]] = {
@@ -113,9 +114,7 @@ class VirtualSource:
     def _refuse_if_stopped(self, conditions: Conditions) -> None:
         if "camera_stops" in conditions.faults:
             raise SourceLost(
-                tr("the camera has stopped"),
-                where=self.name,
-                advice=tr("Check its cable, then open it again"),
+                tr("the camera has stopped"), where=self.name, advice=Remedy.CHECK_CABLE
             )
 
     def _wait_until_due(self, limit_s: float) -> bool:

@@ -167,6 +167,6 @@ def _write_gif(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
 def _refusal(path: Path) -> InputError:
     return InputError(
         tr("The movie cannot be written"),
-        where=str(path),
+        where=path,
         advice=tr("Choose another folder, or GIF instead of MP4"),
     )

@@ -30,7 +30,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.native import give_own_window
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -320,7 +320,5 @@ def _load() -> type[Interactor]:
     except ImportError as error:
         _LOG.exception("The 3D view cannot be loaded")
         raise InputError(
-            tr("The library pyvista cannot be loaded"),
-            where=tr("3D view"),
-            advice=tr("Install the program again. The log contains the name of the missing part"),
+            tr("The library pyvista cannot be loaded"), where=tr("3D view"), advice=Remedy.REINSTALL
         ) from error

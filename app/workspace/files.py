@@ -6,7 +6,7 @@ import os
 import shutil
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import NameTakenError, write_atomically
 from gelpolight_core.io.reading import open_file
 from gelpolight_core.translation import tr
@@ -53,6 +53,6 @@ def move_file(source: Path, target: Path) -> None:
 def _refused(error: OSError, path: Path) -> InputError:
     return InputError(
         tr("The operating system refused it ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check the name, the permissions and the disk space"),
+        where=path,
+        advice=Remedy.CHECK_DISK,
     )

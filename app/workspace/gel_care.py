@@ -36,7 +36,6 @@ def read_presses(folder: Path) -> dict[str, int]:
             for identity, row in content["calibrations"].items()
         },
         found=tr("The list of presses cannot be read ({error})"),
-        advice=tr("Repair the file, or delete it to count from 0"),
     )
     return found or {}
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.io.reading import NAME_LIMIT, brief, plain_text, read_own
 from gelpolight_core.measurement.measure import SHAPES
@@ -52,19 +52,19 @@ class Indenter:
         """Check the values."""
         where = tr("indenter {name}").format(name=self.name or tr("without a name"))
         if not self.name.strip():
-            raise InputError(tr("An indenter has no name"), where=where, advice=tr("Enter a name"))
+            raise InputError(tr("An indenter has no name"), where=where, advice=Remedy.CHOOSE_NAME)
         if self.shape not in SHAPES:
             raise InputError(
                 tr("Unknown shape '{shape}'").format(shape=self.shape),
                 where=where,
-                advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
+                advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
             )
         for length in (self.size_mm, self.second_mm, self.height_mm):
             if length is not None and not (math.isfinite(length) and length > 0.0):
                 raise InputError(
-                    tr("The length {value} mm is not valid").format(value=length),
+                    tr("The length {value} mm is not greater than zero").format(value=length),
                     where=where,
-                    advice=tr("Enter lengths greater than zero"),
+                    advice=Remedy.CORRECT_VALUE,
                 )
 
     @property
@@ -107,7 +107,6 @@ def read_indenters(folder: Path) -> tuple[Indenter, ...]:
         (FORMAT, VERSION),
         _parse,
         found=tr("The list of indenters cannot be read ({error})"),
-        advice=tr("Repair the file, or delete it to start with the default list"),
     )
     return first_indenters() if found is None else found
 
@@ -140,7 +139,7 @@ def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
             raise InputError(
                 tr("Two indenters have the name {name}").format(name=name),
                 where=tr("List of indenters"),
-                advice=tr("Give each indenter a different name"),
+                advice=Remedy.CHOOSE_NAME,
             )
     content = {"format": FORMAT, "version": VERSION, "indenters": [asdict(row) for row in rows]}
     make_folder(folder)

@@ -95,7 +95,6 @@ def read_validation(calibration: Path) -> Validation | None:
         (FORMAT, VERSION),
         _parse,
         found=tr("The validation cannot be read ({error})"),
-        advice=tr("Validate the calibration again"),
     )
 
 

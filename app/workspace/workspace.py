@@ -29,7 +29,7 @@ from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.trash import Removal, put_into_trash, removals_in, take_from_trash
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_json
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.translation import tr
@@ -246,7 +246,7 @@ class Workspace:
             if summary.fault and not summary.accepted:
                 raise InputError(
                     summary.fault.text,
-                    where=str(path),
+                    where=path,
                     advice=tr("Calibrate again, or use it on the Sensors page with a reason"),
                 )
         make_folder(self.folder)
@@ -333,16 +333,16 @@ class Workspace:
         except OSError as error:
             raise InputError(
                 tr("The workspace cannot be read ({reason})").format(reason=error.strerror),
-                where=str(self.folder),
-                advice=tr("Check its permissions, or choose another folder in the preferences"),
+                where=self.folder,
+                advice=Remedy.CHECK_DISK,
             ) from error
 
     def _refuse_outside(self, path: Path) -> None:
         if not path.is_relative_to(self.sensors_folder):
             raise InputError(
                 tr("The calibration is not in the library"),
-                where=str(path),
-                advice=tr("Import it first"),
+                where=path,
+                advice=Remedy.IMPORT_CALIBRATION,
             )
 
 

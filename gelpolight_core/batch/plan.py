@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import ENDING
@@ -132,7 +132,7 @@ def plan_batch(
         raise InputError(
             tr("There are no frames to reconstruct"),
             where=", ".join(map(str, inputs)),
-            advice=tr("Choose recordings, images (PNG or TIFF) or folders of them"),
+            advice=Remedy.CHOOSE_IMAGES,
         )
     used: set[str] = set()
     for job in plan:
@@ -141,9 +141,7 @@ def plan_batch(
             raise InputError(
                 tr("Two inputs would have results named {name}").format(name=job.output),
                 where=tr("INPUT"),
-                advice=tr(
-                    "Give their common folder instead, or use a separate folder for each run"
-                ),
+                advice=Remedy.SEPARATE_FOLDERS,
             )
         used.add(name)
     return plan
@@ -163,15 +161,13 @@ class _Finder:
         resolved = path.resolve()
         if not resolved.exists():
             raise InputError(
-                tr("The file or folder does not exist"),
-                where=str(path),
-                advice=tr("Check the name"),
+                tr("The file or folder does not exist"), where=path, advice=Remedy.CHECK_NAME
             )
         if resolved.is_relative_to(self._out):
             raise InputError(
                 tr("The input is inside the folder of the results"),
-                where=str(path),
-                advice=tr("Choose another folder for the results"),
+                where=path,
+                advice=Remedy.CHOOSE_FOLDER,
             )
         if resolved.is_dir():
             self._add_folder(path, resolved.name)

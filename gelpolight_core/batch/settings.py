@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core import __version__
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.translation import tr
@@ -78,8 +78,8 @@ def require_same(settings: BatchSettings, out: Path) -> None:
     except (FileNotFoundError, ValueError, TypeError) as error:
         raise InputError(
             tr("The settings of the run are missing or damaged"),
-            where=str(out / FILE),
-            advice=tr("Check that each worker has access to this folder, or choose a new folder"),
+            where=out / FILE,
+            advice=Remedy.CLUSTER,
         ) from error
     for key, value in settings.as_json().items():
         if begun.get(key) != value:
@@ -87,6 +87,6 @@ def require_same(settings: BatchSettings, out: Path) -> None:
                 tr("The run in this folder was started with {what} {a}, but now it is {b}").format(
                     what=key, a=begun.get(key), b=value
                 ),
-                where=str(out),
-                advice=tr("Use the same settings as at the start, or choose a new folder"),
+                where=out,
+                advice=Remedy.START_NEW,
             )

@@ -23,7 +23,7 @@ from gelpolight_core.batch.plan import Job, frame_stamp
 from gelpolight_core.batch.results import FrameRow
 from gelpolight_core.batch.settings import BatchSettings, require_same
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -84,8 +84,8 @@ class _Worker:
         if calibration.identity != settings.calibration_id:
             raise InputError(
                 tr("The calibration was replaced while in use"),
-                where=str(settings.calibration),
-                advice=tr("Restore it, or start a separate run with the new one"),
+                where=settings.calibration,
+                advice=Remedy.START_NEW,
             )
         self._reconstructor = Reconstructor(
             calibration, model=settings.model, effort=settings.effort, workers=1
@@ -145,7 +145,7 @@ def _frame(recording: Recording, job: Job, index: int) -> RecordedFrame:
         return recording.frame(index)
     raise InputError(
         tr("Frame {n} has changed since the run was started").format(n=index),
-        where=str(job.path),
+        where=job.path,
         advice=tr("Repeat the command, which reads the recording again"),
     )
 

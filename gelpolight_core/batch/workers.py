@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 ANSWER_S = 10.0
@@ -122,15 +122,15 @@ def cluster(address: str) -> Iterator[Workers]:
         raise InputError(
             tr("Dask is not installed"),
             where="--workers",
-            advice=tr("Install the program as gelpolight-studio[dask], or give a number"),
+            advice=Remedy.INSTALL.format(package="gelpolight-studio[dask]"),
         ) from error
     try:
         client = Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
-            tr("The Dask scheduler does not respond"),
+            tr("No Dask scheduler responds at this address (such as tcp://10.0.0.1:8786)"),
             where=address,
-            advice=tr("Check that it is running and that the address is like tcp://10.0.0.1:8786"),
+            advice=Remedy.CLUSTER,
         ) from error
     with client:
         # Not pure: the same frames may have to be repeated, and the result is the files.
@@ -147,5 +147,5 @@ def cluster(address: str) -> Iterator[Workers]:
                     reason=str(error).partition("\n")[0] or type(error).__name__
                 ),
                 where=address,
-                advice=tr("Check that it is running and has this program on each worker"),
+                advice=Remedy.CLUSTER,
             ) from error

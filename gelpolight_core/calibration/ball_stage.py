@@ -21,7 +21,7 @@ from gelpolight_core.calibration.open_sensor import (
     same_size,
 )
 from gelpolight_core.calibration.recipe import Results, Stage, Table, Work
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import (
     Finding,
     QualityTable,
@@ -221,7 +221,7 @@ def placed_contact(
         raise InputError(
             tr("The circle set by hand extends beyond the visible membrane"),
             where=tr("balls"),
-            advice=tr("Move it inside the working area, or exclude the image"),
+            advice=Remedy.MOVE_INSIDE,
         )
     middle = edge_mm.mean(axis=0)
     radius_mm = float(np.hypot(*(edge_mm - middle).T).mean())

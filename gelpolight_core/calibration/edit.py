@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.factors.background import flat_cosines
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
@@ -131,5 +131,5 @@ def _checked(channel: int, curve: Curve) -> Curve:
     raise InputError(
         found,
         where=tr("reflectance, {name} channel").format(name=channel_name(channel)),
-        advice=tr("Move the nodes so that brightness increases with the cosine"),
+        advice=Remedy.MOVE_NODES,
     )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.image_checks import refuse_other_size, refuse_unfit
 from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.recipe import Recipe, Stage
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import read_image_file
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
@@ -78,8 +78,8 @@ class EditableSession:
         if not self.recipe.fits(session):
             raise InputError(
                 tr("The session is now of another kind of sensor"),
-                where=str(folder),
-                advice=tr("Open it again"),
+                where=folder,
+                advice=Remedy.OPEN_AGAIN,
             )
         return session
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import require_size
 from gelpolight_core.session.file_hashes import file_hash, refuse_copies
 from gelpolight_core.session.images import read_image, require_colour
@@ -51,8 +51,8 @@ def refuse_unfit(
                 tr("The image is already in the session, as {name}").format(
                     name=f"{twin.parent.name}/{twin.name}"
                 ),
-                where=str(path),
-                advice=tr("Choose another image, or include that one again"),
+                where=path,
+                advice=Remedy.CHOOSE_FILE,
             )
 
 

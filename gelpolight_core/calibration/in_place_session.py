@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.in_place.ball import Ball
@@ -242,8 +242,8 @@ def _presses(
             tr("there are {n} ball images, {least} are needed").format(
                 n=len(presses), least=LEAST_PRESSES
             ),
-            where=str(session.folder / "balls"),
-            advice=tr("Press a ball of known radius at {n} or more places").format(n=ENOUGH_BALLS),
+            where=session.folder / "balls",
+            advice=Remedy.PRESS_BALLS,
         )
     return presses, unreadable
 

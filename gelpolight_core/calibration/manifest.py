@@ -15,7 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, worst_verdict
+from gelpolight_core.finding import (
+    Finding,
+    QualityTable,
+    Verdict,
+    calibration_fault,
+    worst_verdict,
+)
 from gelpolight_core.io.reading import (
     brief,
     check_version,
@@ -246,13 +252,9 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
         values is raised while it is open.
     """
     if not path.is_file():
-        raise missing_file(path, tr("Create it with gelpolight calibrate"))
+        raise missing_file(path)
     with (
-        refusing(
-            tr("The file is damaged, or is not a calibration ({error})"),
-            path,
-            advice=tr("Use a backup copy, or calibrate again from the session"),
-        ),
+        refusing(tr("The file is damaged, or is not a calibration ({error})"), path),
         opened_zip(path) as archive,
     ):
         yield archive

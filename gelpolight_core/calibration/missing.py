@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gelpolight_core.calibration.in_place import IN_PLACE
 from gelpolight_core.calibration.recipes import FULL
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.session import IN_PLACE as CLOSED
 from gelpolight_core.session.session import (
     SensorData,
@@ -62,13 +62,11 @@ def refuse_missing(
         found += tr("; session.toml lacks the tables {tables}").format(
             tables=", ".join(f"[{name}]" for name in absent_tables)
         )
-    advice = tr("Capture these stages, or copy their PNG or TIFF images there")
+    advice: str = Remedy.CAPTURE_STAGE
     if opened := [name for name in missing if name in OPEN_FOLDERS]:
         found += tr("; the sensor must be open for: {stages}").format(stages=", ".join(opened))
         advice = tr(
-            "Capture these stages; or, if the sensor cannot be opened, calibrate it in place from "
-            "background and balls alone: replace [checkerboard] and [top_pose] in session.toml "
-            "with [in_place] mm_per_px = (size of a pixel on the membrane in mm) and keep only "
-            "the serial in [sensor]"
+            "Capture these images; or calibrate in place, from background and balls alone: replace "
+            "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."
         )
-    raise InputError(found, where=str(folder), advice=advice)
+    raise InputError(found, where=folder, advice=advice)

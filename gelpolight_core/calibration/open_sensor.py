@@ -12,7 +12,7 @@ import numpy as np
 
 from gelpolight_core.calibration.recipe import Facts, Results, Stage, Table, Work
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
 from gelpolight_core.translation import tr
 
@@ -404,14 +404,14 @@ def _refuse_unlit(image: LinearImage) -> None:
         raise InputError(
             tr("The image is dark (a channel only reaches {v:.1%})").format(v=brightest.min()),
             where=f"background/{image.name}",
-            advice=tr("Switch all three LEDs on, or use a longer exposure"),
+            advice=Remedy.LIGHT_ON,
         )
     share = float(saturated(image.rgb).any(axis=2).mean())
     if share > 0.2:
         raise InputError(
             tr("{share:.0%} of the image is saturated").format(share=share),
             where=f"background/{image.name}",
-            advice=tr("Use a shorter exposure"),
+            advice=Remedy.SHORTER_EXPOSURE,
         )
 
 

@@ -18,7 +18,7 @@ from gelpolight_core.calibration.recipe import Progress, Recipe, Results, Stage,
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.causes import with_one_cause
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -271,8 +271,8 @@ class Project(EditableSession):
                 if not self._is_current(key, found):
                     raise InputError(
                         tr("The stage {stage} has no up-to-date result").format(stage=key),
-                        where=str(session.folder),
-                        advice=tr("Complete the stages that are not done yet"),
+                        where=session.folder,
+                        advice=Remedy.COMPLETE_STAGES,
                     )
                 if (fault := self.fault(key)) is not None:
                     raise fault

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.translation import tr
@@ -202,7 +202,7 @@ class Results:
             raise InputError(
                 tr("An earlier stage has no result yet"),
                 where=stage.title,
-                advice=tr("Complete the earlier stages first"),
+                advice=Remedy.COMPLETE_STAGES,
             )
         return result
 

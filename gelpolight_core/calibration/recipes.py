@@ -20,7 +20,7 @@ from gelpolight_core.calibration.open_sensor import (
     linear,
 )
 from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Work
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.labels import label
 from gelpolight_core.translation import tr
@@ -152,7 +152,7 @@ def recipe_of(session: Session, model: str | None = None) -> Recipe:
         if session.in_place is None
         else tr("The session is of a closed sensor"),
         where=f"--model {model}",
-        advice=tr("Do not choose a model: it follows from the session"),
+        advice=Remedy.REMOVE_OPTION,
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import plain_text
 from gelpolight_core.translation import tr
 
@@ -38,8 +38,8 @@ def write_remark(path: Path, key: str, text: str) -> None:
     except ValueError as error:
         raise InputError(
             tr("The text is not plain text of at most {n} characters").format(n=REMARK_LENGTH),
-            where=str(path),
-            advice=tr("Enter a shorter text without special characters"),
+            where=path,
+            advice=Remedy.CORRECT_VALUE,
         ) from error
     calibration = read_calibration(path)
     remark: dict[str, Any] = {key: text.strip()}

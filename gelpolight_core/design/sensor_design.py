@@ -24,7 +24,7 @@ from gelpolight_core.design.parts import (
     Press,
     SessionDesign,
 )
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.reading import (
     NAME_LIMIT,
@@ -141,25 +141,25 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
     _check_ranges(design, where=where, prefix="")
     if len(design.leds) != 3:
         raise InputError(
-            tr("There are {n} LEDs").format(n=len(design.leds)),
+            tr("There are {n} LEDs, not one of each colour").format(n=len(design.leds)),
             where=f"{where} [[leds]]",
-            advice=tr("Define three LEDs: red, green and blue"),
+            advice=Remedy.CORRECT_ENTRY,
         )
     if design.layers.air_gap_mm <= 0.0:
         raise InputError(
-            tr("The layers reach the camera: they are {t} mm thick").format(
+            tr("The layers are {t} mm thick, more than top_distance_mm").format(
                 t=design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
             ),
             where=f"{where} [layers]",
-            advice=tr("Increase top_distance_mm or make the layers thinner"),
+            advice=Remedy.CORRECT_VALUE,
         )
     if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
         raise InputError(
-            tr("The camera has {w} x {h} pixels").format(
-                w=design.camera.width_px, h=design.camera.height_px
+            tr("The camera has {w} x {h} pixels, more than {n} megapixels").format(
+                w=design.camera.width_px, h=design.camera.height_px, n=MAX_PIXELS // 10**6
             ),
             where=f"{where} [camera]",
-            advice=tr("Use at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
+            advice=Remedy.CORRECT_VALUE,
         )
     return design
 
@@ -174,9 +174,11 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
             # A comparison with NaN is false, so NaN is refused too.
             if not np.all((numbers >= low) & (numbers <= high)):
                 raise InputError(
-                    tr("{name} is {value}").format(name=name, value=brief(value)),
+                    tr("{name} is {value}, not a number from {low} to {high}").format(
+                        name=name, value=brief(value), low=low, high=high
+                    ),
                     where=where,
-                    advice=tr("Use a number from {low} to {high}").format(low=low, high=high),
+                    advice=Remedy.CORRECT_VALUE,
                 )
         elif "choices" in item.metadata:
             choices = item.metadata["choices"]
@@ -184,7 +186,7 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
                 raise InputError(
                     tr("{name} is {value}").format(name=name, value=brief(value)),
                     where=where,
-                    advice=tr("Use one of {names}").format(names=", ".join(map(str, choices))),
+                    advice=Remedy.ONE_OF.format(names=", ".join(map(str, choices))),
                 )
         elif hasattr(value, "__dataclass_fields__"):
             _check_ranges(value, where=where, prefix=f"{name}.")
@@ -225,15 +227,13 @@ def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
     """Return a part of a design with the values of a table instead of its defaults."""
     where = f"{where} [{part}]" if part else where
     if not isinstance(table, dict):
-        raise InputError(
-            tr("The value is not a table"), where=where, advice=tr("Write keys and values")
-        )
+        raise InputError(tr("The value is not a table"), where=where, advice=Remedy.CORRECT_ENTRY)
     known = {item.name for item in fields(default)}
     if unknown := sorted(set(table) - known):
         raise InputError(
             tr("Unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
             where=where,
-            advice=tr("Use only {known}").format(known=", ".join(sorted(known))),
+            advice=Remedy.ONE_OF.format(names=", ".join(sorted(known))),
         )
     values = {}
     for name, value in table.items():
@@ -243,9 +243,9 @@ def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
         elif isinstance(like, tuple) and is_dataclass(like[0]):
             if not isinstance(value, list):
                 raise InputError(
-                    tr("The value is not a list of tables"),
+                    tr("The value is not a list of tables (double brackets)"),
                     where=f"{where} [[{name}]]",
-                    advice=tr("Use double brackets"),
+                    advice=Remedy.CORRECT_ENTRY,
                 )
             kind: Any = type(like[0])
             values[name] = tuple(_read(kind(), v, where=where, part=f"[{name}]") for v in value)
@@ -285,7 +285,7 @@ def _converted(value: Any, like: Any, *, where: str) -> Any:
             return float(value) if abs(value) < MOST else math.inf
         kind = tr("a number")
     raise InputError(
-        tr("The value is {value}").format(value=brief(value)),
+        tr("The value is {value}, not {kind}").format(value=brief(value), kind=kind),
         where=where,
-        advice=tr("Use {kind}").format(kind=kind),
+        advice=Remedy.CORRECT_VALUE,
     )

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from gelpolight_core.drawing_thread import in_drawing_thread
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
@@ -48,9 +48,9 @@ def write_board(board: BoardSpec, path: Path) -> None:
     """
     if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("A board can only be written as PDF"),
-            where=str(path),
-            advice=tr("Use a file name that ends in .pdf"),
+            tr("A board is written as PDF, so its name must end in .pdf"),
+            where=path,
+            advice=Remedy.CHOOSE_NAME,
         )
     stream = io.BytesIO()
     information = {"Title": caption(board), "Creator": "GelPoLight Studio", "CreationDate": None}
@@ -106,7 +106,7 @@ def _paper(width_mm: float, height_mm: float, board: BoardSpec) -> tuple[float, 
             w=width_mm, h=height_mm
         ),
         where=caption(board),
-        advice=tr("Choose fewer corners or smaller squares"),
+        advice=Remedy.BOARD_SIZE,
     )
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path, PurePath
 from typing import BinaryIO
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.mesh import Mesh, mesh_of, write_gltf, write_ply, write_stl, write_vtp
 from gelpolight_core.export.raster import (
     describe,
@@ -83,7 +83,7 @@ def write_heightmap(
             raise InputError(
                 tr("The format {name} is unknown").format(name=repr(name)),
                 where=tr("export"),
-                advice=tr("Choose from {names}").format(names=", ".join(FORMATS)),
+                advice=Remedy.ONE_OF.format(names=", ".join(FORMATS)),
             )
     surface = mesh_of(heightmap, stride=stride) if MESH_FORMATS.keys() & formats else None
     make_folder(folder)

@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import as_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
@@ -65,7 +65,7 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
         raise InputError(
             tr("No part of the surface is in the working area"),
             where=heightmap.source,
-            advice=tr("Check the working area in the calibration"),
+            advice=Remedy.CHECK_AREA,
         )
     first = np.arange(depth_mm.size, dtype=np.int32).reshape(depth_mm.shape)
     corner, right, below, across = (

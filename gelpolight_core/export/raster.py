@@ -120,9 +120,8 @@ def read_npz(path: Path) -> HeightMap:
     InputError
         If it cannot be read, or is not a height map.
     """
-    advice = tr("Choose an .npz file exported by this program")
     found = tr("The file is not a height map in npz format, or is damaged ({error})")
-    with refusing(found, path, advice=advice):
+    with refusing(found, path):
         stored = read_arrays(path, (*NPZ_NAMES, *HEAD))
         head = {key: stored.pop(key).item() for key in HEAD if key in stored}
         if head:  # files of earlier programs have none

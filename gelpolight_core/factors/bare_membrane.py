@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.optics.resampling import ResamplingTable, working_area
 from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
@@ -82,10 +82,7 @@ def check_bare_membrane(
             raise InputError(
                 tr("The image shows the same as the whiteboard image"),
                 where=tr("background"),
-                advice=tr(
-                    "Mount the membrane. If it is mounted, it was also mounted for the "
-                    "whiteboard image: capture that one again"
-                ),
+                advice=Remedy.WITH_MEMBRANE,
             )
         pressed = _find_pressed(small, white, area)
     figures = (
@@ -123,7 +120,7 @@ def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
         raise InputError(
             tr("The working area is not in the image"),
             where=tr("background"),
-            advice=tr("Check the working diameter and repeat the top pose"),
+            advice=Remedy.CHECK_LENGTHS,
         )
     return whole
 
@@ -140,9 +137,7 @@ def brightness_figure(small: Float, area: Mask) -> Finding:
         warn=25.0,
         fail=200.0 * LEAST_LIGHT,
         higher_is_better=True,
-        remedy=tr("Switch the {name} LED on, or use a longer exposure").format(
-            name=channel_name(dimmest)
-        ),
+        remedy=Remedy.LIGHT_ON,
     )
 
 

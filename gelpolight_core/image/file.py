@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import missing_file, read_file
 from gelpolight_core.translation import tr
 
@@ -92,9 +92,11 @@ def _check_declared_size(path: Path, data: bytes) -> None:
     for width, height in declared_sizes(data):
         if width * height > MAX_PIXELS:
             raise InputError(
-                tr("The image declares {w} x {h} pixels").format(w=width, h=height),
-                where=str(path),
-                advice=tr("Use images of at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
+                tr("The image declares {w} x {h} pixels, more than {n} megapixels").format(
+                    w=width, h=height, n=MAX_PIXELS // 10**6
+                ),
+                where=path,
+                advice=Remedy.SMALLER_IMAGES,
             )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.translation import tr
 
@@ -66,7 +66,7 @@ def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str
                 a="x".join(map(str, size)), b="x".join(map(str, expected))
             ),
             where=where,
-            advice=tr("Use images of the same camera and size everywhere"),
+            advice=Remedy.SAME_CAMERA,
         )
 
 

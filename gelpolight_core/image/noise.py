@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.translation import tr
 
@@ -129,11 +129,7 @@ def lit_area(background: Array) -> Mask:
     bright = light > max(0.05 * float(np.quantile(light[::3, ::3], 0.99)), 0.5 * DARK)
     regions, _ = cv2.findContours(bright.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not regions:
-        raise InputError(
-            tr("the image is all black"),
-            where=BACKGROUND,
-            advice=tr("Switch the lights on and check the exposure"),
-        )
+        raise InputError(tr("the image is all black"), where=BACKGROUND, advice=Remedy.LIGHT_ON)
     filled = np.zeros(bright.shape, np.uint8)
     cv2.drawContours(filled, [max(regions, key=cv2.contourArea)], -1, 1, cv2.FILLED)
     return filled > 0
@@ -143,9 +139,11 @@ def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str
     for image, what in ((press, name), (background, BACKGROUND)):
         if image.ndim != 3 or image.shape[2] != 3 or min(image.shape[:2]) < 32:
             raise InputError(
-                tr("the array has shape {shape}").format(shape=image.shape),
+                tr(
+                    "the array has shape {shape}, not of a colour image of 32x32 pixels or more"
+                ).format(shape=image.shape),
                 where=what,
-                advice=tr("Give a colour image of at least 32x32 pixels"),
+                advice=Remedy.CHOOSE_FILE,
             )
     for other, what in ((background, BACKGROUND), (valid, tr("working area"))):
         if other is not None and other.shape[:2] != press.shape[:2]:
@@ -158,7 +156,7 @@ def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str
                     oh=other.shape[0],
                 ),
                 where=name,
-                advice=tr("Capture both with the same camera settings"),
+                advice=Remedy.SAME_CAMERA,
             )
 
 
@@ -166,24 +164,16 @@ def _check_exposure(image: Array, area: Mask, name: str) -> None:
     step = max(1, min(image.shape[:2]) // 256)
     inside = image[::step, ::step][area[::step, ::step]]
     if len(inside) == 0:
-        raise InputError(
-            tr("the working area is empty"),
-            where=name,
-            advice=tr("Check the working area and the images"),
-        )
+        raise InputError(tr("the working area is empty"), where=name, advice=Remedy.CHECK_AREA)
     brightest = inside.max(axis=1)
     if float(np.median(brightest)) < DARK:
-        raise InputError(
-            tr("the image is all black"),
-            where=name,
-            advice=tr("Switch the lights on and check the exposure"),
-        )
+        raise InputError(tr("the image is all black"), where=name, advice=Remedy.LIGHT_ON)
     share = float(np.mean(brightest >= SATURATED))
     if share > 0.5:
         raise InputError(
             tr("{share:.0f} % of the image is saturated").format(share=100.0 * share),
             where=name,
-            advice=tr("Shorten the exposure and capture it again"),
+            advice=Remedy.SHORTER_EXPOSURE,
         )
 
 
@@ -348,7 +338,7 @@ def check_gain(gain: tuple[float, float, float], name: str) -> None:
                 gain=worst
             ),
             where=name,
-            advice=tr("Fix exposure and lights, then capture background and press again"),
+            advice=Remedy.SAME_LIGHT,
         )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
 from gelpolight_core.in_place.dead_channel import refuse_dead_channel
 from gelpolight_core.in_place.fit import (
@@ -308,7 +308,7 @@ def _require_presses(found: Sequence[_Press], refused: Mapping[str, InputError])
     raise InputError(
         f"{sentence} ({'; '.join(reasons[:2])})" if reasons else sentence,
         where="balls",
-        advice=tr("Press a ball of known size at different places, and check the background"),
+        advice=Remedy.PRESS_BALLS,
     )
 
 
@@ -358,7 +358,7 @@ def _explained(
                     "other presses (slope error {e:.2f}, other presses {m:.2f})"
                 ).format(e=error, m=float(np.median(errors))),
                 where=press.name,
-                advice=tr("Check the ball's radius and that one clean ball is pressed straight"),
+                advice=Remedy.CHECK_RADIUS,
             )
     rest = list(compress(presses, kept))
     _require_presses(rest, refused)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.health.judging import SIGMAS
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
 from gelpolight_core.translation import tr
@@ -70,5 +70,5 @@ def refuse_dead_channel(images: Sequence[Map], background: Map) -> None:
                 channel=channel_name(weakest)
             ),
             where="balls",
-            advice=tr("Check its LED, then capture background and presses again"),
+            advice=Remedy.LIGHT_ON,
         )

@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import brief, parse_json, read_file
 from gelpolight_core.session.decisions import PlacedCircle
@@ -98,12 +98,12 @@ def read_foreign(folder: Path) -> ForeignFolder:
 
 
 def _unusable(found: str, where: Path | str) -> InputError:
-    advice = tr("Choose a calibration folder of another library that is complete")
-    return InputError(found, where=str(where), advice=advice)
+    advice = Remedy.CHOOSE_FOLDER
+    return InputError(found, where=where, advice=advice)
 
 
 def _wrong_line(found: str, where: str) -> InputError:
-    return InputError(found, where=where, advice=tr("Correct or remove this line"))
+    return InputError(found, where=where, advice=Remedy.CORRECT_ENTRY)
 
 
 def _catalog(folder: Path, table: Path) -> ForeignFolder:
@@ -199,8 +199,8 @@ def _label(path: Path) -> PlacedCircle:
     except (FileNotFoundError, ValueError, KeyError) as error:
         raise InputError(
             tr("The label contains no circle (center, radius)"),
-            where=str(path),
-            advice=tr("Label the image again, or remove this file"),
+            where=path,
+            advice=Remedy.CORRECT_FILE,
         ) from error
     return PlacedCircle(float(x), float(y), radius)
 

@@ -6,7 +6,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import FILE_LIMIT
 from gelpolight_core.in_place.foreign import ForeignFolder, ForeignPress
 from gelpolight_core.in_place.preset import Preset
@@ -65,16 +65,14 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(
-            tr("The folder already contains files"),
-            where=str(out),
-            advice=tr("Choose a new folder"),
+            tr("The folder already contains files"), where=out, advice=Remedy.CHOOSE_FOLDER
         )
     background = stated.background or found.background
     if background is None:
         raise InputError(
             tr("The folder has no image of the untouched membrane"),
             where=found.form,
-            advice=tr("Name it with --background"),
+            advice=Remedy.STATE_WITH.format(option="--background"),
         )
     names = [f"ball_{index:03d}" for index in range(len(found.presses))]
     pairs = list(zip(names, found.presses, strict=True))
@@ -109,9 +107,9 @@ def _radius(press: ForeignPress, stated: Stated) -> float:
     radius = stated.ball_radius_mm or press.radius_mm
     if radius is None:
         raise InputError(
-            tr("The folder does not state the size of the ball"),
-            where=str(press.image.parent),
-            advice=tr("State it with --ball-diameter, in mm"),
+            tr("The folder does not state the diameter of the ball in mm"),
+            where=press.image.parent,
+            advice=Remedy.STATE_WITH.format(option="--ball-diameter"),
         )
     return radius
 
@@ -126,9 +124,9 @@ def _scale(found: ForeignFolder, stated: Stated, background: Path) -> tuple[floa
         rows, columns = _pixels(background)
         return stated.preset.scale_for(columns, rows)
     raise InputError(
-        tr("The folder does not state the scale"),
+        tr("The folder does not state the scale, and no preset is chosen"),
         where=found.form,
-        advice=tr("Name a preset with --preset, or state --mm-per-px"),
+        advice=Remedy.STATE_WITH.format(option="--mm-per-px"),
     )
 
 
@@ -140,11 +138,7 @@ def _pixels(path: Path) -> tuple[int, int]:
 def _copy(source: Path, target: Path) -> None:
     """Copy an image of a format that a session can contain."""
     if source.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            tr("The image is neither PNG nor TIFF"),
-            where=str(source),
-            advice=tr("Capture PNG images: other formats change the colours"),
-        )
+        raise InputError(tr("The image is neither PNG nor TIFF"), where=source, advice=Remedy.PNG)
     read_raw_image(source)
     data = read_file(source, FILE_LIMIT)
     make_folder(target.parent)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, read_toml
 from gelpolight_core.session.session import SCALE_RANGE
 from gelpolight_core.session.table import Table
@@ -118,9 +118,9 @@ def preset_named(key: str) -> Preset:
     if key.endswith(".toml"):
         return read_preset(Path(key))
     raise InputError(
-        tr('There is no preset "{key}"').format(key=brief(key)),
+        tr('There is no preset or TOML file "{key}"').format(key=brief(key)),
         where="preset",
-        advice=tr("Choose one of {names}, or a TOML file").format(names=", ".join(sorted(known))),
+        advice=Remedy.ONE_OF.format(names=", ".join(sorted(known))),
     )
 
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
 from gelpolight_core.reflectance.contour import Circle
@@ -159,9 +159,9 @@ def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
     found = max(fits, key=lambda fit: len(fit.pins_px))
     if (count := len(found.pins_px)) < LEAST_PINS:
         raise InputError(
-            tr("no regular grid of pins was found ({n} pins of one)").format(n=count),
+            tr("no regular grid of 3 x 3 pins or more was found ({n} pins of one)").format(n=count),
             where=where,
-            advice=tr("Press the pin grid evenly, 3 x 3 pins or more, or state mm_per_px"),
+            advice=Remedy.STATE_SCALE,
         )
     # Where a pin's spot is cut off on one side, its centre depends on the smoothing. The error
     # follows from the other smoothing with the nearest result, as that of one of two values.
@@ -229,9 +229,7 @@ def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
     off = np.abs(np.hypot(points[:, 0] - a, points[:, 1] - b) - found.radius)
     if np.mean(off < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
         raise InputError(
-            tr("no round edge of a pressed punch was found"),
-            where=where,
-            advice=tr("Press the flat punch straight and deeper, or state mm_per_px"),
+            tr("no round edge of a pressed punch was found"), where=where, advice=Remedy.STATE_SCALE
         )
     return found
 

@@ -13,7 +13,7 @@ from operator import methodcaller
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 
@@ -58,8 +58,8 @@ def write_atomically(
     if inside is not None and not target.is_relative_to(os.path.realpath(inside)):
         raise InputError(
             tr("The path is a link that points outside the folder"),
-            where=str(path),
-            advice=tr("Replace the link by the file or folder itself"),
+            where=path,
+            advice=Remedy.REPLACE_LINK,
         )
     try:
         _write_and_place(target, _temporary_for(target), writer, _place_new if new else os.replace)
@@ -67,9 +67,7 @@ def write_atomically(
         if not new:
             raise cannot_write(error, path) from error
         raise NameTakenError(
-            tr("A file with this name already exists"),
-            where=str(path),
-            advice=tr("Choose another name"),
+            tr("A file with this name already exists"), where=path, advice=Remedy.CHOOSE_NAME
         ) from error
     except OSError as error:
         raise cannot_write(error, path) from error
@@ -131,9 +129,7 @@ def _ordinary_target(path: Path) -> Path:
     if target.exists() and not (target.is_file() or target.is_dir()):
         # Otherwise an ordinary file would replace, for example, /dev/full.
         raise InputError(
-            tr("The path is a device, not a file"),
-            where=str(path),
-            advice=tr("Choose a file"),
+            tr("The path is a device, not a file"), where=path, advice=Remedy.CHOOSE_FILE
         )
     return target
 
@@ -197,34 +193,30 @@ def sync_folder(folder: Path) -> None:
 def cannot_write(error: OSError, path: Path) -> InputError:
     """Return the error for a file that the system does not allow to be written."""
     found, advice = _plain_words(error)
-    return InputError(found, where=str(path), advice=advice)
+    return InputError(found, where=path, advice=advice)
 
 
 def _plain_words(error: OSError) -> tuple[str, str]:
     """Return the problem and the advice."""
     match error.errno:
         case errno.ENOSPC | errno.EDQUOT:
-            return tr("The disk is full"), tr("Free some space or choose another disk")
+            return tr("The disk is full"), Remedy.FREE_SPACE
         case errno.EACCES | errno.EPERM:
-            return tr("You do not have permission to write here"), tr(
-                "Choose your own folder, or ask for permission"
-            )
+            return tr("You do not have permission to write here"), Remedy.ASK_PERMISSION
         case errno.EROFS:
-            return tr("This disk is read-only"), tr("Choose a folder on another disk")
+            return tr("This disk is read-only"), Remedy.CHOOSE_FOLDER
         case errno.ENOENT:
-            return tr("The folder does not exist"), tr("Create the folder first")
+            return tr("The folder does not exist"), Remedy.CHECK_NAME
         case errno.ENOTDIR | errno.EEXIST:
-            return tr("A file has the name of a required folder"), tr("Choose another folder")
+            return tr("A file has the name of a required folder"), Remedy.CHOOSE_FOLDER
         case errno.EISDIR:
-            return tr("A folder has the name of the file"), tr("Choose another name")
+            return tr("A folder has the name of the file"), Remedy.CHOOSE_NAME
         case errno.ENAMETOOLONG:
-            return tr("The name is too long"), tr("Choose a shorter name")
+            return tr("The name is too long"), Remedy.CHOOSE_NAME
         case errno.EFBIG:
-            return tr("The file is too large for this disk"), tr("Choose another disk")
+            return tr("The file is too large for this disk"), Remedy.FREE_SPACE
     reason = error.strerror or str(error)
-    return tr("The file cannot be written ({reason})").format(reason=reason), tr(
-        "Check the disk or choose another folder"
-    )
+    return tr("The file cannot be written ({reason})").format(reason=reason), Remedy.CHECK_DISK
 
 
 def append_durably(path: Path, content: bytes) -> None:

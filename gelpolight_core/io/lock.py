@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import cannot_write
 from gelpolight_core.io.user import user_name
 from gelpolight_core.translation import tr
@@ -100,8 +100,8 @@ class RunLock(FileLock):
     def _refusal(self, holder: str) -> InputError:
         return InputError(
             tr("This run is being written by {holder}").format(holder=holder),
-            where=str(self.folder),
-            advice=tr("Stop the other run first, or choose a new folder"),
+            where=self.folder,
+            advice=Remedy.STOP_OTHER,
         )
 
 
@@ -117,8 +117,8 @@ def _lock(handle: int) -> None:
 def _is_link(path: Path) -> InputError:
     return InputError(
         tr("This file is a link to another file, which would be overwritten"),
-        where=str(path),
-        advice=tr("Remove the link, or choose a new folder"),
+        where=path,
+        advice=Remedy.REPLACE_LINK,
     )
 
 

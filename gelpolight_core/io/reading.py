@@ -21,7 +21,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 T = TypeVar("T")
@@ -86,8 +86,8 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
             tr("The file is larger than {n} bytes, the limit for files of this kind").format(
                 n=limit
             ),
-            where=str(path),
-            advice=tr("Choose another file"),
+            where=path,
+            advice=Remedy.CHOOSE_FILE,
         )
     return data
 
@@ -184,8 +184,8 @@ def read_toml(path: Path, *, missing: InputError | None = None) -> dict[str, Any
     except ValueError as error:
         raise InputError(
             tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct this line"),
+            where=path,
+            advice=Remedy.CORRECT_FILE,
         ) from error
 
 
@@ -270,13 +270,13 @@ def refuse_newer(version: int, newest: int, path: Path) -> None:
             tr("The file has version {v}, but this program only reads up to version {k}").format(
                 v=version, k=newest
             ),
-            where=str(path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
+            where=path,
+            advice=Remedy.UPDATE,
         )
 
 
 @contextmanager
-def refusing(found: str, where: Path | str, *, advice: str) -> Iterator[None]:
+def refusing(found: str, where: Path | str) -> Iterator[None]:
     """Refuse a file whose content turns out to be invalid.
 
     Parameters
@@ -285,8 +285,6 @@ def refusing(found: str, where: Path | str, *, advice: str) -> Iterator[None]:
         The sentence of the error, with a placeholder ``{error}`` for the reason.
     where : Path or str
         The file, or the place in it.
-    advice : str
-        What to do about it.
 
     Raises
     ------
@@ -297,14 +295,16 @@ def refusing(found: str, where: Path | str, *, advice: str) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError as error:
-        raise missing_file(Path(where), advice) from error
+        raise missing_file(Path(where)) from error
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
-        raise InputError(found.format(error=reason), where=str(where), advice=advice) from error
+        raise InputError(
+            found.format(error=reason), where=where, advice=Remedy.REPAIR_FILE
+        ) from error
 
 
 def read_own(
-    path: Path, form: tuple[str, int], parse: Callable[[Any], T], *, found: str, advice: str
+    path: Path, form: tuple[str, int], parse: Callable[[Any], T], *, found: str
 ) -> T | None:
     """Return what a JSON file of this program contains; None if there is no such file.
 
@@ -316,7 +316,7 @@ def read_own(
         Its format, and the newest version that this program reads.
     parse : callable
         Takes the content; wrong keys, types and values may raise any of their errors.
-    found, advice : str
+    found : str
         As in :func:`refusing`.
 
     Raises
@@ -328,7 +328,7 @@ def read_own(
         data = read_file(path, OWN_LIMIT)
     except FileNotFoundError:
         return None
-    with refusing(found, path, advice=advice):
+    with refusing(found, path):
         content = parse_json(data)
         check_version(content, *form, path)
         return parse(content)
@@ -386,18 +386,17 @@ def brief(value: Any, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def missing_file(path: Path, advice: str = "") -> InputError:
+def missing_file(path: Path) -> InputError:
     """Return the error for a file that does not exist."""
-    advice = advice or tr("Check the file name")
-    return InputError(tr("The file does not exist"), where=str(path), advice=advice)
+    return InputError(tr("The file does not exist"), where=path, advice=Remedy.CHECK_NAME)
 
 
 def unreadable(error: OSError, path: Path) -> InputError:
     """Return the error for a file that the system cannot read."""
     return InputError(
         tr("The file cannot be read ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check its permissions and the disk, or copy it to your own folder"),
+        where=path,
+        advice=Remedy.CHECK_DISK,
     )
 
 

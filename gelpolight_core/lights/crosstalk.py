@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
@@ -209,7 +209,7 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
         raise InputError(
             tr("The image is dark (brightest value {v:.1%})").format(v=np.quantile(blocks, 0.99)),
             where=where,
-            advice=tr("Switch on only the {name} LED, or use a longer exposure").format(name=name),
+            advice=Remedy.LIGHT_ON,
         )
     clear = blocks[(blocks < SATURATED).all(axis=1)]
     lit = clear[clear.max(axis=1, initial=0.0) > LEAST_LIGHT / 2.0]
@@ -217,7 +217,7 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
         raise InputError(
             tr("The image is saturated in nearly all lit areas"),
             where=where,
-            advice=tr("Use a shorter exposure"),
+            advice=Remedy.SHORTER_EXPOSURE,
         )
     shares = np.median(lit / np.maximum(lit[:, led : led + 1], 1e-6), axis=0)
     strongest = int(np.argmax(shares))
@@ -228,7 +228,7 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
                 other=channel_name(rival), x=min(shares[rival], 1e3), name=name
             ),
             where=where,
-            advice=tr("Switch on only the {name} LED for this image").format(name=name),
+            advice=Remedy.SINGLE_LED,
         )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
@@ -161,7 +161,7 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
         raise InputError(
             tr("The image is black (brightest value {v:.0%})").format(v=brightest.max()),
             where=where,
-            advice=tr("Switch the LEDs on, or use a longer exposure"),
+            advice=Remedy.LIGHT_ON,
         )
     share = float((brightest > 0.25 * brightest.max()).mean())
     if share > BRIGHT_SHARE_LIMIT:
@@ -170,10 +170,7 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
                 "{share:.0%} of the image is bright, but only three small spots are expected"
             ).format(share=share),
             where=where,
-            advice=tr(
-                "Put the mirror in place of the membrane, darken the room and use a shorter "
-                "exposure"
-            ),
+            advice=Remedy.CLEAN_MIRROR,
         )
 
 
@@ -284,9 +281,7 @@ def _refuse_merged(candidates: list[Spot], where: str) -> None:
                     v=spot.centre_px[1],
                 ),
                 where=where,
-                advice=tr(
-                    "Use a shorter exposure; if they stay merged, the LEDs are too close together"
-                ),
+                advice=Remedy.SHORTER_EXPOSURE,
             )
 
 
@@ -299,10 +294,7 @@ def _choose(
         raise InputError(
             tr("The {name} LED has no spot").format(name=name),
             where=where,
-            advice=tr(
-                "Check that the {name} LED is on and its reflection is in view, or use a "
-                "longer exposure"
-            ).format(name=name),
+            advice=Remedy.MIRROR_VIEW,
         )
     best, others = own[0], own[1:]
     if others and others[0].flux[channel] > RIVAL_FLUX * best.flux[channel]:
@@ -312,15 +304,13 @@ def _choose(
                 name=name,
             ),
             where=where,
-            advice=tr(
-                "Remove the cause of the extra spot: room light, a second reflection, or dust"
-            ),
+            advice=Remedy.CLEAN_MIRROR,
         )
     if best.touches_border:
         raise InputError(
             tr("The {name} spot is cut by the image border").format(name=name),
             where=where,
-            advice=tr("The LED's reflection must be in view: use a wider lens or lower LEDs"),
+            advice=Remedy.MIRROR_VIEW,
         )
     reason = tr("Fainter than the main spot of the {name} LED: a glint or second reflection")
     return best, [(s, reason.format(name=name)) for s in others]

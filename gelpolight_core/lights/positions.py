@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.camera import Camera
@@ -120,7 +120,7 @@ def locate_leds(
                 "The three light directions lie nearly in one plane (condition number {c:.0f})"
             ).format(c=condition),
             where=tr("mirror"),
-            advice=tr("Place the LEDs wider apart around the sensor's axis"),
+            advice=Remedy.WIDER_LEDS,
         )
     return LightResult(
         positions,
@@ -232,7 +232,7 @@ def _judge(
                 condition,
                 warn=8.0,
                 fail=20.0,
-                remedy=tr("Place the LEDs wider apart around the sensor's axis"),
+                remedy=Remedy.WIDER_LEDS,
             ),
             judge(
                 "led_radius_ratio",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
@@ -46,14 +46,11 @@ class Rectangle:
         numbers = (*self.centre_mm, *self.sides_mm, self.yaw_deg)
         if not all(map(math.isfinite, numbers)) or min(self.sides_mm) <= 0.0:
             raise InputError(
-                tr("a rectangle of {a:g} x {b:g} mm at ({x:g}, {y:g}) mm").format(
-                    a=self.sides_mm[0],
-                    b=self.sides_mm[1],
-                    x=self.centre_mm[0],
-                    y=self.centre_mm[1],
+                tr("the rectangle of {a:g} x {b:g} mm at ({x:g}, {y:g}) mm has no area").format(
+                    a=self.sides_mm[0], b=self.sides_mm[1], x=self.centre_mm[0], y=self.centre_mm[1]
                 ),
                 where=tr("rectangle"),
-                advice=tr("Give two sides greater than zero, and the position of the centre"),
+                advice=Remedy.CORRECT_VALUE,
             )
 
     @property
@@ -89,7 +86,7 @@ class Rectangle:
             where=tr("rectangle at ({x:g}, {y:g}) mm").format(
                 x=self.centre_mm[0], y=self.centre_mm[1]
             ),
-            advice=tr("Make it larger, or move it into the working area"),
+            advice=Remedy.LARGER_AREA,
         )
 
 

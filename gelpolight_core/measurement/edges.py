@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import least_squares
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measured import depth_at
@@ -247,7 +247,7 @@ def _edge_offsets(
         raise InputError(
             tr("there is no edge near the drawn shape"),
             where=tr("steepest slope"),
-            advice=tr("Draw it nearer to the edge, or measure the drawn shape (plain)"),
+            advice=Remedy.DRAW_AGAIN,
         )
     return np.asarray(offsets[0] + step * index), there
 
@@ -308,7 +308,5 @@ def _together(points: Array) -> float:
 
 def _no_circle() -> InputError:
     return InputError(
-        tr("no circle goes through these points"),
-        where=tr("circle"),
-        advice=tr("Give three or more points of the edge that do not lie on one line"),
+        tr("no circle goes through these points"), where=tr("circle"), advice=Remedy.PLACE_POINTS
     )

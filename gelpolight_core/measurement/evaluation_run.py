@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.evaluation import Evaluation, evaluate
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -73,11 +73,11 @@ def evaluate_presses(
     missing = [row.file for row in table.rows if not (folder / row.file).is_file()]
     if missing:
         raise InputError(
-            tr("{count} of {all} images are missing, first {file}").format(
+            tr("{count} of {all} images are missing beside it, first {file}").format(
                 count=len(missing), all=len(table.rows), file=missing[0]
             ),
-            where=str(folder / "truth.csv"),
-            advice=tr("Put the images beside truth.csv or take their rows out"),
+            where=folder / "truth.csv",
+            advice=Remedy.TRUTH_ROW,
         )
     outcomes: dict[str, Outcome] = {}
     if submit is None:

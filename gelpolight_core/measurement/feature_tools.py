@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import doubt
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.edges import fit_circle
@@ -212,7 +212,7 @@ def _complete(profile: Profile) -> Mask:
         raise InputError(
             tr("the section ends outside the working area"),
             where=tr("profile of {length:.2f} mm").format(length=profile.along_mm[-1]),
-            advice=tr("Move its ends into the working area"),
+            advice=Remedy.MOVE_INSIDE,
         )
     return there
 

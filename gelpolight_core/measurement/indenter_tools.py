@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.measured import Measured
@@ -57,11 +57,7 @@ def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:
         found = tr("the object may be a {first} or a {second}").format(
             first=proposal.candidates[0], second=proposal.candidates[1]
         )
-    raise InputError(
-        found,
-        where=heightmap.source or tr("height map"),
-        advice=tr("State its shape, or measure it with another tool"),
-    )
+    raise InputError(found, where=heightmap.source or tr("height map"), advice=Remedy.CHOOSE_SHAPE)
 
 
 def mode_error(heightmap: HeightMap) -> ModeError:

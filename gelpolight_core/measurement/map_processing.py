@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.measurement.roughness import above_plane
@@ -53,7 +53,7 @@ def masked(heightmap: HeightMap, keep: Mask) -> HeightMap:
         raise InputError(
             tr("the mask leaves out all points with a depth"),
             where=tr("mask"),
-            advice=tr("Choose a larger area or a smaller depth"),
+            advice=Remedy.LARGER_AREA,
         )
     flags = heightmap.flags | np.where(keep, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
     percent = 100.0 * float((before & ~keep).sum() / before.sum())
@@ -87,7 +87,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
             raise InputError(
                 tr("fewer than three points have a depth"),
                 where=tr("levelling"),
-                advice=tr("Choose a larger area inside the working area"),
+                advice=Remedy.LARGER_AREA,
             )
         left = above_plane(x, y, depth, there)
         middle = float(np.median(left[there]))
@@ -114,9 +114,9 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     positions = np.asarray(points_mm, np.float64)
     if positions.shape != (3, 2):
         raise InputError(
-            tr("there are only {n} points for a plane").format(n=len(positions)),
+            tr("there are {n} points for a plane, which needs three").format(n=len(positions)),
             where=tr("levelling"),
-            advice=tr("Choose three points"),
+            advice=Remedy.PLACE_POINTS,
         )
     depth = depth_at(heightmap, positions[:, 0], positions[:, 1])
     (ax, ay), (bx, by) = positions[1] - positions[0], positions[2] - positions[0]
@@ -127,7 +127,7 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
         raise InputError(
             tr("the three points lie on a line, or one has no depth"),
             where=tr("levelling"),
-            advice=tr("Choose three points inside the working area, far from each other"),
+            advice=Remedy.PLACE_POINTS,
         )
     terms = np.column_stack([np.ones(3), positions])
     level, slope_x, slope_y = np.linalg.solve(terms, depth)
@@ -215,7 +215,7 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
         raise InputError(
             tr("the two height maps do not overlap"),
             where=f"{heightmap.source}, {earlier.source}",
-            advice=tr("Choose a reference of the same sensor"),
+            advice=Remedy.SAME_SENSOR,
         )
     note = tr("Difference to {name}.").format(name=earlier.source)
     left = _without(heightmap, np.where(there, other, heightmap.depth_mm), note)
@@ -240,9 +240,7 @@ def histogram(
     there = usable(heightmap)
     if not there.any():
         raise InputError(
-            tr("no point has a depth"),
-            where=heightmap.source,
-            advice=tr("Use an image of the lit sensor"),
+            tr("no point has a depth"), where=heightmap.source, advice=Remedy.CHECK_AREA
         )
     counts, edges = np.histogram(heightmap.depth_mm[there].astype(np.float64), bins=bins)
     return counts, edges
@@ -301,7 +299,9 @@ def _without_errors(heightmap: HeightMap) -> HeightMap:
 
 def _bad_size(size: float) -> InputError:
     return InputError(
-        tr("the size of the filter is {size:g}").format(size=size),
+        tr(
+            "the size of the filter, {size:g}, is neither above 0 mm nor an odd number from 3 to 15"
+        ).format(size=size),
         where=tr("smoothing"),
-        advice=tr("Choose a sigma above 0 mm, or an odd number of points from 3 to 15"),
+        advice=Remedy.CORRECT_VALUE,
     )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.fit import (
     EdgePrior,
@@ -96,7 +96,7 @@ def measure_object(
         raise InputError(
             tr("unknown shape '{shape}'").format(shape=shape),
             where=tr("shape"),
-            advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
+            advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
     blur_mm2 = 0.0 if mode is None else mode.blur_mm2
     window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, blur_mm2=blur_mm2)
@@ -152,7 +152,7 @@ def find_object(
                 x=region.centre_mm[0], y=region.centre_mm[1]
             ),
             where=tr("depth map"),
-            advice=tr("Press it nearer to the middle of the sensor"),
+            advice=Remedy.PRESS_MIDDLE,
         )
     window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
     pixel_mm2 = window.pitch_mm**2
@@ -177,9 +177,7 @@ def _chosen_region(
     """Return the object at the seed, or the only one."""
     if not regions:
         raise InputError(
-            tr("no object is pressed"),
-            where=tr("depth map"),
-            advice=tr("Press the object into the membrane and capture the image again"),
+            tr("no object is pressed"), where=tr("depth map"), advice=Remedy.PRESS_DEEPER
         )
     if seed_mm is not None:
         return _region_at(regions, x_mm, y_mm, seed_mm)
@@ -191,7 +189,7 @@ def _chosen_region(
                 count=len(tall), places=places
             ),
             where=tr("depth map"),
-            advice=tr("Choose one: give --seed X Y with a point on it"),
+            advice=Remedy.CHOOSE_OBJECT,
         )
     return tall[0]
 
@@ -206,13 +204,11 @@ def _region_at(
     nearest = min(regions, key=distance)
     if not distance(nearest) <= SEED_REACH_MM:
         raise InputError(
-            tr("no object lies at the seed point ({x:g}, {y:g}) mm").format(
-                x=seed_mm[0], y=seed_mm[1]
-            ),
+            tr(
+                "no object lies at ({x:g}, {y:g}) mm; the nearest is at ({a:.1f}, {b:.1f}) mm"
+            ).format(x=seed_mm[0], y=seed_mm[1], a=nearest.centre_mm[0], b=nearest.centre_mm[1]),
             where=tr("seed"),
-            advice=tr("The nearest is at ({x:.1f}, {y:.1f}) mm").format(
-                x=nearest.centre_mm[0], y=nearest.centre_mm[1]
-            ),
+            advice=Remedy.CHOOSE_OBJECT,
         )
     return nearest
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.edges import (
     circle_at_steepest,
@@ -122,5 +122,5 @@ def _check_edge(edge: str) -> None:
         raise InputError(
             tr("unknown edge '{edge}'").format(edge=edge),
             where=tr("measuring tool"),
-            advice=tr("Choose one of {names}").format(names=", ".join(EDGES)),
+            advice=Remedy.ONE_OF.format(names=", ".join(EDGES)),
         )

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.area import Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import (
     Measured,
@@ -125,7 +125,7 @@ class Angle:
             raise InputError(
                 tr("an arm of the angle has no length"),
                 where=tr("angle"),
-                advice=tr("Place three different points, the apex second"),
+                advice=Remedy.PLACE_POINTS,
             )
 
         def compute(at: Array, depth: Array) -> tuple[float, ...]:
@@ -215,7 +215,7 @@ def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
                 x=x_mm[k], y=y_mm[k]
             ),
             where=tr("measuring tool"),
-            advice=tr("Move it onto the map"),
+            advice=Remedy.MOVE_INSIDE,
         )
     return depth
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, is_file_name
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
@@ -139,9 +139,7 @@ def read_truth(path: Path) -> TruthTable:
             skipped.append(file)
     if not rows:
         raise InputError(
-            tr("no row with a cylinder, cuboid or ball"),
-            where=str(path),
-            advice=tr("Add a row for each press that has a true size"),
+            tr("no row with a cylinder, cuboid or ball"), where=path, advice=Remedy.TRUTH_ROW
         )
     return TruthTable(tuple(rows), tuple(skipped))
 
@@ -176,9 +174,9 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         missing.append("diameter_mm")
     if missing:
         raise InputError(
-            tr("the column {names} is missing").format(names=", ".join(missing)),
-            where=str(path),
-            advice=tr("Write the column names in the first line, separated by commas"),
+            tr("the column {names} is missing in the first line").format(names=", ".join(missing)),
+            where=path,
+            advice=Remedy.CORRECT_FILE,
         )
     return [
         (line, dict(zip(header, (cell.strip() for cell in cells), strict=False)))

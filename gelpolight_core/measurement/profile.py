@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measured import (
     MapErrors,
     Measured,
@@ -110,7 +110,7 @@ def take_profile(
         raise InputError(
             tr("the line lies outside the working area"),
             where=tr("profile"),
-            advice=tr("Draw it over the area to measure"),
+            advice=Remedy.MOVE_INSIDE,
         )
     total = np.where(there, depth, 0.0).sum(axis=0)
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
@@ -135,11 +135,11 @@ def _check_line(length: float, width_mm: float, step: float) -> None:
     good = math.isfinite(length) and math.isfinite(width_mm) and width_mm >= 0.0
     if not good or not 2.0 * step <= length <= MOST_POINTS * step:
         raise InputError(
-            tr("the line has a length of {length:g} mm and a width of {width:g} mm").format(
+            tr("the line has no length or no valid width ({length:g} mm x {width:g} mm)").format(
                 length=length, width=width_mm
             ),
             where=tr("profile"),
-            advice=tr("Draw a line across the object, and give a width of 0 or more"),
+            advice=Remedy.DRAW_AGAIN,
         )
 
 
@@ -341,7 +341,7 @@ def _crossings(
         raise InputError(
             tr("the profile does not cross {level:.4f} mm twice").format(level=level),
             where=tr("width of a profile"),
-            advice=tr("Choose another level, or a range that begins and ends beside the object"),
+            advice=Remedy.DRAW_AGAIN,
         )
     found = [
         _Crossing(
@@ -367,7 +367,7 @@ def _within(profile: Profile, part_mm: Point, least: int) -> Mask:
                 low=low, high=high
             ),
             where=tr("profile of {length:.2f} mm").format(length=along[-1]),
-            advice=tr("Choose a longer range inside the working area"),
+            advice=Remedy.LARGER_AREA,
         )
     return np.asarray(part)
 

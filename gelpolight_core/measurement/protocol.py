@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_text
 from gelpolight_core.io.codec import unpack
 from gelpolight_core.io.reading import (
@@ -271,24 +271,20 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
         unknown, missing, of the wrong kind or out of range.
     """
     path = folder / FILE_NAME
-    advice = tr("Correct the file; the presses in the folder are intact")
-    try:
-        with refusing(tr("the protocol cannot be read ({error})"), path, advice=advice):
-            content = parse_toml(read_file(path, SIZE_LIMIT))
-            check_version(content, FORMAT, VERSION, path)
-            if missing := [
-                k for name, keys in TABLES.items() for k in keys if k not in content[name]
-            ]:
-                raise ValueError(f"{missing[0]} is missing")
-            values = {key: value for name in TABLES for key, value in content[name].items()}
-            protocol = check_protocol(unpack(Protocol, values, {}, "protocol"), where=str(path))
-            sensor = content["sensor"]
-            return ProtocolFile(
-                protocol, plain_text(sensor["serial"]), plain_text(sensor["calibration"])
-            )
-    except FileNotFoundError as error:
+    if not path.is_file():
         raise InputError(
             tr("there is no {name}").format(name=FILE_NAME),
-            where=str(folder),
-            advice=tr("Name the folder of a run of the evaluation protocol"),
-        ) from error
+            where=folder,
+            advice=Remedy.CHOOSE_FOLDER,
+        )
+    with refusing(tr("the protocol cannot be read ({error})"), path):
+        content = parse_toml(read_file(path, SIZE_LIMIT))
+        check_version(content, FORMAT, VERSION, path)
+        if missing := [k for name, keys in TABLES.items() for k in keys if k not in content[name]]:
+            raise ValueError(f"{missing[0]} is missing")
+        values = {key: value for name in TABLES for key, value in content[name].items()}
+        protocol = check_protocol(unpack(Protocol, values, {}, "protocol"), where=str(path))
+        sensor = content["sensor"]
+        return ProtocolFile(
+            protocol, plain_text(sensor["serial"]), plain_text(sensor["calibration"])
+        )

@@ -17,7 +17,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import append_durably, cannot_write, make_folder, write_text
 from gelpolight_core.io.reading import brief, read_file
 from gelpolight_core.io.table import csv_text, read_csv
@@ -236,8 +236,8 @@ def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str
         if (folder / name).exists():
             raise InputError(
                 tr("the folder already contains {name}").format(name=name),
-                where=str(folder),
-                advice=tr("Continue that run, or choose a new folder"),
+                where=folder,
+                advice=Remedy.START_NEW,
             )
     make_folder(folder / PRESSES)
     content = ProtocolFile(protocol, serial, calibration)
@@ -263,8 +263,8 @@ def open_run(folder: Path) -> ProtocolRun:
         if press is None or len(row) != len(COLUMNS) or row[1:-1] != _row(press)[1:-1]:
             raise InputError(
                 tr("the row of {file} does not belong to this protocol").format(file=brief(row[0])),
-                where=str(presses / TRUTH),
-                advice=tr("Restore the original protocol.toml and truth.csv"),
+                where=presses / TRUTH,
+                advice=Remedy.REPAIR_FILE,
             )
         # A deleted image is requested again.
         if (presses / row[0]).is_file():
@@ -339,8 +339,8 @@ def _read_rows(path: Path) -> list[list[str]]:
     if not lines or tuple(lines[0]) != COLUMNS:
         raise InputError(
             tr("the first line is not that of a protocol run"),
-            where=str(path),
-            advice=tr("Restore the original file"),
+            where=path,
+            advice=Remedy.REPAIR_FILE,
         )
     return lines[1:]
 

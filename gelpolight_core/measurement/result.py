@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, reason_of
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.translation import tr
@@ -278,14 +278,14 @@ def compare(
                 truth=truth.shape, shape=measurement.shape
             ),
             where=tr("truth"),
-            advice=tr("Measure with the shape that was pressed"),
+            advice=Remedy.CHOOSE_SHAPE,
         )
     for value in (truth.size_mm, truth.height_mm):
         if value <= 0.0 or math.isinf(value):
             raise InputError(
-                tr("the true size is {value} mm").format(value=value),
+                tr("the true size is {value} mm, not greater than zero").format(value=value),
                 where=tr("truth"),
-                advice=tr("Give sizes greater than zero"),
+                advice=Remedy.CORRECT_VALUE,
             )
     rows = (
         (truth.size_key, measurement.size_mm, measurement.size_sd_mm, truth.size_mm),

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.area import AreaNodes, Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import Measured, map_errors, measured
 from gelpolight_core.measurement.profile import Profile
@@ -117,11 +117,11 @@ def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> Parameters
     sections = min((count - 2 * math.ceil(0.5 * section)) // section, SECTIONS)
     if sections < 1:
         raise InputError(
-            tr("a line of {length:.2f} mm is too short for a cut-off of {cutoff:g} mm").format(
+            tr("a line of {length:.2f} mm is shorter than two cut-offs of {cutoff:g} mm").format(
                 length=step * count, cutoff=cutoff_mm
             ),
             where=tr("profile roughness"),
-            advice=tr("Draw a line of at least two cut-offs; six allow the standard evaluation"),
+            advice=Remedy.DRAW_AGAIN,
         )
     first = (count - sections * section) // 2
     errors = profile.errors and replace(profile.errors, depth_mm=profile.errors.depth_mm[:, inside])
@@ -203,12 +203,10 @@ def _check_cutoff(cutoff_mm: float, pitch_mm: float) -> None:
         return
     raise InputError(
         tr(
-            "the cut-off is {cutoff:g} mm, but the points of the map are {pitch:.3f} mm apart"
-        ).format(cutoff=cutoff_mm, pitch=pitch_mm),
+            "the cut-off is {cutoff:g} mm, and {least:.2f} mm the least for this map (0.8 is usual)"
+        ).format(cutoff=cutoff_mm, least=LEAST_PITCHES * pitch_mm),
         where=tr("profile roughness"),
-        advice=tr("Choose at least {least:.2f} mm; 0.8 mm is usual").format(
-            least=LEAST_PITCHES * pitch_mm
-        ),
+        advice=Remedy.CORRECT_VALUE,
     )
 
 
@@ -220,6 +218,6 @@ def _inside(profile: Profile) -> slice:
         raise InputError(
             tr("the line crosses points without depth"),
             where=tr("profile roughness"),
-            advice=tr("Draw it where the map has no gaps"),
+            advice=Remedy.DRAW_AGAIN,
         )
     return slice(int(there[0]), int(there[-1]) + 1)

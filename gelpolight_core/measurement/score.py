@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.npy import read_arrays
+from gelpolight_core.io.reading import missing_file
 from gelpolight_core.session.session import SensorData
 from gelpolight_core.translation import tr
 
@@ -125,11 +126,7 @@ def read_true_depth(path: Path) -> TrueDepth:
         arrays = read_arrays(path, KEYS)
         depth, x0, y0, pitch = (arrays[key].astype(np.float64) for key in KEYS)
     except FileNotFoundError as error:
-        raise InputError(
-            tr("The file does not exist"),
-            where=str(path),
-            advice=tr("Use a session that contains the true depth of its presses"),
-        ) from error
+        raise missing_file(path) from error
     except (ValueError, KeyError) as error:
         raise _not_a_truth(path) from error
     if not x0.size == y0.size == pitch.size == 1:
@@ -143,6 +140,6 @@ def read_true_depth(path: Path) -> TrueDepth:
 def _not_a_truth(path: Path) -> InputError:
     return InputError(
         tr("the file does not contain the true depth of a press"),
-        where=str(path),
-        advice=tr("It needs {keys}; simulate the session again").format(keys=", ".join(KEYS)),
+        where=path,
+        advice=Remedy.CHOOSE_SESSION,
     )

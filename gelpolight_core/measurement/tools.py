@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any, cast
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.codec import unpack
 from gelpolight_core.io.reading import brief, refusing
 from gelpolight_core.measurement.area import Rectangle
@@ -89,15 +89,12 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
         raise InputError(
             tr("unknown tool '{name}'").format(name=brief(name)),
             where=tr("measuring tool"),
-            advice=tr("Choose one of {names}").format(names=", ".join(TOOLS)),
+            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     given = {key: value for key, value in content.items() if key != "tool"}
     with refusing(
         tr("the values do not describe this tool ({error})"),
         tr("measuring tool {name}").format(name=name),
-        advice=tr("It needs {names}; give lengths in mm, and a position as two numbers").format(
-            names=", ".join(field.name for field in fields(cast(Any, kind)))
-        ),
     ):
         return unpack(kind, _plain(given), {}, kind.name)
 
@@ -116,7 +113,7 @@ def tools_from_json(content: Any) -> tuple[Tool, ...]:
         raise InputError(
             tr("there is no measuring tool"),
             where=tr("measuring tools"),
-            advice=tr("Give a list of tools, or results that were stored"),
+            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     tools = []
     for entry in content:

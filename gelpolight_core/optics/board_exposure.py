@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.translation import tr
@@ -41,20 +41,20 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
         raise InputError(
             tr("{n} pixels have no valid value").format(n=int(np.count_nonzero(~finite))),
             where=name,
-            advice=tr("Capture the image again"),
+            advice=Remedy.CAPTURE_AGAIN,
         )
     # One pixel in 200 at each end may be a glint or a hole.
     low, high = np.percentile(grey[::2, ::2], [0.5, 99.5])
     if high - low >= MIN_CONTRAST:
         return
     if low >= SATURATED - MIN_CONTRAST:
-        found, advice = tr("The image is saturated"), tr("Use a shorter exposure")
+        found, advice = tr("The image is saturated"), Remedy.SHORTER_EXPOSURE
     elif high < 3.0 * MIN_CONTRAST:
-        found, advice = tr("The image is black"), tr("Light the board, or use a longer exposure")
+        found, advice = tr("The image is black"), Remedy.LIGHT_ON
     else:
         found, advice = (
             tr("The image has the same brightness everywhere"),
-            tr("Place the board in view of the camera"),
+            Remedy.SHOW_BOARD,
         )
     raise InputError(found, where=name, advice=advice)
 
@@ -131,5 +131,5 @@ def blur_error(edge_width_px: float, limit_px: float, name: str) -> InputError:
             "The image is blurred: edges are {e:.1f} px wide, but at most {m:.1f} px is allowed"
         ).format(e=edge_width_px, m=limit_px),
         where=name,
-        advice=tr("Focus the camera, hold the board still, and capture the image again"),
+        advice=Remedy.FOCUS,
     )

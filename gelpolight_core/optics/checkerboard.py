@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
     EDGE_OF_SIGMA,
@@ -186,14 +186,14 @@ def _check_view(view: BoardView) -> None:
     if view.saturated_share > MAX_SATURATED_SHARE:
         raise refuse(
             tr("{p:.0f} % of the light squares are saturated").format(p=100 * view.saturated_share),
-            advice=tr("Use a shorter exposure so that the light squares are not saturated"),
+            advice=Remedy.SHORTER_EXPOSURE,
         )
     if view.contrast < MIN_CONTRAST:
         raise refuse(
             tr("Light and dark squares differ by only {c:.1f} of 255").format(
                 c=255 * view.contrast
             ),
-            advice=tr("Use more light on the board, or a longer exposure"),
+            advice=Remedy.LIGHT_ON,
         )
     limit_px = min(edge_limit_px(view.image_size[0]), MAX_EDGE_OF_SQUARE * view.square_px)
     if view.edge_width_px > limit_px:
@@ -206,7 +206,7 @@ def _check_view(view: BoardView) -> None:
             tr(
                 "The corners deviate by up to {m:.1f} px from a flat grid (squares of {s:.0f} px)"
             ).format(m=view.grid_max_px, s=view.square_px),
-            advice=tr("Use a flat board, hold it still, and keep reflections and fingers off it"),
+            advice=Remedy.FLAT_BOARD,
         )
 
 
@@ -226,7 +226,7 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
             h=board.inner_corners[1],
         ),
         where=name,
-        advice=_size_advice(),
+        advice=Remedy.BOARD_SIZE,
     )
 
 
@@ -236,12 +236,8 @@ def _larger(board: BoardSpec, name: str) -> InputError:
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
         where=name,
-        advice=_size_advice(),
+        advice=Remedy.BOARD_SIZE,
     )
-
-
-def _size_advice() -> str:
-    return tr("Correct the number of inner corners of the board, or show the whole board")
 
 
 def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputError:
@@ -255,5 +251,5 @@ def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputErro
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
         where=name,
-        advice=tr("Show the whole board, flat and evenly lit, with a light margin around it"),
+        advice=Remedy.SHOW_BOARD,
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, judge, judge_left_out
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
@@ -61,10 +61,7 @@ def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
             "length is uncertain by {p:.2g} % although the board tilt varies by {s:.1f} degrees"
         ).format(r=fit.rms_px, s=spread_deg, p=100.0 * focal_sd),
         where=tr("checkerboard"),
-        advice=tr(
-            "Print the board at 100 % scale and glue it to something flat. If it is flat, capture "
-            "more sharp views that fill the image"
-        ),
+        advice=Remedy.FLAT_BOARD,
     )
 
 

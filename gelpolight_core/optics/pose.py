@@ -15,7 +15,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge, judge_left_out
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.optics.board_exposure import EDGE_OF_SIGMA
@@ -168,7 +168,7 @@ def _check_images(images: Sequence[LinearImage], camera: Camera) -> None:
         raise InputError(
             tr("There is no image of the board on the top surface"),
             where=tr("top_pose"),
-            advice=tr("Lay the board on the top surface and capture an image"),
+            advice=Remedy.BOARD_ON_TOP,
         )
     for image in images:
         require_size(image.size, (camera.width, camera.height), where=f"top_pose/{image.name}")
@@ -243,7 +243,7 @@ def _refuse_discord(views: Sequence[TopPoseView], count: int) -> None:
             n=count, names="; ".join(f"{view.name}: {view.reason}" for view in strays)
         ),
         where=tr("top_pose"),
-        advice=tr("Use only images in which the board lies flat on the top surface"),
+        advice=Remedy.BOARD_ON_TOP,
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.translation import tr
 
@@ -73,9 +73,7 @@ def build_stack(
                 "{d:.1f} mm away"
             ).format(t=elastomer_thickness_mm + window_thickness_mm, d=distance_mm),
             where=tr("sensor description"),
-            advice=tr(
-                "Correct the thicknesses, or the square size of the board on the top surface"
-            ),
+            advice=Remedy.CHECK_LENGTHS,
         )
     layers = [
         (air_mm, 1.0),

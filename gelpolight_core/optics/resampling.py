@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane, membrane_to_camera
@@ -119,9 +119,11 @@ def build_resampling_table(
     """
     if max(camera.width, camera.height) > FLOAT32_MAX_PIXELS:
         raise InputError(
-            tr("The image has {w} x {h} pixels").format(w=camera.width, h=camera.height),
+            tr("The image has {w} x {h} pixels, more than {n} a side").format(
+                w=camera.width, h=camera.height, n=FLOAT32_MAX_PIXELS
+            ),
             where=tr("camera"),
-            advice=tr("Use images of at most {n} pixels a side").format(n=FLOAT32_MAX_PIXELS),
+            advice=Remedy.SMALLER_IMAGES,
         )
     grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
     points = grid.points_mm()
@@ -207,7 +209,7 @@ def visible_grid(
         raise InputError(
             tr("The camera sees nothing of the working circle"),
             where="top_pose",
-            advice=tr("Check the square size of the board and the image of the top surface"),
+            advice=Remedy.CHECK_LENGTHS,
         )
     if not (high - low >= LEAST_NODES * pitch_mm).all():
         raise InputError(
@@ -216,14 +218,14 @@ def visible_grid(
                 "{n} pixels"
             ).format(x=high[0] - low[0], y=high[1] - low[1], n=LEAST_NODES),
             where=tr("sensor description"),
-            advice=tr("Enter the working diameter in mm: the width of the membrane in use"),
+            advice=Remedy.CHECK_LENGTHS,
         )
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_IMAGE * camera.width * camera.height:
         raise InputError(
             tr("The membrane grid would have {n:.1e} nodes").format(n=nodes),
             where=tr("camera"),
-            advice=tr("Check focal length and working diameter, or set a larger pitch"),
+            advice=Remedy.CHECK_LENGTHS,
         )
     axes = []
     for start, stop in zip(low, high, strict=True):

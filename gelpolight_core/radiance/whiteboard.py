@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.positions import light_directions
@@ -124,14 +124,14 @@ def _refuse_hopeless(
                 name=name, v=min(brightest)
             ),
             where=where,
-            advice=tr("Switch the {name} LED on, or use a longer exposure").format(name=name),
+            advice=Remedy.LIGHT_ON,
         )
     share = float(saturated[valid].mean())
     if share > 0.3:
         raise InputError(
             tr("{share:.0%} of the working area is saturated").format(share=share),
             where=where,
-            advice=tr("Use a shorter exposure so that the brightest area stays below 95 %"),
+            advice=Remedy.SHORTER_EXPOSURE,
         )
 
 
@@ -155,10 +155,7 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
                     "mirror image"
                 ).format(name=name, other=names[best]),
                 where=where,
-                advice=tr(
-                    "Capture mirror and whiteboard again: the LEDs or colours were swapped "
-                    "between them"
-                ),
+                advice=Remedy.MIRROR_AGAIN,
             )
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.lights.positions import (
     CONDITION_LIMIT,
@@ -73,7 +73,7 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
         raise InputError(
             tr("the image contains values of type {kind}").format(kind=frame.dtype),
             where=name or tr("image"),
-            advice=tr("Use unsigned 8 or 16 bit integers, or floats of linear light 0..1"),
+            advice=Remedy.LINEAR_ARRAY,
         )
     if kind == "u":
         return frame.astype(frame.dtype.newbyteorder("="), copy=False)
@@ -86,7 +86,7 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
                 value=median
             ),
             where=name or tr("image"),
-            advice=tr("Divide it by its full scale, or use whole numbers as the camera gives them"),
+            advice=Remedy.LINEAR_ARRAY,
         )
     limited: Map = np.clip(frame, 0.0, 1.0).astype(np.float32)
     limited[~np.isfinite(frame)] = np.nan
@@ -243,7 +243,7 @@ def refuse_coplanar_lights(calibration: OpenSensor, leds_mm: NDArray[np.float64]
                 "The three light directions lie nearly in one plane (condition number {c:.0f})"
             ).format(c=condition),
             where=calibration.serial,
-            advice=tr("Place the LEDs wider apart around the sensor's axis, and calibrate again"),
+            advice=Remedy.WIDER_LEDS,
         )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import calibration_fault
 from gelpolight_core.health.finding import KEYS, Health
 from gelpolight_core.reconstruction.checks import accepted
@@ -94,7 +94,7 @@ class Reconstructor:
                     made=calibration.model, model=self.model
                 ),
                 where=calibration.identity,
-                advice=tr("Leave --model out, or use a calibration for that model"),
+                advice=Remedy.OTHER_MODEL,
             )
         self._kind.refuse_unfit(calibration.data)
 
@@ -327,6 +327,6 @@ class Reconstructor:
                     shape=shape, w=camera.width, h=camera.height
                 ),
                 where=name or tr("image"),
-                advice=tr("Use the calibration of this sensor at this image size"),
+                advice=Remedy.SAME_SENSOR,
             )
         return self.calibration.data.bad_pixels.left_out(accepted(frame, name=name))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import require_size
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.sensor_calibration import Calibration
@@ -33,8 +33,8 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
             tr("The recording is of sensor {a}, but the calibration is of sensor {b}").format(
                 a=recorded, b=calibrated
             ),
-            where=str(recording.path),
-            advice=tr("Choose a calibration of sensor {a}").format(a=recorded),
+            where=recording.path,
+            advice=Remedy.SAME_SENSOR,
         )
     if len(recording):
         camera = calibration.camera

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.closing import Closing
 from gelpolight_core.io.reading import missing_file, open_file, parse_json, refuse_newer, unreadable
@@ -124,8 +124,8 @@ class Recording(Closing):
             if zlib.crc32(data) != strip.crc or not unpack_strip(data, rgb[part]):
                 raise InputError(
                     tr("Frame {n} is damaged").format(n=index),
-                    where=str(self.path),
-                    advice=tr("Leave this frame out, or copy the recording again"),
+                    where=self.path,
+                    advice=Remedy.COPY_AGAIN,
                 )
         return RecordedFrame(rgb, mark.number, mark.time_s)
 
@@ -150,11 +150,7 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
     """Return the description of the recording, and the position of the first frame."""
     head = os.pread(file, layout.DESCRIPTION_AT, 0)
     if len(head) < layout.DESCRIPTION_AT or head[layout.HEAD_AT :][:8] != layout.MAGIC:
-        raise InputError(
-            tr("The file is not a recording"),
-            where=str(path),
-            advice=tr("Choose a recording made with this program"),
-        )
+        raise InputError(tr("The file is not a recording"), where=path, advice=Remedy.CHOOSE_FILE)
     _, version, length, crc = layout.HEAD.unpack_from(head, layout.HEAD_AT)
     refuse_newer(version, VERSION, path)
     end = layout.DESCRIPTION_AT + length
@@ -166,9 +162,7 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
             except ValueError:
                 pass  # just as damaged as with a wrong checksum
     raise InputError(
-        tr("The header of the recording is damaged"),
-        where=str(path),
-        advice=tr("Copy it again, or use another recording"),
+        tr("The header of the recording is damaged"), where=path, advice=Remedy.COPY_AGAIN
     )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.atomic import cannot_write, sync_folder
 from gelpolight_core.io.closing import Closing
@@ -62,9 +62,7 @@ class RecordingWriter(Closing):
             self._file: int | None = os.open(path, flags, 0o666)
         except FileExistsError as error:
             raise InputError(
-                tr("A file with this name already exists"),
-                where=str(path),
-                advice=tr("Choose a new name"),
+                tr("A file with this name already exists"), where=path, advice=Remedy.CHOOSE_NAME
             ) from error
         except OSError as error:
             raise cannot_write(error, path) from error

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import cannot_write
 from gelpolight_core.io.reading import brief
 from gelpolight_core.records.schema import bring_up_to_date
@@ -74,7 +74,7 @@ def in_plain_words(path: Path) -> Iterator[None]:
         yield
     except (sqlite3.Error, UnicodeDecodeError) as error:
         found, advice = _plain_words(error)
-        raise InputError(found, where=str(path), advice=advice) from error
+        raise InputError(found, where=path, advice=advice) from error
 
 
 def is_damage(error: sqlite3.Error | UnicodeDecodeError) -> bool:
@@ -92,24 +92,18 @@ def _code(error: sqlite3.Error | UnicodeDecodeError) -> int:
 def _plain_words(error: sqlite3.Error | UnicodeDecodeError) -> tuple[str, str]:
     match _code(error):
         case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
-            return tr("Another program is using the records"), tr(
-                "Wait until it has finished, or close it, and try again"
-            )
+            return tr("Another program is using the records"), Remedy.CLOSE_PROGRAM
         case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_PERM | sqlite3.SQLITE_AUTH:
-            return tr("The records are read-only"), tr(
-                "Ask for write permission for this folder, or choose another workspace"
-            )
+            return tr("The records are read-only"), Remedy.ASK_PERMISSION
         case sqlite3.SQLITE_CANTOPEN:
-            return tr("The records cannot be opened or created here"), tr(
-                "Check that the folder exists and that you have write permission"
-            )
+            return tr("The records cannot be opened or created here"), Remedy.CHECK_DISK
         case sqlite3.SQLITE_FULL:
-            return tr("The disk is full"), tr("Free some space and try again")
+            return tr("The disk is full"), Remedy.FREE_SPACE
         case sqlite3.SQLITE_CORRUPT | sqlite3.SQLITE_NOTADB:
             return tr("The records are damaged"), tr(
                 "Restart the program: it keeps the damaged file under another name and "
                 "creates a new one"
             )
-    return tr("The records cannot be used ({reason})").format(reason=brief(str(error))), tr(
-        "Check the disk, and try again"
-    )
+    return tr("The records cannot be used ({reason})").format(
+        reason=brief(str(error))
+    ), Remedy.CHECK_DISK

@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.closing import Closing
 from gelpolight_core.io.reading import refusing
 from gelpolight_core.records.database import connect, in_plain_words, is_damage, keep_aside
@@ -239,11 +239,7 @@ class Records(Closing):
             self._connection.close()
 
     def _refusing(self) -> AbstractContextManager[None]:
-        return refusing(
-            tr("The records contain an invalid measurement ({error})"),
-            self.path,
-            advice=tr("Move the file away, or restore an older copy of it"),
-        )
+        return refusing(tr("The records contain an invalid measurement ({error})"), self.path)
 
     def _change(self, number: int, what: str, value: str | None) -> None:
         with self._writing() as connection:
@@ -253,8 +249,8 @@ class Records(Closing):
             if changed.rowcount != 1:
                 raise InputError(
                     tr("Measurement {number} does not exist").format(number=number),
-                    where=str(self.path),
-                    advice=tr("Read the records again"),
+                    where=self.path,
+                    advice=Remedy.OPEN_AGAIN,
                 )
 
     def _know(self, connection: sqlite3.Connection, serial: str, calibration_id: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import refuse_newer
 from gelpolight_core.translation import tr
 
@@ -105,8 +105,8 @@ def refuse_other_tables(connection: sqlite3.Connection, path: Path) -> None:
     if _tables(connection) != wanted:
         raise InputError(
             tr("The records contain other tables than those of this program"),
-            where=str(path),
-            advice=tr("Move the file away, or restore an older copy of it"),
+            where=path,
+            advice=Remedy.REPAIR_FILE,
         )
 
 
@@ -123,9 +123,7 @@ def _version(connection: sqlite3.Connection, path: Path) -> int:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if tables and owner != APPLICATION_ID:
         raise InputError(
-            tr("The file is a database of another program"),
-            where=str(path),
-            advice=tr("Move it away, or choose another folder"),
+            tr("The file is a database of another program"), where=path, advice=Remedy.CHOOSE_FOLDER
         )
     refuse_newer(version, len(MIGRATIONS), path)
     return int(version) if tables else 0

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Verdict
 from gelpolight_core.image.noise import (
     ScaledDifference,
@@ -341,7 +341,7 @@ def _locate(change: ScaledDifference, name: str) -> tuple[Mask, Circle]:
             Reason.NO_INDENTATION,
             tr("there is no indentation; nothing differs from the background beyond its noise"),
             where=name,
-            advice=tr("Press the ball deeper, or leave this image out"),
+            advice=Remedy.PRESS_DEEPER,
         )
     return region, _core_circle(change, region)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.noise import (
     LARGEST_GAIN_CHANGE,
@@ -140,7 +140,7 @@ def indentation_at(
         raise InputError(
             tr("the contact placed by hand reaches beyond the working area"),
             where=name,
-            advice=tr("Move it inside, or leave this image out"),
+            advice=Remedy.MOVE_INSIDE,
         )
     turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
     points = np.stack(
@@ -249,7 +249,7 @@ def _judge(
 
     lowest = 100.0 * LEAST_COVERAGE
     middle, deeper = (
-        tr("Press the ball nearer to the middle"),
+        Remedy.PRESS_MIDDLE,
         tr("Average several frames or press deeper"),
     )
     largest_sd = max(1.0, LARGEST_SD * radius)
@@ -264,6 +264,6 @@ def _judge(
             figure("signal_to_noise", signal, "", 2.0, None, deeper),
             figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
             figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * LARGEST_LIGHT_CHANGE, light),
-            figure("saturated", 100.0 * saturated, "%", 5.0, None, tr("Use a shorter exposure")),
+            figure("saturated", 100.0 * saturated, "%", 5.0, None, Remedy.SHORTER_EXPOSURE),
         )
     )

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.noise import BACKGROUND, ScaledDifference
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit
 from gelpolight_core.reflectance.contour import (
@@ -130,7 +130,7 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
                 share=100.0 * (outside if outside > 0.0 else 1.0 - contour.coverage)
             ),
             where=name,
-            advice=tr("Press the ball nearer to the middle"),
+            advice=Remedy.PRESS_MIDDLE,
         )
 
 
@@ -170,7 +170,7 @@ def check_visible(circle: Circle, area: Mask, name: str) -> None:
                 share=100.0 * (1.0 - seen)
             ),
             where=name,
-            advice=tr("Press the ball nearer to the middle"),
+            advice=Remedy.PRESS_MIDDLE,
         )
 
 
@@ -298,10 +298,7 @@ def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
 def refuse_several(name: str) -> NoReturn:
     """Refuse an image with a second ball."""
     raise BallRefusal(
-        Reason.SEVERAL,
-        tr("there is more than one indentation"),
-        where=name,
-        advice=tr("Press one ball at a time"),
+        Reason.SEVERAL, tr("there is more than one indentation"), where=name, advice=Remedy.ONE_BALL
     )
 
 
@@ -364,7 +361,7 @@ def check_order(press: Array, background: Array, area: Mask, circle: Circle, nam
             Reason.SWAPPED,
             tr("the indentation is in the background, not in the press"),
             where=f"{name}, {BACKGROUND}",
-            advice=tr("Swap the two images, or capture the background again without contact"),
+            advice=Remedy.SWAP_IMAGES,
         )
 
 
@@ -390,7 +387,7 @@ def check_light_change(light_change: float, name: str) -> None:
                 drift=100.0 * light_change
             ),
             where=name,
-            advice=tr("Fix exposure and lights, then capture background and press again"),
+            advice=Remedy.SAME_LIGHT,
         )
 
 
@@ -405,9 +402,4 @@ def _refuse_oval(axis_ratio: float, name: str) -> NoReturn:
 
 
 def _refuse_shape(reason: Reason, found: str, name: str) -> NoReturn:
-    raise BallRefusal(
-        reason,
-        found,
-        where=name,
-        advice=tr("Press a single clean ball straight down, or leave this image out"),
-    )
+    raise BallRefusal(reason, found, where=name, advice=Remedy.ONE_BALL)

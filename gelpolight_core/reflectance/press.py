@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -141,7 +141,7 @@ def find_ball(
                 c=contact, r=radius_mm
             ),
             where=name,
-            advice=tr("Correct the stated radius of this ball (not its diameter)"),
+            advice=Remedy.CHECK_RADIUS,
         )
     depth = ball_depth_from_contact(contact, radius_mm)
     ray_slope = _ray_slope_at(table, seen)
@@ -152,11 +152,7 @@ def find_ball(
     pixels = _shaded_pixels(image, background, table, inside)
     if not pixels.weight.any():
         raise InputError(
-            tr("no lit pixel of the contact can be used"),
-            where=name,
-            advice=tr(
-                "Check that whiteboard, background and press are not dark or saturated there"
-            ),
+            tr("no lit pixel of the contact can be used"), where=name, advice=Remedy.CHECK_EXPOSURE
         )
     pose, misfit, sd = refine_centre(pixels, start, led_positions_mm)
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))

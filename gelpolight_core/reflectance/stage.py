@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
@@ -137,9 +137,7 @@ def calibrate_reflectance(
     """
     if not presses:
         raise InputError(
-            tr("no ball press can be used"),
-            where=tr("balls"),
-            advice=tr("Press a ball of known radius at several places"),
+            tr("no ball press can be used"), where=tr("balls"), advice=Remedy.PRESS_BALLS
         )
     scatter = ball_scatter(presses, images, table, led_positions_mm, radiance, factors)
     fits = [

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -183,11 +183,7 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
 
 
 def _poor(name: str, text: str, *, n: int) -> InputError:
-    return InputError(
-        text.format(name=name, n=n),
-        where=tr("balls"),
-        advice=tr("Press balls deeper and at more places, and check each ball's radius"),
-    )
+    return InputError(text.format(name=name, n=n), where=tr("balls"), advice=Remedy.PRESS_BALLS)
 
 
 def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Array]:

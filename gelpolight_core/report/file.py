@@ -15,7 +15,7 @@ import numpy as np
 import typst
 
 from gelpolight_core import __version__
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.report.document import MARKS, Report
@@ -36,9 +36,9 @@ def refuse_other_endings(path: Path) -> None:
     """
     if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("A report can only be written as PDF"),
-            where=str(path),
-            advice=tr("Use a file name that ends in .pdf"),
+            tr("A report is written as PDF, so its name must end in .pdf"),
+            where=path,
+            advice=Remedy.CHOOSE_NAME,
         )
 
 

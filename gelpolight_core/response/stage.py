@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import NODES, CameraResponse, declared_response, distance
@@ -190,7 +190,7 @@ def _fit_channel(series: Series) -> _Channel:
                 "exposed in three images"
             ),
             where="response",
-            advice=tr("Add exposures between the present ones"),
+            advice=Remedy.MORE_EXPOSURES,
         )
     # Small errors of the stated exposure times bend the curve more than pixel noise does.
     uncertainty = max(REPEATABILITY, float(np.median(known)))
@@ -236,13 +236,7 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
     # Stated times are rounded: 0.5 to 2.0 ms is a factor of four.
     if count < LEAST_IMAGES or span < LEAST_SPAN * (1.0 - 1e-6):
         raise InputError(
-            found.format(n=count, r=span),
-            where="response",
-            advice=tr(
-                "Capture one still, evenly lit scene at {n} or more exposures. The longest "
-                "must be at least {r:g} times the shortest, and none may be black or "
-                "saturated"
-            ).format(n=LEAST_IMAGES, r=LEAST_SPAN),
+            found.format(n=count, r=span), where="response", advice=Remedy.MORE_EXPOSURES
         )
 
 
@@ -251,11 +245,7 @@ def _refuse_unsteady(residual: float) -> None:
         raise InputError(
             tr("The images disagree by {x:.1%} of their light").format(x=residual),
             where="response",
-            advice=tr(
-                "Capture the series again with a still scene, steady light and an untouched "
-                "lens. State the true exposure time of each image, and switch off automatic gain "
-                "and white balance"
-            ),
+            advice=Remedy.STEADY_SERIES,
         )
 
 
@@ -264,10 +254,7 @@ def _refuse_unknown(departure_sd: float) -> None:
         raise InputError(
             tr("The response curve is uncertain by {x:.1%} of full scale").format(x=departure_sd),
             where="response",
-            advice=tr(
-                "Add exposures between the present ones, or show a scene with some areas twice "
-                "as bright as others"
-            ),
+            advice=Remedy.MORE_EXPOSURES,
         )
 
 

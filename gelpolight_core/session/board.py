@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -39,19 +39,19 @@ class BoardSpec:
         """
         if min(self.inner_corners) < 3:
             raise InputError(
-                tr("The board has only {w} x {h} inner corners").format(
+                tr("The board has {w} x {h} inner corners, fewer than 3 x 3").format(
                     w=self.inner_corners[0], h=self.inner_corners[1]
                 ),
                 where=tr("checkerboard"),
-                advice=tr(
-                    "Use a board with at least 3 x 3 inner corners (points where four squares meet)"
-                ),
+                advice=Remedy.BOARD_SIZE,
             )
         if not (math.isfinite(self.square_mm) and self.square_mm > 0.0):
             raise InputError(
-                tr("The side of the squares is {s} mm").format(s=self.square_mm),
+                tr("The side of the squares is {s} mm, not greater than zero").format(
+                    s=self.square_mm
+                ),
                 where=tr("checkerboard"),
-                advice=tr("Measure the side of a square and enter it in mm"),
+                advice=Remedy.BOARD_SIZE,
             )
 
     @property

@@ -74,11 +74,7 @@ def read_decisions(folder: Path) -> Decisions:
         data = read_file(path, SIZE_LIMIT)
     except FileNotFoundError:
         return Decisions()
-    with refusing(
-        tr("The decisions cannot be used ({error})"),
-        path,
-        advice=tr("Correct the file, or move it away to return to the detected values"),
-    ):
+    with refusing(tr("The decisions cannot be used ({error})"), path):
         content = parse_toml(data)
         check_version(content, FORMAT, VERSION, path)
         return _parse(content)

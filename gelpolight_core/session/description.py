@@ -8,7 +8,7 @@ from typing import Any
 
 import tomli_w
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_text
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
@@ -58,8 +58,8 @@ def create_session(session: Session) -> None:
     if path.exists():
         raise InputError(
             tr("The folder already contains a session"),
-            where=str(session.folder),
-            advice=tr("Open this session, or choose a new folder"),
+            where=session.folder,
+            advice=Remedy.CHOOSE_FOLDER,
         )
     make_folder(session.folder)
     write_description(session)

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import open_file, unreadable
 from gelpolight_core.translation import tr
 
@@ -45,8 +45,8 @@ def refuse_copies(files: Iterable[Path]) -> None:
                 tr("The image is a copy of {first}").format(
                     first=f"{first.parent.name}/{first.name}"
                 ),
-                where=str(path),
-                advice=tr("Capture this image again, or remove the copy"),
+                where=path,
+                advice=Remedy.CAPTURE_AGAIN,
             )
 
 
@@ -86,15 +86,13 @@ class KnownFiles:
         """Record the present content of a file as known."""
         self._known[path] = _hash_or_none(path)
 
-    def refuse_changed(self, path: Path, *, advice: str = "") -> None:
+    def refuse_changed(self, path: Path) -> None:
         """Refuse to overwrite a file that another program has changed.
 
         Parameters
         ----------
         path : Path
             The file.
-        advice : str, optional
-            Advice for a file that does not belong to a session.
 
         Raises
         ------
@@ -104,8 +102,8 @@ class KnownFiles:
         if path in self.changed():
             raise InputError(
                 tr("Another program has changed the file since it was read; nothing was written"),
-                where=str(path),
-                advice=advice or tr("Reload the session and repeat your correction"),
+                where=path,
+                advice=Remedy.REPEAT_CHANGE,
             )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import decode_image
 from gelpolight_core.image.linear import LinearImage, linear_image, require_size
 from gelpolight_core.image.response import CameraResponse
@@ -67,8 +67,8 @@ class SessionImages:
                 tr("The stage has no images")
                 if not self.captured(stage)
                 else tr("All images of the stage are excluded"),
-                where=str(self.folder / stage),
-                advice=tr("Capture this stage, or copy its PNG or TIFF images into the folder"),
+                where=self.folder / stage,
+                advice=Remedy.CAPTURE_STAGE,
             )
         return found
 
@@ -165,9 +165,9 @@ class SessionImages:
             self._refuse_misspelt_ball(name)
         if radius is None:
             raise InputError(
-                tr("[balls] has no radius for {name}").format(name=name),
-                where=str(self.folder / "session.toml"),
-                advice=tr('Add "{name}" = radius in mm, or a default').format(name=name),
+                tr('[balls] has neither "{name}" = radius in mm nor a default').format(name=name),
+                where=self.folder / "session.toml",
+                advice=Remedy.STATE_IN_SESSION,
             )
         return radius
 
@@ -185,8 +185,8 @@ class SessionImages:
             tr("[balls] lists {stray}, which does not exist, but not {name}").format(
                 stray=strays[0], name=name
             ),
-            where=str(self.folder / "session.toml"),
-            advice=tr("Correct the file name in [balls], or remove the line"),
+            where=self.folder / "session.toml",
+            advice=Remedy.CORRECT_ENTRY,
         )
 
 
@@ -248,14 +248,14 @@ def read_raw_image(path: Path) -> tuple[NDArray[Any], bool]:
     if raw is None:
         raise InputError(
             tr("The file is not a complete PNG or TIFF image"),
-            where=str(path),
-            advice=tr("Capture or copy it again"),
+            where=path,
+            advice=Remedy.CAPTURE_AGAIN,
         )
     if raw.dtype not in (np.uint8, np.uint16):
         raise InputError(
             tr("The image contains {kind} values").format(kind=raw.dtype),
-            where=str(path),
-            advice=tr("Use images of 8 or 16 bit"),
+            where=path,
+            advice=Remedy.PNG,
         )
     grey = raw.ndim == 2
     bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
@@ -279,20 +279,14 @@ def require_colour(image: LinearImage, *, where: str) -> None:
     """
     if float(image.rgb.min()) >= 1.0:
         raise InputError(
-            tr("The image is saturated everywhere"),
-            where=where,
-            advice=tr("Use a shorter exposure"),
+            tr("The image is saturated everywhere"), where=where, advice=Remedy.SHORTER_EXPOSURE
         )
     rgb = image.rgb
     same = image.grey or bool(
         np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
     )
     if same and float(rgb.max()) > 0.0:
-        raise InputError(
-            tr("The image is grey"),
-            where=where,
-            advice=tr("Capture a colour image: each LED is identified by its colour channel"),
-        )
+        raise InputError(tr("The image is grey"), where=where, advice=Remedy.CAPTURE_COLOUR)
 
 
 Frame = NDArray[Any]
@@ -331,7 +325,5 @@ def write_image(rgb: Frame, path: Path, *, new: bool = False, inside: Path | Non
     make_folder(path.parent)
     done, data = cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]))
     if not done:
-        raise InputError(
-            tr("The image cannot be encoded"), where=str(path), advice=tr("Capture it again")
-        )
+        raise InputError(tr("The image cannot be encoded"), where=path, advice=Remedy.CAPTURE_AGAIN)
     write_atomically(path, lambda stream: stream.write(data.tobytes()), new=new, inside=inside)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.channels import CHANNEL_KEYS
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
 from gelpolight_core.io.reading import read_toml
@@ -174,15 +174,13 @@ class Session(SessionImages):
         images = replace(self, response=None).images("response")
         names = {image.name for image in images}
         for name in sorted(names ^ set(self.exposures_ms)):
-            found = tr("[response] has no exposure time for {name}")
+            found = tr("[response] has no exposure time in ms for {name}")
             if name not in names:
                 found = tr("[response] lists {name}, but there is no such image")
             raise InputError(
                 found.format(name=name),
-                where=str(self.folder / "session.toml"),
-                advice=tr(
-                    'Write one line "{name}" = time in ms for each image in the folder'
-                ).format(name=next(iter(sorted(names)))),
+                where=self.folder / "session.toml",
+                advice=Remedy.CORRECT_FILE,
             )
         return images, tuple(self.exposures_ms[image.name] for image in images)
 
@@ -200,8 +198,8 @@ class Session(SessionImages):
                 tr("The folder contains {found} instead of red, green and blue").format(
                     found=", ".join(path.name for path in self.files("single_led"))
                 ),
-                where=str(self.folder / "single_led"),
-                advice=tr("Provide one image for each LED alone: red.png, green.png, blue.png"),
+                where=self.folder / "single_led",
+                advice=Remedy.SINGLE_LED,
             )
         return tuple(by_name[name] for name in CHANNEL_KEYS)
 
@@ -232,11 +230,7 @@ def read_description(folder: Path) -> dict[str, Any]:
         If the folder or file is missing or is not TOML.
     """
     path = folder / "session.toml"
-    missing = InputError(
-        tr("There is no session.toml"),
-        where=str(folder),
-        advice=tr("Choose a session folder, or create one with gelpolight simulate"),
-    )
+    missing = InputError(tr("There is no session.toml"), where=folder, advice=Remedy.CHOOSE_SESSION)
     return read_toml(path, missing=missing)
 
 
@@ -300,12 +294,9 @@ def _parse_in_place(top: Table) -> dict[str, Any]:
     one = (pressed.pin_spacing_mm is None) != (pressed.punch_diameter_mm is None)
     if found.mm_per_px is None and not one:
         raise InputError(
-            tr("[in_place] does not state the scale"),
-            where=str(top.path),
-            advice=tr(
-                "State mm_per_px; or press a pin grid or a flat punch, put the images in scale/, "
-                "and state either pin_spacing_mm or punch_diameter_mm"
-            ),
+            tr("[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm"),
+            where=top.path,
+            advice=Remedy.STATE_IN_SESSION,
         )
     return {"sensor": SensorData(sensor.text("serial")), "in_place": found}
 

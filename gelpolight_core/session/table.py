@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, check_version, is_file_name, plain_text
 from gelpolight_core.translation import tr
 
@@ -29,11 +29,7 @@ class Table:
         """Return the error for a key; `what` is ignored if the key is missing."""
         if key not in self.content:
             what = tr("is missing")
-        return InputError(
-            f"{self._key(key)} {what}",
-            where=str(self.path),
-            advice=tr("Correct the key {key}").format(key=self._key(key)),
-        )
+        return InputError(f"{self._key(key)} {what}", where=self.path, advice=Remedy.CORRECT_ENTRY)
 
     def text(self, key: str) -> str:
         """Return a text that is not empty."""
@@ -106,6 +102,6 @@ class Table:
             if key not in known:
                 raise InputError(
                     tr("The key {key} is unknown").format(key=self._key(key)),
-                    where=str(self.path),
-                    advice=tr("Remove it, or correct its spelling"),
+                    where=self.path,
+                    advice=Remedy.CORRECT_ENTRY,
                 )

@@ -19,7 +19,7 @@ from scipy.ndimage import map_coordinates
 
 from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_atomically, write_text
 from gelpolight_core.simulation.boards import BoardPose, board_views
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -122,9 +122,7 @@ def simulate_session(
     out = Path(out)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(
-            tr("The folder already contains files"),
-            where=str(out),
-            advice=tr("Choose a new folder"),
+            tr("The folder already contains files"), where=out, advice=Remedy.CHOOSE_FOLDER
         )
     sensor = VirtualSensor(design.scaled(scale), seed)
     made = not out.exists()

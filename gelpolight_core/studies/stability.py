@@ -17,7 +17,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
 from gelpolight_core.reconstruction.trace import EFFORTS
@@ -210,7 +210,7 @@ def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
             raise InputError(
                 tr("there is no case {name!r}").format(name=name),
                 where="--only",
-                advice=tr("Use some of {names}").format(names=", ".join(sorted(known))),
+                advice=Remedy.ONE_OF.format(names=", ".join(sorted(known))),
             )
     return tuple(case for case in cases if case.name in asked or case.subject in asked)
 

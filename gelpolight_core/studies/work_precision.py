@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
 from gelpolight_core.measurement.press import read_truth
@@ -181,8 +181,8 @@ def measure_session(
     if not rows:
         raise InputError(
             tr("No press of a cylinder or cuboid was found"),
-            where=str(folder / "presses" / "truth.csv"),
-            advice=tr("Use a session that contains such presses and their true depth"),
+            where=folder / "presses" / "truth.csv",
+            advice=Remedy.CHOOSE_SESSION,
         )
     solvers = dict(reversed(solvers_of(calibration).items()))
     radius_mm = scored_radius_mm(calibration.open_sensor.sensor)
@@ -218,10 +218,7 @@ def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
                 one=serial, other=calibration.serial
             ),
             where=where,
-            advice=tr(
-                "Choose presses of this sensor with known true depth, or the calibration "
-                "of their sensor"
-            ),
+            advice=Remedy.SAME_SENSOR,
         )
 
 

@@ -92,8 +92,8 @@ def test_what_is_pressed_can_be_measured(command, day: Path, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--frames", "x"], "x selects no frames"),
-        (["--frames", "::0"], "--frames: ::0 selects no frames"),
+        (["--frames", "x"], "x is not a range of frames"),
+        (["--frames", "::0"], "--frames: ::0 is not a range of frames"),
         (["--workers", "0"], "At least one worker is needed"),
         (["--frames", "99:"], "here are no frames"),
         (["--format", "doc"], "Unknown format doc"),

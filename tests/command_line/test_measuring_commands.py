@@ -111,7 +111,7 @@ def test_the_object_is_selected_by_a_point_in_both_notations(
     place: str,
 ) -> None:
     arguments = ("measure", str(calibration), str(press), "--shape", "cylinder", "--at", *seed)
-    assert f"no object lies at the seed point {place} mm" in refusal(capsys, *arguments)
+    assert f"no object lies at {place} mm" in refusal(capsys, *arguments)
 
 
 def test_a_profile_is_written_as_a_table(calibration: Path, press: Path, tmp_path: Path) -> None:

@@ -87,7 +87,7 @@ DAMAGES: list[tuple[str, Callable[[Path], None], str]] = [
         lambda f: replace_text(
             f / "session.toml", "working_diameter_mm = 26.0", "working_diameter_mm = 1.0"
         ),
-        "Enter the working diameter in mm",
+        "Check the working diameter",
     ),
     (
         "no image",

@@ -98,7 +98,8 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
     record = entry(
         serial="small-1", calibration_id=calibration.identity, shape=measurement.shape,
         quantities=quantities, verdict=verdict_of(quantities, doubtful=False),
-        details=measurement.as_json(TRUTH), settings={"model": calibration.model}, operator="A. Tester", picture=f"{PRESS}.png",
+        details=measurement.as_json(TRUTH), settings={"model": calibration.model},
+        operator="A. Tester", picture=f"{PRESS}.png",
         note="first press",
     )  # fmt: skip
     with records.open(workspace / "records.sqlite") as book:

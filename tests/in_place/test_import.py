@@ -101,7 +101,7 @@ def test_a_table_of_circles_needs_ball_and_background(
     assert "--background" in refusal(folder, tmp_path / "s", capsys, *scale)
     assert "--ball-diameter" in refusal(folder, tmp_path / "s", capsys, *background, *scale)
     ball = ("--ball-diameter", "6")
-    assert "--preset" in refusal(folder, tmp_path / "s", capsys, *background, *ball)
+    assert "--mm-per-px" in refusal(folder, tmp_path / "s", capsys, *background, *ball)
     session = imported(folder, tmp_path / "s", *background, *ball, *scale)
     assert session.decisions.balls["ball_000.png"] == PlacedCircle(101.0, 110.0, 28.0)
     assert session.ball_radius_mm("ball_000.png") == 3.0

@@ -106,7 +106,7 @@ def times(factor: float) -> Callable[[list[LinearImage]], list[LinearImage]]:
     ("change", "what"),
     [
         (swap, "single_led/green.png: The green channel has .* of the red channel"),
-        (all_lit, "of the red channel's light.*Switch on only the red LED"),
+        (all_lit, "of the red channel's light.*Capture one image of each LED alone"),
         (times(0.05), "is dark"),
         (times(60.0), "saturated"),
     ],

@@ -106,7 +106,7 @@ def test_a_map_with_errors_gives_the_parameters_theirs() -> None:
 
 def test_a_line_that_is_too_short_or_has_gaps_is_refused() -> None:
     profile = wave(0.4)
-    with pytest.raises(InputError, match="too short for a cut-off"):
+    with pytest.raises(InputError, match="shorter than two cut-offs"):
         profile_roughness(profile, cutoff_mm=float(profile.along_mm[-1]))
     with pytest.raises(InputError, match=r"cut-off is 0\.01 mm"):
         profile_roughness(profile, cutoff_mm=0.01)

@@ -12,7 +12,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.checkerboard import find_board
 from gelpolight_core.session.board import BoardSpec
@@ -72,7 +72,7 @@ def test_another_board_size_is_refused_and_the_real_one_named(
     with pytest.raises(InputError, match=r"9 x 6 inner corners, not") as refusal:
         find_board(tilted_board, BoardSpec(stated, 3.0))
     assert refusal.value.where == "view.png"
-    assert "inner corners" in refusal.value.advice
+    assert refusal.value.advice == Remedy.BOARD_SIZE
 
 
 def test_uneven_light_does_not_move_the_corners(tilted_board: LinearImage) -> None:

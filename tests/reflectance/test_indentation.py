@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Verdict
 from gelpolight_core.image.noise import pixel_noise
 from gelpolight_core.optics.camera import Camera
@@ -178,7 +178,7 @@ def test_drape_that_reaches_the_border_is_reported() -> None:
 def test_two_presses_are_refused() -> None:
     error = refusal(*scene((90.0, 100.0, 30.0), (220.0, 140.0, 30.0)))
     assert "more than one" in error.found
-    assert "one ball at a time" in error.advice
+    assert error.advice == Remedy.ONE_BALL
 
 
 def test_contact_cut_by_the_working_area_is_refused() -> None:

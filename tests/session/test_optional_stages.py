@@ -100,8 +100,8 @@ def test_a_series_is_read_as_the_camera_encoded_it_with_its_times(tmp_path: Path
 @pytest.mark.parametrize(
     ("more", "images", "what"),
     [
-        ("", ("a.png",), "no exposure time for a.png"),
-        ('[response]\n"a.png" = 1.0\n', ("a.png", "b.png"), "no exposure time for b.png"),
+        ("", ("a.png",), "no exposure time in ms for a.png"),
+        ('[response]\n"a.png" = 1.0\n', ("a.png", "b.png"), "no exposure time in ms for b.png"),
         ('[response]\n"a.png" = 1.0\n"c.png" = 2.0\n', ("a.png",), "lists c.png"),
         ('[response]\n"a.png" = 1.0\n', (), "no images"),
     ],

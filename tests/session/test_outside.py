@@ -25,7 +25,7 @@ def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path: Path) -
     for change in (lambda: path.write_text("a = 22"), path.unlink):
         change()
         assert files.changed() == (path,)
-        with pytest.raises(InputError, match="Reload"):
+        with pytest.raises(InputError, match="repeat your change"):
             files.refuse_changed(path)
 
 

@@ -227,7 +227,7 @@ def test_a_closed_sensor_states_scale_and_region(tmp_path: Path) -> None:
         ("200, 150", "200", "four whole numbers"),
         ("200, 150", "0, 150", "four whole numbers"),
         ("20, 10", "20.5, 10", "four whole numbers"),
-        ("mm_per_px = [0.06, 0.05]\n", "", "does not state the scale"),
+        ("mm_per_px = [0.06, 0.05]\n", "", "has no mm_per_px"),
         ('serial = "c-1"', 'serial = "c-1"\nled_height_mm = 13.0', "led_height_mm"),
     ],
 )

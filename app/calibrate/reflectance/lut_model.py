@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.channels import channel_name
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable, fit_channel
 from gelpolight_core.translation import tr
 
@@ -142,7 +142,7 @@ def add_node(edit: CurveEdit, channel: int, cosine: float) -> tuple[CurveEdit, i
         raise InputError(
             tr("there is no room for a node at cosine {cosine:.3f}").format(cosine=cosine),
             where=tr("Reflectance curve"),
-            advice=tr("Choose a position between two nodes"),
+            advice=Remedy.MOVE_NODES,
         )
     cosines.insert(index, cosine)
     values.insert(index, float(curve.at(cosine)))
@@ -162,13 +162,13 @@ def remove_node(edit: CurveEdit, channel: int, index: int) -> CurveEdit:
         raise InputError(
             tr("the end nodes of the curve cannot be removed"),
             where=tr("Reflectance curve"),
-            advice=tr("Move the node up or down instead"),
+            advice=Remedy.MOVE_NODES,
         )
     if len(curve.cosines) <= LEAST_NODES:
         raise InputError(
             tr("a curve needs at least {n} nodes").format(n=LEAST_NODES),
             where=tr("Reflectance curve"),
-            advice=tr("Move the node instead"),
+            advice=Remedy.MOVE_NODES,
         )
     keep = [i for i in range(len(curve.cosines)) if i != index]
     cosines, values = curve.cosines, curve.values
@@ -252,7 +252,7 @@ def leave_out(
         raise InputError(
             tr("the outline contains no included point"),
             where=tr("Reflectance curve"),
-            advice=tr("Draw it around the points that you want to exclude"),
+            advice=Remedy.DRAW_AGAIN,
         )
     fit = fit_channel(
         scatter.cosines[channel][~out], scatter.values[channel][~out], name=channel_name(channel)

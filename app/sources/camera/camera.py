@@ -26,7 +26,7 @@ from app.sources.camera.driver import (
 )
 from app.sources.source import Frame
 from app.sources.stopping import join
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import FileLock
 from gelpolight_core.session.camera_settings import CameraSettings
@@ -262,9 +262,7 @@ class Camera:
         device = find_device(self._driver.devices(), self.device.identity, self._is_same)
         if device is None:
             raise CameraGone(
-                tr("the camera is not plugged in"),
-                where=self.device.name,
-                advice=tr("Plug it in at the same port; it then continues automatically"),
+                tr("the camera is not plugged in"), where=self.device.name, advice=Remedy.PLUG_IN
             )
         offered = self._driver.formats(device)
         asked = format_of(wanted) or best_format(offered)
@@ -377,14 +375,14 @@ class Camera:
         return CameraGone(
             tr("the camera delivers no images now and cannot be set"),
             where=self.device.name,
-            advice=tr("Wait until an image arrives"),
+            advice=Remedy.WAIT,
         )
 
     def _silent(self, silent_s: float) -> CameraGone:
         return CameraGone(
             tr("no image has arrived for {s:.0f} seconds").format(s=silent_s),
             where=self.device.name,
-            advice=tr("Check the camera and its cable; the program tries again automatically"),
+            advice=Remedy.WAIT,
         )
 
     def _fault(self, error: Exception) -> CameraGone:
@@ -393,7 +391,7 @@ class Camera:
                 kind=type(error).__name__
             ),
             where=self.device.name,
-            advice=tr("The program tries again automatically"),
+            advice=Remedy.WAIT,
         )
 
 

@@ -7,7 +7,7 @@ from concurrent.futures import TimeoutError as Late
 from app.sources.camera.camera import Camera
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame, Setting, SourceAway, closed, no_setting
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 SET_S = 2.0
@@ -75,7 +75,7 @@ class CameraSource:
             raise InputError(
                 tr("the camera has not responded for {s:g} seconds").format(s=SET_S),
                 where=self.name,
-                advice=tr("Check its cable"),
+                advice=Remedy.CHECK_CABLE,
             ) from error
         if applied is None or applied.read is None:
             raise no_setting(key, self.settings(), self.name)

@@ -24,6 +24,7 @@ from app.sources.camera.driver import (
 from app.sources.camera.properties import Properties
 from app.sources.camera.v4l2 import V4l2
 from app.sources.source import Setting
+from gelpolight_core.errors import Remedy
 from gelpolight_core.translation import tr
 
 SLOW_READ_S = 2.5
@@ -82,11 +83,7 @@ class OpenCvDriver:
             if controls is not None:
                 controls.close()
             raise CameraGone(
-                tr("the camera cannot be opened"),
-                where=device.name,
-                advice=tr(
-                    "Close all other programs that use it, or unplug it and plug it in again"
-                ),
+                tr("the camera cannot be opened"), where=device.name, advice=Remedy.CLOSE_PROGRAM
             )
         if wanted is not None:
             _ask_for(capture, wanted)
@@ -138,7 +135,7 @@ class OpenCvCamera:
             raise CameraGone(
                 tr("the camera delivers no more images"),
                 where=self._device.name,
-                advice=tr("Check its cable"),
+                advice=Remedy.CHECK_CABLE,
             )
         return _rgb(bgr), came_s
 

@@ -13,7 +13,7 @@ from typing import Any
 import cv2
 
 from app.sources.source import Setting
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.camera_controls import CONTROLS
 from gelpolight_core.translation import tr
 
@@ -104,5 +104,5 @@ class Properties:
             raise InputError(
                 tr("the camera does not accept {what} {value:g}").format(what=label, value=value),
                 where=tr("Camera"),
-                advice=tr("Set it in the camera manufacturer's program"),
+                advice=Remedy.NO_SUCH_SETTING,
             )

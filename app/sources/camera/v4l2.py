@@ -37,7 +37,7 @@ from app.sources.camera.v4l2_structures import (
     QueryMenu,
 )
 from app.sources.source import Setting
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.camera_controls import CONTROLS, ORDER
 from gelpolight_core.translation import tr
 
@@ -183,7 +183,7 @@ class V4l2:
             raise InputError(
                 tr("the camera has no setting {what}").format(what=_label(key)),
                 where=self.path,
-                advice=tr("Leave this setting unchanged"),
+                advice=Remedy.NO_SUCH_SETTING,
             )
         number = self._number_of(key, value, query)
         try:
@@ -271,9 +271,9 @@ class V4l2:
 
 def gone(address: str, error: OSError) -> CameraGone:
     """Return why a camera cannot be used, from the system's error."""
-    found, advice = tr("the camera was not found"), tr("Plug it in")
+    found, advice = tr("the camera was not found"), Remedy.PLUG_IN
     if error.errno in (errno.EBUSY, errno.EAGAIN):
-        found, advice = tr("another program uses the camera"), tr("Close that program")
+        found, advice = tr("another program uses the camera"), Remedy.CLOSE_PROGRAM
     elif error.errno in (errno.EACCES, errno.EPERM):
         found = tr("this user has no permission to use the camera")
         advice = tr('Add the user to the group "video", and log in again')

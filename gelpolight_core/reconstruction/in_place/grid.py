@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.resampling import LEAST_NODES, MembraneGrid, ResamplingTable
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.translation import tr
@@ -67,12 +67,12 @@ class WorkingGrid:
         if self.region_px and (min(x, y, *ends) < 0 or min(self.shape) < LEAST_NODES):
             raise InputError(
                 tr(
-                    "The region {region} is not inside the image of {w} x {h} pixels or too small"
-                ).format(region=list(self.region), w=self.image.width, h=self.image.height),
-                where="region_px",
-                advice=tr("State x, y, width and height, {n} pixels or more on each side").format(
-                    n=LEAST_NODES
+                    "The region {region} is not inside the image of {w} x {h} pixels or below {n}"
+                ).format(
+                    region=list(self.region), w=self.image.width, h=self.image.height, n=LEAST_NODES
                 ),
+                where="region_px",
+                advice=Remedy.STATE_IN_SESSION,
             )
 
     def __repr__(self) -> str:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
     free_boundary_note,
@@ -148,7 +148,7 @@ class NearLightSolver(OpenSolver):
             raise InputError(
                 tr("the calibration was made for the paper's model only"),
                 where=calibration.serial,
-                advice=tr("Calibrate again with --model full, or use --model paper"),
+                advice=Remedy.OTHER_MODEL,
             )
         refuse_coplanar_lights(calibration, calibration.full.led_positions_mm)
         refuse_dark_membrane(calibration, calibration.full.background)

@@ -25,4 +25,4 @@ def test_it_is_measured_only_with_a_cutoff_and_refused_if_the_line_is_too_short(
     short = Section((Line((-1.0, 0.0), (1.0, 0.0)),), cutoff_mm=2.5)
     found = cut(wavy(), short, None)
     assert "rz" not in {figure.name for figure in found.figures}
-    assert any("too short" in sentence for sentence in found.sentences)
+    assert any("shorter than" in sentence for sentence in found.sentences)
