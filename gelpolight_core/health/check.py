@@ -33,7 +33,7 @@ from gelpolight_core.health.judging import (
 from gelpolight_core.health.movement import FOLLOWED_PX, movement_px
 from gelpolight_core.health.samples import PARAMETERS, Samples, compare_samples, samples_of
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.sensor_calibration import OpenSensor
+from gelpolight_core.sensor_calibration import SensorModel
 
 Map = NDArray[np.float32]
 LEAST_UNTOUCHED = 0.12
@@ -59,11 +59,13 @@ class HealthCheck:
 
     Parameters
     ----------
-    calibration : OpenSensor
+    calibration : SensorModel
         The sensor's.
+    interreflection : float, optional
+        Of its membrane, which a press makes brighter around it.
     """
 
-    def __init__(self, calibration: OpenSensor) -> None:
+    def __init__(self, calibration: SensorModel, *, interreflection: float = 0.0) -> None:
         self.calibration = calibration
         self.samples: Samples = samples_of(calibration)
         cells, runs = self.samples.count.size, self.samples.run_cell.size
@@ -71,8 +73,6 @@ class HealthCheck:
         self._square, self._full = np.zeros(cells), np.zeros(cells)
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
-        full = calibration.full
-        interreflection = 0.0 if full is None else full.membrane.interreflection
         self._limits = Limits.of(interreflection)
         self._noise = float(calibration.noise.max())
         self._stripe = 0

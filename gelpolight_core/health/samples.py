@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED, lit
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.sensor_calibration import OpenSensor
+from gelpolight_core.sensor_calibration import SensorModel
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -94,7 +94,7 @@ class Samples:
     blur_strength: Array
 
 
-def samples_of(calibration: OpenSensor) -> Samples:
+def samples_of(calibration: SensorModel) -> Samples:
     """Choose the samples of a calibrated sensor."""
     base, table = calibration.background, calibration.table
     inside = table.valid & lit(base) & (base < SATURATED).all(axis=2)

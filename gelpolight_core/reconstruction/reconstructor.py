@@ -14,7 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import calibration_fault
-from gelpolight_core.health.finding import KEYS, Health
+from gelpolight_core.health.finding import Health
 from gelpolight_core.reconstruction.checks import accepted
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
@@ -267,7 +267,6 @@ class Reconstructor:
         solved = self.solver.depth(
             frame, self._wanted(health, normals=normals, uncertainty=uncertainty)
         )
-        known = health or Health()
         fault = calibration_fault(self.calibration.quality)
         failed = () if fault is None else (fault,)
         grid, noise = self.calibration.table.grid, solved.noise
@@ -281,7 +280,7 @@ class Reconstructor:
             calibration_id=self.calibration.identity,
             model=self.model,
             source=name,
-            findings=(*failed, *solved.findings, *known.findings),
+            findings=(*failed, *solved.findings, *health.findings),
             **({} if noise is None else {f.name: getattr(noise, f.name) for f in fields(noise)}),
             depth_scale_sd=solved.depth_scale_sd,
             lateral_scale_sd=solved.lateral_scale_sd,
@@ -291,18 +290,15 @@ class Reconstructor:
             lateral_per_mm=solved.lateral_per_mm,
         )
 
-    def _wanted(
-        self, health: Health | None, *, normals: bool = True, uncertainty: bool = False
-    ) -> Wanted:
-        known = health or Health(untouched=0.0)
+    def _wanted(self, health: Health, *, normals: bool = True, uncertainty: bool = False) -> Wanted:
         wanted = Wanted(self.effort, self.terms, normals, uncertainty)
-        return replace(wanted, light=known.light, untouched=known.untouched == 1.0)
+        return replace(wanted, light=health.light, untouched=health.untouched == 1.0)
 
     def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
         """Return the faults of a frame, each with cause and remedy.
 
         The whole image is searched for bad pixels, and large movements of the camera are followed.
-        For a closed sensor everything is unknown.
+        Of a closed sensor only faults that no press can cause are known.
 
         Parameters
         ----------
@@ -315,7 +311,7 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         frame = self._accepted(frame, name)
-        return self.solver.check(frame, whole=True) or Health(unknown=KEYS)
+        return self.solver.check(frame, whole=True)
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
         """Return a frame of the correct size in the number type of all steps."""

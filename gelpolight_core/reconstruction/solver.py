@@ -160,8 +160,8 @@ class Solver(Protocol):
     def refuse_unfit(calibration: Any) -> None:
         """Refuse a calibration that the model cannot use."""
 
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health | None:
-        """Return the faults of a frame, as :meth:`HealthCheck.check`; None: nothing is known."""
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
+        """Return the faults of a frame, as :meth:`HealthCheck.check`."""
 
     def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
         """Reconstruct a frame."""
@@ -210,7 +210,9 @@ class OpenSolver(ABC):
 
     @cached_property
     def _health(self) -> HealthCheck:
-        return HealthCheck(self.calibration)
+        full = self.calibration.full
+        interreflection = 0.0 if full is None else full.membrane.interreflection
+        return HealthCheck(self.calibration, interreflection=interreflection)
 
     @cached_property
     def _background(self) -> Map:

@@ -50,7 +50,13 @@ def frames(known: KnownSensor) -> dict[str, Map]:
 @pytest.fixture(scope="module")
 def check(known: KnownSensor) -> HealthCheck:
     """Return the health check of the sensor."""
-    return HealthCheck(known.calibration.data)
+    return _check_of(known.calibration)
+
+
+def _check_of(calibration: Calibration) -> HealthCheck:
+    full = calibration.data.full
+    around = 0.0 if full is None else full.membrane.interreflection
+    return HealthCheck(calibration.data, interreflection=around)
 
 
 def light(*shares: float) -> Change:
@@ -74,7 +80,7 @@ def test_a_shallow_wide_face_in_much_noise_is_no_change_of_light() -> None:
     camera = usual.camera
     noisy = replace(camera, shot_variance=16.0 * camera.shot_variance, read_sd=4.0 * camera.read_sd)
     known = known_sensor(replace(usual, camera=noisy))
-    check = HealthCheck(known.calibration.data)
+    check = _check_of(known.calibration)
     for diameter_mm, depth_mm in ((12.0, 0.05), (10.0, 0.04)):
         frame = known.pressed(Cylinder(diameter_mm, depth_mm), samples=1).frame
         for seed in range(1, 5):
@@ -216,7 +222,7 @@ def test_hot_pixels_are_found_and_the_more_there_are_the_worse(
 
 def test_what_no_texture_shows_is_unknown_and_not_guessed() -> None:
     known = known_sensor(matt_design(0.25))
-    check = HealthCheck(known.calibration.data)
+    check = _check_of(known.calibration)
     press = known.pressed(Ball(4.0, 1.0), samples=1).frame
     found = check.check(known.noisy(np.asarray(gaussian_filter(press, (1.5, 1.5, 0)))))
     assert found.unknown == ("blurred",)
@@ -242,7 +248,7 @@ def test_kinds_of_numbers_and_a_camera_that_is_not_linear_give_the_same_findings
     from gelpolight_core.simulation.exposure import exposed
 
     bent: Calibration = known.calibration.changed(response=gamma_response(2.2))
-    check = HealthCheck(bent.data)
+    check = _check_of(bent)
     for change, keys in ((light(1.0, 1.0, 1.0), ()), (light(1.01, 1.01, 1.01), ("exposure",))):
         frame = change(frames["cylinder"])
         encoded = exposed(
@@ -258,7 +264,7 @@ def test_kinds_of_numbers_and_a_camera_that_is_not_linear_give_the_same_findings
 def test_the_paper_models_calibration_is_checked_too(known: KnownSensor) -> None:
     matt = known_sensor(matt_design(0.25))
     paper = replace(matt.calibration, model="paper").changed(full=None)
-    check = HealthCheck(paper.data)
+    check = _check_of(paper)
     press = matt.pressed(Ball(4.0, 1.0), samples=1).frame
     assert not check.check(matt.noisy(press)).findings
     assert check.check(matt.noisy(press * np.float32(0.98))).keys == ("exposure",)

@@ -215,7 +215,7 @@ def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states
     "region", [(300, 10, 21, 100), (0, 200, 100, 41), (10, 10, 31, 100), (-1, 0, 100, 100)]
 )
 def test_a_region_that_cannot_hold_a_press_is_refused(region: tuple[int, int, int, int]) -> None:
-    with pytest.raises(InputError, match=r"is not inside the image of 320 x 240 pixels or too"):
+    with pytest.raises(InputError, match=r"is not inside the image of 320 x 240 pixels or below"):
         WorkingGrid(ImageSize(320, 240), 0.1, region_px=region)
 
 

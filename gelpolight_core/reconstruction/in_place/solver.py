@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, ClassVar
 
 import cv2
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.health.check import HealthCheck
+from gelpolight_core.health.finding import KEYS, Health, health_of
 from gelpolight_core.reconstruction.checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
@@ -46,6 +49,8 @@ NOISE_REACH = 8.0
 STATED_CHANGE = 0.01
 """Change of the light that is stated: images of a closed sensor scatter by less."""
 ONE_MODE = tr("calibration in place has one mode")
+SURE = ("dark", "led_off", "colour_order", "bad_pixels", "bad_line")
+"""Faults that no press can cause."""
 STEPS = (tr("change of colour"), tr("slopes"), INTEGRATION)
 
 
@@ -72,8 +77,20 @@ class InPlaceSolver:
     def refuse_unfit(calibration: ClosedSensor) -> None:
         """Refuse nothing: a closed sensor's calibration has one model."""
 
-    def check(self, frame: NDArray[Any], *, whole: bool = False) -> None:
-        """Return that no fault is known."""
+    @cached_property
+    def _health(self) -> HealthCheck:
+        return HealthCheck(self.calibration)
+
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
+        """Return the faults that no press can cause; the others are unknown.
+
+        The membrane of a closed sensor changes a few percent from press to press, so that smaller
+        changes of the light say nothing. The depth follows them.
+        """
+        found = self._health.check(frame, whole=whole)
+        sure = [finding for finding in found.findings if finding.key in SURE]
+        unknown = tuple(key for key in KEYS if key not in SURE)
+        return health_of(sure, unknown=unknown, untouched=found.untouched)
 
     def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
         """Return which steps a frame needs; see :class:`Solver`."""
