@@ -114,9 +114,9 @@ class ResidualTable(QWidget):
             value = QTableWidgetItem(f"{capture.residual:.3g}")
             value.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             value.setData(SHARE, capture.residual / largest)
-            tip = "" if capture.finding is None else plain_tip(capture.finding.sentence)
+            tip = "" if capture.finding is None else capture.finding.sentence
             for column, item in ((NAME_COLUMN, name), (RESIDUAL_COLUMN, value)):
-                item.setToolTip(tip)
+                item.setToolTip(plain_tip(tip))
                 self._table.setItem(row, column, item)
         self.select(shown)
         rows = min(len(self._captures), 6)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
-from gelpolight_core.measurement.result import Measurement, Quantity, Truth, compare
+from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor

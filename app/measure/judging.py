@@ -9,7 +9,8 @@ from app.measure.figures_text import unit_behind, unit_of
 from app.services.preferences import Limits
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.measurement.result import Quantity, Truth, compare
+from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.measurement.result import Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, verdict_of

@@ -13,7 +13,7 @@ from typing import Any
 
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.reading import brief, plain_text, read_own
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"

@@ -70,7 +70,7 @@ def test_the_map_is_kept_in_the_file_and_files_without_one_are_read(
     write_calibration(small_calibration, tmp_path / "without.gplcal")
     without = read_calibration(tmp_path / "without.gplcal")
     assert without.data.bad is None
-    assert not without.bad_pixels.pixels.size
+    assert not without.data.bad_pixels.pixels.size
     assert without.identity == small_calibration.identity
 
 

@@ -19,7 +19,8 @@ from typing import Any
 import cv2
 
 from app.command_line.main import main as gelpolight
-from gelpolight_core.measurement.result import Quantity, Truth
+from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.measurement.result import Truth
 
 DESIGN = Path(__file__).with_name("small_sensor.toml")
 PRESS = "cylinder_s5_d100"

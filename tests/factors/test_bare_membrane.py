@@ -58,7 +58,6 @@ def test_what_the_live_hint_sees_the_stage_fails(
         assert "same as the whiteboard image" in status.sentence
     else:
         assert status.quality["pressed"].value > 0.0
-        stage = {f.key: f for f in status.quality.figures}
-        for figure in live.figures:
-            assert figure.verdict is stage[figure.key].verdict
-            assert figure.value == pytest.approx(stage[figure.key].value, abs=0.5)
+        stage = status.quality[live.finding.key]
+        assert live.finding.verdict is stage.verdict
+        assert live.finding.value == pytest.approx(stage.value, abs=0.5)

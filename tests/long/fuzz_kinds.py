@@ -33,7 +33,8 @@ from gelpolight_core.measurement.protocol import (
     read_protocol_file,
     write_protocol_file,
 )
-from gelpolight_core.measurement.result import Measurement, Quantity
+from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.measurement.tools import tools_from_json
 from gelpolight_core.optics.camera import Camera

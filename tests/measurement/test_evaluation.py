@@ -197,8 +197,8 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
     ("text", "message"),
     [
         ("file,shape\na.png,ball\n", "column height_mm, diameter_mm is missing"),
-        (HEADER + "a.png,ball,,,1\n", "line 2: diameter_mm is ''"),
-        (HEADER + "a.png,cuboid,5,,1\n", "side_mm is ''"),
+        (HEADER + "a.png,ball,,,1\n", "line 2: diameter_mm is empty"),
+        (HEADER + "a.png,cuboid,5,,1\n", "side_mm is empty"),
         (HEADER + "a.png,ball,six,,1\n", "diameter_mm is 'six'"),
         (HEADER + "a.png,ball,nan,,1\n", "diameter_mm is 'nan'"),
         (HEADER + "a.png,ball,0,,1\n", "diameter_mm is '0'"),

@@ -15,11 +15,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.statistics import statistics_of
-from gelpolight_core.records.entry import (
-    MeasurementRecord,
-    Quantity,
-)
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 
 NOON = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)

@@ -108,7 +108,7 @@ def off_by(found: Indentation, x: float, y: float) -> float:
 
 def refusal(press: NDArray[np.float32], background: NDArray[np.float32]) -> InputError:
     with pytest.raises(InputError) as caught:
-        find_indentation(press, background, name="ball_07.png", background_name="background.png")
+        find_indentation(press, background, name="ball_07.png")
     assert "ball_07.png" in caught.value.where
     assert caught.value.advice
     return caught.value

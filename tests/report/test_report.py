@@ -25,7 +25,7 @@ from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.causes import MODEL
 from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts

@@ -32,7 +32,7 @@ from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.protocol import (
     read_protocol_file,
 )
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.reader import Recording, is_recording

@@ -24,7 +24,7 @@ from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import write_csv

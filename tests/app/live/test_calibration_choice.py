@@ -16,7 +16,7 @@ from app.services.jobs import Job
 from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.sensor_calibration import Calibration
 
 

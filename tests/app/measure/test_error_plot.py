@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 from app.measure.error_plot import ErrorPlot
 from app.services.preferences import Limits
 from app.theme import theme
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 
 

@@ -37,7 +37,7 @@ from app.workspace.report import write_entry_report
 from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME
 

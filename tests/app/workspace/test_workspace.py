@@ -24,7 +24,7 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.remarks import write_remark
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 
 GOOD = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)

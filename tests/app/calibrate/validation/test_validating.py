@@ -19,7 +19,7 @@ from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.finding import doubt
-from gelpolight_core.measurement.result import Quantity
+from gelpolight_core.measurement.quantity import Quantity
 
 Made = Callable[[], Project]
 PRESS = "presses/cylinder_s5_d100.png"
