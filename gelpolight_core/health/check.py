@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
 from gelpolight_core.finding import Finding
 from gelpolight_core.health.finding import KEYS, Health, health_of
-from gelpolight_core.health.fit import LEAST_START, CommonChange, common_change
+from gelpolight_core.health.fit import (
+    LEAST_START,
+    CommonChange,
+    common_change,
+    evened,
+    uneven_change,
+)
 from gelpolight_core.health.judging import (
     Limits,
     bad_pixel_findings,
@@ -29,6 +35,8 @@ from gelpolight_core.health.judging import (
     saturated_finding,
     stranger_finding,
     swapped_finding,
+    uneven_finding,
+    with_shape,
 )
 from gelpolight_core.health.movement import FOLLOWED_PX, movement_px
 from gelpolight_core.health.samples import PARAMETERS, Samples, compare_samples, samples_of
@@ -118,6 +126,11 @@ class HealthCheck:
     ) -> Health:
         """Return the changes on the membrane of this sensor."""
         limits, samples = self._limits, self.samples
+        uneven = uneven_change(samples, self._change, self._square, common)
+        shaded = uneven_finding(uneven, limits)
+        if uneven is not None and shaded is not None:
+            less = evened(samples, self._change, self._square, uneven.shape)
+            common = common_change(samples, *less, self._full)
         if (common.values[:6:2] < DARK - 1.0).all():
             return health_of([dark_finding()], untouched=common.share)
         full = float(self._full.sum() / samples.count.sum())
@@ -126,6 +139,9 @@ class HealthCheck:
         moved = moved_finding(common, seen_px)
         changes = light_findings(common, limits)
         gain = light_gain(common, changes, limits)
+        changes += [shaded] if shaded is not None else []
+        if uneven is not None and shaded is not None and not shaded.meaningless:
+            gain = with_shape(gain, common, uneven)
         if moved is not None and moved.value > FOLLOWED_PX:
             # The pattern of the light has moved, too.
             changes, gain = [finding for finding in changes if finding.meaningless], None

@@ -13,9 +13,22 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
 
 KEYS = (
-    "dark", "led_off", "led_weak", "exposure", "room_light", "colour_order", "other_sensor",
-    "saturated", "camera_moved", "blurred", "dirt", "bad_pixels", "bad_line", "not_recovered",
-)  # fmt: skip
+    "dark",
+    "led_off",
+    "led_weak",
+    "exposure",
+    "uneven",
+    "room_light",
+    "colour_order",
+    "other_sensor",
+    "saturated",
+    "camera_moved",
+    "blurred",
+    "dirt",
+    "bad_pixels",
+    "bad_line",
+    "not_recovered",
+)
 """Keys of all faults."""
 
 
@@ -29,10 +42,14 @@ class LightGain:
         Light of each channel over that at calibration; an image is divided by it.
     sd : (3,) float64
         Standard deviations.
+    shape : (6,) float64 or None
+        Smooth change over the image, common to all channels, as factors of
+        :func:`~gelpolight_core.health.samples.image_shapes`; None: the same everywhere.
     """
 
     share: NDArray[np.float64]
     sd: NDArray[np.float64]
+    shape: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)

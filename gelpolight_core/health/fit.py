@@ -6,6 +6,7 @@ that do not follow the common change are pressed, dirty, or of another sensor.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numba
@@ -119,6 +120,78 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     elif not small and kept.mean() < LEAST_START:
         kept[:] = False
     return CommonChange(values, sd, kept, left, alone[:3], alone_sd[:3])
+
+
+@dataclass(frozen=True, slots=True)
+class Uneven:
+    """A change of the light that differs smoothly over the image, of all channels alike.
+
+    Attributes
+    ----------
+    shape : (6,)
+        Its share as factors of :func:`~gelpolight_core.health.samples.image_shapes`; 0 on average
+        over the untouched part.
+    largest, sd : float
+        Its largest share at the cells, and the standard deviation there.
+    """
+
+    shape: Array
+    largest: float
+    sd: float
+
+
+def uneven_change(
+    samples: Samples, change: Array, square: Array, common: CommonChange
+) -> Uneven | None:
+    """Fit a smooth change of the light together with the common one; None: too little to fit it.
+
+    Parameters
+    ----------
+    samples, change, square
+        As for :func:`common_change`.
+    common : CommonChange
+        What that has found.
+    """
+    at, shapes = common.untouched, samples.shapes[:, 1:]
+    if common.share < LEAST_START:
+        return None
+    by_light = samples.normal[:, [0, 2, 4]].sum(axis=1)
+    size = samples.normal[:, [0, 2, 4], [0, 2, 4]].sum(axis=1)
+    mixed = by_light[at].T @ shapes[at]
+    matrix = np.block(
+        [
+            [samples.normal[at].sum(axis=0) + np.diag(PRECISION), mixed],
+            [mixed.T, (shapes[at].T * size[at]) @ shapes[at]],
+        ]
+    )
+    light = change[:, :6:2].sum(axis=1)
+    right = np.concatenate([change[at].sum(axis=0), shapes[at].T @ light[at]])
+    inverse = np.linalg.inv(matrix)
+    solved = inverse @ right
+    centre = shapes[at].mean(axis=0)
+    shape = np.concatenate([[-centre @ solved[PARAMETERS:]], solved[PARAMETERS:]])
+    # Around a press, interreflection makes the cells scatter by more than their noise.
+    rest, _ = evened(samples, change, square, shape)
+    left = np.empty((size.size, 3))
+    values = solved[:PARAMETERS].copy()
+    values[:6:2] += centre @ solved[PARAMETERS:]
+    _remaining(samples.normal, rest, values, left)
+    scatter = float((size * left.mean(axis=1) ** 2)[at].mean())
+    share = samples.shapes @ shape
+    worst = int(np.argmax(np.abs(share)))
+    there = shapes[worst] - centre
+    variance = float(there @ inverse[PARAMETERS:, PARAMETERS:] @ there)
+    sd = CORRELATED * math.sqrt(max(scatter, 1.0) * variance)
+    return Uneven(shape, float(share[worst]), sd)
+
+
+def evened(samples: Samples, change: Array, square: Array, shape: Array) -> tuple[Array, Array]:
+    """Return `change` and `square` of :func:`common_change` without an uneven change of light."""
+    share = samples.shapes @ shape
+    by_light = samples.normal[:, [0, 2, 4]].sum(axis=1)
+    size = samples.normal[:, [0, 2, 4], [0, 2, 4]].sum(axis=1)
+    less = square - 2.0 * share * change[:, :6:2].sum(axis=1) + share**2 * size
+    return change - share[:, None] * by_light, less
 
 
 def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:

@@ -13,7 +13,7 @@ from gelpolight_core.bad_pixels import FAR_SHARE
 from gelpolight_core.channels import channel_name
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.health.finding import LightGain
-from gelpolight_core.health.fit import LEAST_START, CommonChange
+from gelpolight_core.health.fit import LEAST_START, CommonChange, Uneven
 from gelpolight_core.health.movement import FOLLOWED_PX
 from gelpolight_core.health.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samples
 from gelpolight_core.translation import tr
@@ -42,7 +42,7 @@ MEAN_BY_INTERREFLECTION = 0.002
 """As `GAIN_BY_INTERREFLECTION`, of the mean of the channels."""
 PRESS_BY_INTERREFLECTION = 0.0015
 """Standard deviation of the change of light around presses, over the interreflection."""
-CORRECTABLE = ("exposure", "led_weak")
+CORRECTABLE = ("exposure", "led_weak", "uneven")
 LEAST_SHIFT_PX = 0.5
 """0.6 px cost 10 um."""
 LEAST_BLUR_PX = 1.0
@@ -155,12 +155,32 @@ def light_gain(
     return LightGain(1.0 + gain, np.hypot(sd, limits.press_sd))
 
 
+def with_shape(gain: LightGain | None, common: CommonChange, uneven: Uneven) -> LightGain:
+    """Return a correction of the light, if there is one, with that of its distribution."""
+    gain = gain or LightGain(np.ones(3), common.gain_sd)
+    return replace(gain, sd=np.hypot(gain.sd, uneven.sd), shape=uneven.shape)
+
+
 def corrected(change: Finding) -> Finding:
     """Return the finding of a change of the light that is corrected; room light is not."""
     if change.key not in CORRECTABLE:
         return change
     remedy = tr("The depth is corrected for this. {remedy}").format(remedy=change.remedy)
     return replace(change, remedy=remedy, verdict=Verdict.WARN, heights=Heights.STATED)
+
+
+def uneven_finding(uneven: Uneven | None, limits: Limits) -> Finding | None:
+    """Return that the light has another distribution over the image; None where it has not."""
+    if uneven is None or abs(uneven.largest) < limits.gain + SIGMAS * uneven.sd:
+        return None
+    text = tr("parts of the image are up to {p:.1f} % {how} than at calibration")
+    text = text.format(
+        p=100.0 * abs(uneven.largest), how=tr("darker") if uneven.largest < 0.0 else tr("brighter")
+    )
+    remedy = tr("Clean the lens and check that nothing shades it; then {again}")
+    far = abs(uneven.largest) > FAR_GAIN
+    largest = 100.0 * uneven.largest
+    return _graded("uneven", text, remedy.format(again=BACKGROUND), far, largest, "%")
 
 
 def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:

@@ -76,6 +76,8 @@ class Samples:
         Neighbours of each cell; itself where there is none.
     run_cell : (runs,) int32
         Cell of each run.
+    shapes : (cells, 6) float64
+        The smooth shapes of :func:`image_shapes` at the cells.
     blur_strength : (1 + blurs,) float64
         Result of the blur fit for no blur and for `BLURS_PX`; empty if the membrane has too little
         texture.
@@ -91,6 +93,7 @@ class Samples:
     run_light: Array
     beside: Index
     run_cell: Index
+    shapes: Array
     blur_strength: Array
 
 
@@ -139,10 +142,34 @@ def samples_of(calibration: SensorModel) -> Samples:
         run_light=np.ascontiguousarray(expected.reshape(-1, RUN, 3).sum(axis=1).T, np.float64),
         beside=_neighbours(used, across),
         run_cell=lattice.astype(np.int32),
+        shapes=_shapes_of_cells(camera.height, camera.width, corner, of_sample, used.size),
         blur_strength=_blur_strength(base, (rows, columns), by_blur, weight)
         if textured.any()
         else np.zeros(0),
     )
+
+
+def image_shapes(row: Array, column: Array, height: int, width: int) -> Array:
+    """Return the smooth shapes (..., 6) of light over an image: constant, linear, quadratic."""
+    half = 0.5 * max(height, width)
+    y, x = (row - 0.5 * (height - 1)) / half, (column - 0.5 * (width - 1)) / half
+    return np.stack(np.broadcast_arrays(np.ones(1), x, y, x * x, x * y, y * y), axis=-1)
+
+
+def light_over_image(shape: Array, height: int, width: int) -> Map:
+    """Return 1 plus a sum of the shapes of :func:`image_shapes` at every pixel."""
+    half = 0.5 * max(height, width)
+    y = ((np.arange(height) - 0.5 * (height - 1)) / half)[:, None]
+    x = (np.arange(width) - 0.5 * (width - 1)) / half
+    first, by_x, by_y, by_xx, by_xy, by_yy = shape.tolist()
+    along = 1.0 + first + by_x * x + by_xx * x * x
+    return np.asarray(along + by_y * y + by_yy * y * y + by_xy * x * y, np.float32)
+
+
+def _shapes_of_cells(height: int, width: int, corner: Index, cell: Index, cells: int) -> Array:
+    count = np.maximum(np.bincount(cell, minlength=cells), 1)
+    row, column = (np.bincount(cell, corner[:, k], minlength=cells) / count for k in (0, 1))
+    return image_shapes(row, column, height, width)
 
 
 def _blur_strength(

@@ -15,10 +15,13 @@ from numpy.typing import DTypeLike, NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import calibration_fault
 from gelpolight_core.health.finding import Health
+from gelpolight_core.health.samples import light_over_image
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.reconstruction.checks import accepted
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
 from gelpolight_core.reconstruction.in_place.solver import InPlaceSolver
+from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.paper.depth import PaperSolver
 from gelpolight_core.reconstruction.solver import Solver, Wanted
@@ -156,7 +159,8 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         frame = self._accepted(frame, name)
-        return self.solver.needs(frame, self._wanted(self.solver.check(frame)))
+        health = self.solver.check(frame)
+        return self.solver.needs(self._evened(frame, health), self._wanted(health))
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> NDArray[np.float32]:
         """Return the image that the camera should see of a surface.
@@ -199,7 +203,10 @@ class Reconstructor:
         light = None if height_map.health is None else height_map.health.light
         gain = None if light is None else light.share
         return self.solver.residual(
-            self._accepted(frame, height_map.source), height_map, gain, step=step
+            self._evened(self._accepted(frame, height_map.source), height_map.health),
+            height_map,
+            gain,
+            step=step,
         )
 
     def misfit(
@@ -265,7 +272,8 @@ class Reconstructor:
         frame = self._accepted(frame, name)
         health = self.solver.check(frame) if health is None else health
         solved = self.solver.depth(
-            frame, self._wanted(health, normals=normals, uncertainty=uncertainty)
+            self._evened(frame, health),
+            self._wanted(health, normals=normals, uncertainty=uncertainty),
         )
         fault = calibration_fault(self.calibration.quality)
         failed = () if fault is None else (fault,)
@@ -312,6 +320,15 @@ class Reconstructor:
         """
         frame = self._accepted(frame, name)
         return self.solver.check(frame, whole=True)
+
+    def _evened(self, frame: NDArray[Any], health: Health | None) -> NDArray[Any]:
+        """Return a frame without an uneven change of its light, then in linear light."""
+        light = None if health is None else health.light
+        if light is None or light.shape is None:
+            return frame
+        linear = as_linear(linearised(frame, self.calibration.response))
+        share = light_over_image(light.shape, *frame.shape[:2])[..., None]
+        return np.where(linear < SATURATED, linear / share, linear)
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
         """Return a frame of the correct size in the number type of all steps."""

@@ -15,6 +15,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.finding import Verdict
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.finding import KEYS
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
 from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
@@ -268,3 +269,50 @@ def test_the_paper_models_calibration_is_checked_too(known: KnownSensor) -> None
     press = matt.pressed(Ball(4.0, 1.0), samples=1).frame
     assert not check.check(matt.noisy(press)).findings
     assert check.check(matt.noisy(press * np.float32(0.98))).keys == ("exposure",)
+
+
+def fall_off(share: float, shape: tuple[int, ...]) -> Map:
+    """Return the light of a lens that is darker by a share at the left and right edge."""
+    down, across = np.mgrid[: shape[0], : shape[1]]
+    half = np.array(shape[:2]) / 2.0
+    square = ((down - half[0]) ** 2 + (across - half[1]) ** 2) / half.max() ** 2
+    return np.asarray(1.0 - share * square, np.float32)[..., None]
+
+
+@pytest.mark.parametrize("share", [0.02, 0.05])
+@pytest.mark.parametrize("name", ["cylinder", "ball", "cuboid"])
+def test_light_that_falls_off_towards_the_edge_is_corrected(
+    known: KnownSensor, frames: dict[str, Map], name: str, share: float
+) -> None:
+    sensor = Reconstructor(known.calibration)
+    frame = frames[name]
+    usual = sensor.depth(frame, normals=False).depth_mm
+    darker = frame * fall_off(share, frame.shape)
+    found = sensor.depth(darker, normals=False)
+    assert found.health is not None
+    assert found.health.light is not None
+    assert "uneven" in found.health.keys
+    assert not found.doubts
+    pressed = usual > 0.8 * usual.max()
+    assert abs(float((found.depth_mm - usual)[pressed].mean())) < 0.004
+    only_gain = replace(found.health, light=replace(found.health.light, shape=None))
+    without = sensor.depth(darker, normals=False, health=only_gain)
+    if name == "cylinder":
+        assert abs(float((without.depth_mm - usual)[pressed].mean())) > 0.01
+
+
+def test_a_shaded_corner_is_corrected_and_a_strong_shade_is_refused(
+    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
+) -> None:
+    frame = frames["ball"]
+    ramp = np.linspace(0.0, 1.0, frame.shape[1], dtype=np.float32)[None, :, None]
+    tilted = check.check(known.noisy(frame * (1.0 - 0.03 * ramp)))
+    assert "uneven" in tilted.keys
+    assert tilted.meaningless is None
+    assert tilted.light is not None
+    assert tilted.light.shape is not None
+    # Darker to the right: the share falls along x.
+    assert tilted.light.shape[1] == pytest.approx(-0.015, abs=0.003)
+    assert abs(tilted.light.shape[2]) < 0.002
+    strong = check.check(known.noisy(frame * (1.0 - 0.25 * ramp)))
+    assert strong.meaningless is not None
