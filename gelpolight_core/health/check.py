@@ -71,9 +71,17 @@ class HealthCheck:
         The sensor's.
     interreflection : float, optional
         Of its membrane, which a press makes brighter around it.
+    crosstalk : (3, 3), optional
+        Of the LEDs in the channels; by default none.
     """
 
-    def __init__(self, calibration: SensorModel, *, interreflection: float = 0.0) -> None:
+    def __init__(
+        self,
+        calibration: SensorModel,
+        *,
+        interreflection: float = 0.0,
+        crosstalk: NDArray[np.float64] | None = None,
+    ) -> None:
         self.calibration = calibration
         self.samples: Samples = samples_of(calibration)
         cells, runs = self.samples.count.size, self.samples.run_cell.size
@@ -82,6 +90,7 @@ class HealthCheck:
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
         self._limits = Limits.of(interreflection)
+        self._unmix = np.linalg.inv(np.eye(3) if crosstalk is None else crosstalk)
         self._noise = float(calibration.noise.max())
         self._stripe = 0
         self._lock = Lock()
@@ -158,7 +167,7 @@ class HealthCheck:
             moved,
             blurred,
             saturated_finding(full),
-            None if specks else dirt_finding(samples, self._run_change, common),
+            None if specks else dirt_finding(samples, self._run_change, common, self._unmix),
             *pixels,
         ]
         unknown = () if samples.blur_strength.size else ("blurred",)

@@ -299,17 +299,24 @@ def saturated_finding(share: float) -> Finding | None:
     return _graded("saturated", text, remedy, share > MOSTLY_SATURATED, 100.0 * share, "%")
 
 
-def dirt_finding(samples: Samples, run_change: Array, common: CommonChange) -> Finding | None:
-    """Return that something dark is on the membrane or in the path of the light."""
-    red, green, blue = (
-        run_change[k] / samples.run_light[k] - common.values[2 * k] for k in range(3)
-    )
+def dirt_finding(
+    samples: Samples, run_change: Array, common: CommonChange, unmix: Array
+) -> Finding | None:
+    """Return that something dark is on the membrane or in the path of the light.
+
+    Channels that show the light of one LED alone, by crosstalk, are alike on a slope, too: `unmix`
+    (3, 3) gives the light of each LED, and only runs that all of them light are judged.
+    """
+    led_light = unmix @ samples.run_light
+    lit = (led_light > 0.5 * samples.run_light).all(axis=0)
+    changes = unmix @ run_change / np.where(lit, led_light, 1.0)
+    red, green, blue = (changes[k] - common.values[2 * k] for k in range(3))
     most = np.maximum(np.maximum(red, green), blue)
     least = np.minimum(np.minimum(red, green), blue)
     dark = (most < DIRT_CHANGE) & (most - least < -DIRT_SPREAD * most)
     if not dark.any():
         return None
-    dark &= ~common.untouched[samples.run_cell]
+    dark &= lit & ~common.untouched[samples.run_cell]
     runs = np.bincount(samples.run_cell[dark], minlength=samples.count.size)
     around = runs + runs[samples.beside].sum(axis=1)
     if around.max() < DIRT_RUNS:

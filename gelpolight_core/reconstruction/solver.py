@@ -212,7 +212,11 @@ class OpenSolver(ABC):
     def _health(self) -> HealthCheck:
         full = self.calibration.full
         interreflection = 0.0 if full is None else full.membrane.interreflection
-        return HealthCheck(self.calibration, interreflection=interreflection)
+        return HealthCheck(
+            self.calibration,
+            interreflection=interreflection,
+            crosstalk=self.calibration.crosstalk,
+        )
 
     @cached_property
     def _background(self) -> Map:

@@ -15,6 +15,8 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.finding import Verdict
 from gelpolight_core.health.check import HealthCheck
 from gelpolight_core.health.finding import KEYS
+from gelpolight_core.health.fit import CommonChange
+from gelpolight_core.health.judging import dirt_finding
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
@@ -57,7 +59,8 @@ def check(known: KnownSensor) -> HealthCheck:
 def _check_of(calibration: Calibration) -> HealthCheck:
     full = calibration.data.full
     around = 0.0 if full is None else full.membrane.interreflection
-    return HealthCheck(calibration.data, interreflection=around)
+    crosstalk = calibration.data.crosstalk
+    return HealthCheck(calibration.data, interreflection=around, crosstalk=crosstalk)
 
 
 def light(*shares: float) -> Change:
@@ -316,3 +319,18 @@ def test_a_shaded_corner_is_corrected_and_a_strong_shade_is_refused(
     assert abs(tilted.light.shape[2]) < 0.002
     strong = check.check(known.noisy(frame * (1.0 - 0.25 * ramp)))
     assert strong.meaningless is not None
+
+
+@pytest.mark.parametrize(("leds", "keys"), [((0.9, 0.0, 0.0), ()), ((0.9, 0.5, 0.4), ("dirt",))])
+def test_crosstalk_of_one_led_is_no_dirt(
+    check: HealthCheck, leds: tuple[float, ...], keys: tuple[str, ...]
+) -> None:
+    """Where one LED lights all channels, a slope makes them alike darker."""
+    crosstalk = np.full((3, 3), 0.03) + 0.97 * np.eye(3)
+    seen = crosstalk @ np.array(leds)
+    samples = replace(check.samples, run_light=np.tile(seen, (check.samples.run_cell.size, 1)).T)
+    pressed = np.zeros(samples.count.size, np.bool_)
+    none = np.zeros((samples.count.size, 3))
+    common = CommonChange(np.zeros(9), np.ones(9), pressed, none, np.zeros(3), np.ones(3))
+    found = dirt_finding(samples, -0.3 * samples.run_light, common, np.linalg.inv(crosstalk))
+    assert (() if found is None else (found.key,)) == keys
