@@ -51,22 +51,21 @@ class SetupForm(QScrollArea):
         super().__init__()
         named(self, "setup", tr("Set-up"))
         self.setWidgetResizable(True)
-        inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=400)
+        inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
         self.setWidget(inside)
-        hbox(None, holder, None, of=inside)
+        hbox(None, (holder, 20), None, of=inside)
         self._title, self._task = PlainLabel(), PlainLabel(wrap=True)
         make_bold(self._title, size=1.35)
         self.values = Form(SetupValues(), "setup", at_once=True)
         self.values.changed.connect(self._on_changed)
         self.serial = self.values.inputs["serial"]
         self.facts = named(PlainLabel(wrap=True), "setup.facts", tr("About this kind of sensor"))
-        below = self.values.rows.getWidgetPosition(self.values.inputs["preset"])[0] + 1
-        self.values.rows.insertRow(below, "", self.facts)
+        self._insert_below("preset", self.facts)
         sensor = QGroupBox(tr("Sensor"))
         vbox(self.values, of=sensor)
-        for place, (name, text) in enumerate(
-            (("lens", tr("Lens views")), ("top", tr("Top surface")))
-        ):
+        self._prints: list[QWidget] = []
+        boards = ("lens", tr("Lens views")), ("top", tr("Top surface"))
+        for place, (name, text) in enumerate(boards):
             button = push_button(
                 f"setup.{name}_board.print",
                 tr("Print…"),
@@ -77,7 +76,8 @@ class SetupForm(QScrollArea):
                     "after printing"
                 ),
             )
-            self.values.put_beside(f"{name}_square_mm", button)
+            self._insert_below(f"{name}_square_mm", button)
+            self._prints.append(button)
         self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
         self.accept = named(
             QPushButton(minimumHeight=38), "setup.accept", tr("Start the calibration")
@@ -160,6 +160,8 @@ class SetupForm(QScrollArea):
         self.facts.setText(preset_text(values.preset))
         known = values.preset != OTHER and not values.optics
         self.values.rows.setRowVisible(self.facts, known or values.source == "stated")
+        for button in self._prints:
+            self.values.rows.setRowVisible(button, values.optics)
         try:
             sensor = session_of(self.session, values).sensor
             unusual = () if not values.optics else judge_set_up(sensor)
@@ -171,6 +173,10 @@ class SetupForm(QScrollArea):
         warnings = (f"{found.stated}. {found.remedy}." for found in unusual)
         self.problem.setText(problem or " ".join(warnings))
         self.accept.setEnabled(not problem)
+
+    def _insert_below(self, name: str, widget: QWidget) -> None:
+        rows = self.values.rows
+        rows.insertRow(rows.getWidgetPosition(self.values.inputs[name])[0] + 1, "", widget)
 
     def _build_camera(self) -> QGroupBox:
         box = QGroupBox(tr("Camera"))

@@ -65,7 +65,7 @@ class Form(QWidget, Generic[V]):
                 words = (meta["label"] or meta["text"]).replace("&", "")
                 named(made, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
                 if meta.get("beside"):
-                    self.put_beside(list(self.inputs)[-1], PlainLabel(meta["beside"]), (made, 1))
+                    self._put_beside(list(self.inputs)[-1], meta["beside"], made)
                 else:
                     self.rows.addRow(meta["label"], made)
                 self.inputs[f.name] = made
@@ -87,17 +87,16 @@ class Form(QWidget, Generic[V]):
         for name, value in values.items():
             self.changed.emit(name, value)
 
-    def put_beside(self, name: str, *parts: Any) -> None:
-        """Add parts of :func:`app.widgets.layout.hbox` to the row of a field."""
-        made, row = self.inputs[name], QWidget()
-        self.rows.replaceWidget(made, row)
-        hbox((made, 1), *parts, of=row, margins=0)
-
     def show_row(self, name: str, on: bool) -> None:
         """Show or hide the row of a field."""
         made = self.inputs[name]
         row = made if made.parentWidget() is self else made.parentWidget()
         self.rows.setRowVisible(row, on)
+
+    def _put_beside(self, name: str, words: str, other: QWidget) -> None:
+        made, row = self.inputs[name], QWidget()
+        self.rows.replaceWidget(made, row)
+        hbox((made, 1), PlainLabel(words), (other, 1), of=row, margins=0)
 
     def _follow(self) -> None:
         for name, when in self._when.items():
