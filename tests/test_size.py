@@ -27,7 +27,7 @@ NO_CODE = {
 MOST = {
     "app/.": 171,
     "app/bench": 252,
-    "app/calibrate": 6463,
+    "app/calibrate": 6302,
     "app/cameras": 606,
     "app/command_line": 1851,
     "app/context": 408,
@@ -43,7 +43,7 @@ MOST = {
     "app/tools": 363,
     "app/view2d": 1117,
     "app/view3d": 1554,
-    "app/widgets": 795,
+    "app/widgets": 788,
     "app/workspace": 673,
     "gelpolight_core/.": 1240,
     "gelpolight_core/batch": 592,

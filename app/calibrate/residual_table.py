@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRectF, Qt, Signal
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -136,14 +136,6 @@ class ResidualTable(QWidget):
         rows = 0 if self.isHidden() else self._table.rowCount()
         columns = (NAME_COLUMN, RESIDUAL_COLUMN)
         return [tuple(self._table.item(row, k).text() for k in columns) for row in range(rows)]
-
-    def changeEvent(self, event: QEvent) -> None:
-        """Apply the colours of a new theme."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and not self.isHidden():
-            chosen = self._table.selectionModel().selectedRows()
-            shown = self._captures[chosen[0].row()].path.name if chosen else ""
-            self.show_captures(self._captures, shown=shown)
 
     def _choose(self, item: QTableWidgetItem) -> None:
         self.chosen.emit(self._captures[item.row()].path.name)

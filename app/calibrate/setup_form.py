@@ -2,42 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QStandardPaths, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
-    QDoubleSpinBox,
     QFileDialog,
-    QFormLayout,
     QGroupBox,
     QPushButton,
     QScrollArea,
-    QSizePolicy,
-    QToolButton,
     QWidget,
 )
 
 from app.calibrate.setup_values import (
     OTHER,
     PRESETS,
-    USUAL_RADIUS_MM,
     SetupValues,
     new_session,
     preset_text,
     session_of,
     values_of,
 )
-from app.widgets.folding_row import FoldingRow
+from app.widgets.buttons import push_button
 from app.widgets.forms import Form
-from app.widgets.inputs import DoubleSpinBox, SpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import Session
 from gelpolight_core.set_up import judge_set_up
 from gelpolight_core.translation import tr
@@ -60,21 +53,31 @@ class SetupForm(QScrollArea):
         self.setWidgetResizable(True)
         inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
         self.setWidget(inside)
-        hbox(None, holder, None, of=inside)
+        hbox(None, (holder, 20), None, of=inside)
         self._title, self._task = PlainLabel(), PlainLabel(wrap=True)
         make_bold(self._title, size=1.35)
         self.values = Form(SetupValues(), "setup", at_once=True)
         self.values.changed.connect(self._on_changed)
         self.serial = self.values.inputs["serial"]
         self.facts = named(PlainLabel(wrap=True), "setup.facts", tr("About this kind of sensor"))
-        below = self.values.rows.getWidgetPosition(self.values.inputs["preset"])[0] + 1
-        self.values.rows.insertRow(below, "", self.facts)
-        sensor, balls = QGroupBox(tr("Sensor")), QGroupBox(tr("Balls"))
+        self._insert_below("preset", self.facts)
+        sensor = QGroupBox(tr("Sensor"))
         vbox(self.values, of=sensor)
-        self.ball = length_box("setup.ball", tr("Default ball diameter"), 0.1, 1000.0)
-        self.ball.setToolTip(tr("Diameter measured with a calliper; each press can have its own"))
-        QFormLayout(balls).addRow(tr("Default diameter"), self.ball)
-        self._boards = self._build_boards()
+        self._prints: list[QWidget] = []
+        boards = ("lens", tr("Lens views")), ("top", tr("Top surface"))
+        for place, (name, text) in enumerate(boards):
+            button = push_button(
+                f"setup.{name}_board.print",
+                tr("Print…"),
+                partial(self._save_board, place),
+                accessible=tr("{b}: save this board as a page to print").format(b=text),
+                tip=tr(
+                    "Save this board as an A4 page to print at 100 % scale; measure the squares "
+                    "after printing"
+                ),
+            )
+            self._insert_below(f"{name}_square_mm", button)
+            self._prints.append(button)
         self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
         self.accept = named(
             QPushButton(minimumHeight=38), "setup.accept", tr("Start the calibration")
@@ -85,8 +88,6 @@ class SetupForm(QScrollArea):
             self._task,
             self._build_camera(),
             sensor,
-            self._boards,
-            balls,
             self.problem,
             self.accept,
             None,
@@ -114,13 +115,8 @@ class SetupForm(QScrollArea):
             label.setText(words)
             label.setVisible(new)
         self.values.show_value(values)
-        self.lens_board.show_board(session.checkerboard)
-        self.top_board.show_board(session.top_pose)
-        self.ball.setValue(2.0 * (session.ball_default_radius_mm or USUAL_RADIUS_MM))
-        self._boards.setVisible(values.optics)
         self.accept.setText(tr("&Start the calibration") if new else tr("&Apply these values"))
         self._check()
-        # The values of the fields, not of the session: the fields round them.
         self._known = self.stated()
 
     @property
@@ -136,14 +132,7 @@ class SetupForm(QScrollArea):
         InputError
             If a text is not what it should be.
         """
-        values = self.values.value
-        values = replace(values, serial=values.serial.strip(), elastomer=values.elastomer.strip())
-        return replace(
-            session_of(self.session, values),
-            checkerboard=self.lens_board.board(),
-            top_pose=self.top_board.board(),
-            ball_default_radius_mm=0.5 * self.ball.value(),
-        )
+        return session_of(self.session, self.values.value)
 
     @property
     def edited(self) -> bool:
@@ -171,6 +160,8 @@ class SetupForm(QScrollArea):
         self.facts.setText(preset_text(values.preset))
         known = values.preset != OTHER and not values.optics
         self.values.rows.setRowVisible(self.facts, known or values.source == "stated")
+        for button in self._prints:
+            self.values.rows.setRowVisible(button, values.optics)
         try:
             sensor = session_of(self.session, values).sensor
             unusual = () if not values.optics else judge_set_up(sensor)
@@ -183,18 +174,9 @@ class SetupForm(QScrollArea):
         self.problem.setText(problem or " ".join(warnings))
         self.accept.setEnabled(not problem)
 
-    def _build_boards(self) -> QGroupBox:
-        boards = QGroupBox(tr("Checkerboards (count inner corners)"))
-        form = QFormLayout(boards, rowWrapPolicy=QFormLayout.RowWrapPolicy.WrapLongRows)
-        self.lens_board = _BoardRow("setup.lens_board", tr("Lens views"))
-        self.top_board = _BoardRow("setup.top_board", tr("Top surface"))
-        for label, row in (
-            (tr("Lens views"), self.lens_board),
-            (tr("Top surface"), self.top_board),
-        ):
-            row.print.clicked.connect(lambda _=False, row=row: self._save_board(row.board()))
-            form.addRow(label, row)
-        return boards
+    def _insert_below(self, name: str, widget: QWidget) -> None:
+        rows = self.values.rows
+        rows.insertRow(rows.getWidgetPosition(self.values.inputs[name])[0] + 1, "", widget)
 
     def _build_camera(self) -> QGroupBox:
         box = QGroupBox(tr("Camera"))
@@ -219,10 +201,11 @@ class SetupForm(QScrollArea):
         show_meaning(self.camera, role)
         self.camera_settings.setEnabled(settable)
 
-    def _save_board(self, board: BoardSpec) -> None:
+    def _save_board(self, place: int) -> None:
         """Save a page with the board where the user chooses, and open it."""
         from gelpolight_core.export.board_page import write_board  # slow to import
 
+        board = self.values.value.boards[place]
         across, down = board.inner_corners
         usual = Path(f"checkerboard-{across}x{down}-{board.square_mm:g}mm.pdf")
         documents = QStandardPaths.StandardLocation.DocumentsLocation
@@ -242,59 +225,3 @@ class SetupForm(QScrollArea):
         shown = QDesktopServices.openUrl(QUrl.fromLocalFile(chosen))
         self.problem.setText("" if shown else tr("Saved as {path}").format(path=chosen))
         show_meaning(self.problem, "")
-
-
-def length_box(name: str, accessible: str, low: float, high: float) -> QDoubleSpinBox:
-    """Return an input for a length in mm."""
-    box = DoubleSpinBox(decimals=3, minimum=low, maximum=high, singleStep=0.1, suffix=tr(" mm"))
-    return named(box, name, tr("{what} in mm").format(what=accessible))
-
-
-class _BoardRow(FoldingRow):
-    """Corner counts and square size of one board."""
-
-    def __init__(self, name: str, accessible: str) -> None:
-        self.columns = named(
-            SpinBox(),
-            f"{name}.columns",
-            tr("{b}: inner corners horizontally").format(b=accessible),
-        )
-        self.rows = named(
-            SpinBox(), f"{name}.rows", tr("{b}: inner corners vertically").format(b=accessible)
-        )
-        for box in (self.columns, self.rows):
-            box.setRange(3, 100)
-            box.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.square = length_box(
-            f"{name}.square", tr("{b}: square size").format(b=accessible), 0.05, 500.0
-        )
-        self.print = named(
-            QToolButton(),
-            f"{name}.print",
-            tr("{b}: save this board as a page to print").format(b=accessible),
-            tr(
-                "Save this board as an A4 page to print at 100 % scale; measure the squares after "
-                "printing"
-            ),
-        )
-        self.print.setText(tr("Print…"))
-        super().__init__(
-            _beside(self.columns, PlainLabel("x"), self.rows),
-            _beside(PlainLabel(tr("squares of")), self.square, self.print),
-        )
-
-    def show_board(self, board: BoardSpec) -> None:
-        self.columns.setValue(board.inner_corners[0])
-        self.rows.setValue(board.inner_corners[1])
-        self.square.setValue(board.square_mm)
-
-    def board(self) -> BoardSpec:
-        return BoardSpec((self.columns.value(), self.rows.value()), self.square.value())
-
-
-def _beside(*widgets: QWidget) -> QWidget:
-    """Return widgets in a row; number fields use the remaining width."""
-    part = QWidget()
-    parts = ((widget, int(isinstance(widget, QDoubleSpinBox))) for widget in widgets)
-    hbox(*parts, None, of=part, margins=0)
-    return part

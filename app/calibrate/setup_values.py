@@ -32,15 +32,25 @@ MM = tr(" mm")
 def _optical(name: str, default: float, label: str, tip: str) -> Any:
     """Return the field of a length or an index of a sensor that is described by its optics."""
     unit, decimals, step = (MM, 3, 0.1) if name.endswith("_mm") else ("", 4, 0.01)
-    span, when = SENSOR_RANGES[name], lambda values: values.optics
-    return number(default, label, *span, unit, decimals, step=step, tip=tip, when=when)
+    span = SENSOR_RANGES[name]
+    return number(default, label, *span, unit, decimals, step=step, tip=tip, when=_opens)
+
+
+def _opens(values: SetupValues) -> bool:
+    return values.optics
+
+
+def _length(default: float, label: str, low: float, high: float, **more: Any) -> Any:
+    return number(default, label, low, high, MM, 3, step=0.1, **more)
+
+
+def _corners(default: int, label: str, **more: Any) -> Any:
+    return number(default, label, 3, 100, when=_opens, **more)
 
 
 def _pressed(source: str, default: float, label: str, tip: str = "") -> Any:
     """Return the field of a length of the object in the images of the scale."""
-    return number(
-        default, label, *PUNCH_RANGE, MM, 3, step=0.1, tip=tip, when=lambda v: v.source == source
-    )
+    return _length(default, label, *PUNCH_RANGE, tip=tip, when=lambda v: v.source == source)
 
 
 @dataclass(frozen=True)
@@ -103,6 +113,12 @@ class SetupValues:
         tr("Working diameter"),
         tr("Diameter of the circle on the membrane in which the sensor measures"),
     )
+    lens_columns: int = _corners(9, tr("Lens views: inner corners"))
+    lens_rows: int = _corners(6, tr("Lens views: inner corners vertically"), beside="x")
+    lens_square_mm: float = _length(3.0, tr("Lens views: squares"), 0.05, 500.0, when=_opens)
+    top_columns: int = _corners(9, tr("Top surface: inner corners"))
+    top_rows: int = _corners(6, tr("Top surface: inner corners vertically"), beside="x")
+    top_square_mm: float = _length(2.0, tr("Top surface: squares"), 0.05, 500.0, when=_opens)
     preset: str = choice(
         USUAL.key,
         tr("Kind of sensor"),
@@ -161,11 +177,24 @@ class SetupValues:
         example=tr("such as 40, 0, 560, 480; empty: all"),
         when=lambda v: not v.optics,
     )
+    ball_mm: float = _length(
+        2.0 * USUAL_RADIUS_MM,
+        tr("Usual ball diameter"),
+        0.1,
+        1000.0,
+        tip=tr("Diameter measured with a calliper; each press can have its own"),
+    )
 
     @property
     def source(self) -> str:
         """Where the scale comes from; empty for a sensor that is described by its optics."""
         return "" if self.optics else self.scale_from
+
+    @property
+    def boards(self) -> tuple[BoardSpec, BoardSpec]:
+        """The boards of the lens views and of the top surface."""
+        lens = BoardSpec((self.lens_columns, self.lens_rows), self.lens_square_mm)
+        return lens, BoardSpec((self.top_columns, self.top_rows), self.top_square_mm)
 
 
 def new_session(*, optics: bool = True) -> Session:
@@ -174,15 +203,25 @@ def new_session(*, optics: bool = True) -> Session:
     if not optics:
         percent = 100.0 * USUAL.mm_per_px_sd / USUAL.mm_per_px
         values = replace(values, scale=USUAL.mm_per_px, scale_sd=percent)
-    boards = BoardSpec((9, 6), 3.0), BoardSpec((9, 6), 2.0)
-    empty = Session(Path(), SensorData(""), *boards, {}, USUAL_RADIUS_MM)
+    empty = Session(Path(), SensorData(""), *values.boards, {}, None)
     return session_of(empty, values)
 
 
 def values_of(session: Session) -> SetupValues:
     """Return the values of a session."""
-    known = SetupValues(serial=session.serial, elastomer=session.elastomer)
-    stated = session.in_place
+    lens, top, stated = session.checkerboard, session.top_pose, session.in_place
+    known = SetupValues(
+        True,
+        session.serial,
+        session.elastomer,
+        lens_columns=lens.inner_corners[0],
+        lens_rows=lens.inner_corners[1],
+        lens_square_mm=lens.square_mm,
+        top_columns=top.inner_corners[0],
+        top_rows=top.inner_corners[1],
+        top_square_mm=top.square_mm,
+        ball_mm=2.0 * (session.ball_default_radius_mm or USUAL_RADIUS_MM),
+    )
     if stated is None:
         return replace(known, **asdict(session.sensor))
     pressed, (x, y) = stated.pressed_scale, stated.mm_per_px or (known.scale, known.scale)
@@ -211,7 +250,15 @@ def session_of(session: Session, values: SetupValues) -> Session:
     InputError
         If the region is not one.
     """
-    session = replace(session, elastomer=values.elastomer)
+    lens, top = values.boards
+    session = replace(
+        session,
+        elastomer=values.elastomer.strip(),
+        checkerboard=lens,
+        top_pose=top,
+        ball_default_radius_mm=0.5 * values.ball_mm,
+    )
+    values = replace(values, serial=values.serial.strip())
     if values.optics:
         data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
         return replace(session, sensor=SensorData(**data))

@@ -228,7 +228,7 @@ class ChoiceDialog(Dialog):
             parent, f"view3d.{name}.dialog", title, kinds.Save | kinds.Cancel, once=True
         )
         form = Form(value, f"view3d.{name}")
-        form.rows.setRowVisible(form.inputs["what"], not only)
+        form.show_row("what", not only)
         self.fill(form)
         self.accepted.connect(lambda: self.chosen.emit(form.value))
 

@@ -31,12 +31,16 @@ def number(
     tip: str = "",
     none: str = "",
     slider: bool = False,
+    beside: str = "",
     when: When | None = None,
 ) -> Any:
-    """Return a field with a number. `none` is the text of the lowest value."""
+    """Return a field with a number. `none` is the text of the lowest value.
+
+    With words `beside`, it follows them in the row of the field before.
+    """
     span = {"span": (low, high), "unit": unit, "decimals": decimals, "step": step}
     more = {"label": label, "tip": tip, "none": none, "slider": slider, "when": when}
-    return field(default=default, metadata=span | more)
+    return field(default=default, metadata=span | more | {"beside": beside})
 
 
 def switch(

@@ -13,6 +13,8 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QLineEdit, QW
 from app.theme.icons import icon
 from app.widgets.fields import When
 from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
+from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -62,8 +64,11 @@ class Form(QWidget, Generic[V]):
                 made, meta = self._input(f), f.metadata
                 words = (meta["label"] or meta["text"]).replace("&", "")
                 named(made, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
+                if meta.get("beside"):
+                    self._put_beside(list(self.inputs)[-1], meta["beside"], made)
+                else:
+                    self.rows.addRow(meta["label"], made)
                 self.inputs[f.name] = made
-                self.rows.addRow(meta["label"], made)
                 if meta.get("when") is not None:
                     self._when[f.name] = meta["when"]
         self.show_value(value)
@@ -82,9 +87,20 @@ class Form(QWidget, Generic[V]):
         for name, value in values.items():
             self.changed.emit(name, value)
 
+    def show_row(self, name: str, on: bool) -> None:
+        """Show or hide the row of a field."""
+        made = self.inputs[name]
+        row = made if made.parentWidget() is self else made.parentWidget()
+        self.rows.setRowVisible(row, on)
+
+    def _put_beside(self, name: str, words: str, other: QWidget) -> None:
+        made, row = self.inputs[name], QWidget()
+        self.rows.replaceWidget(made, row)
+        hbox((made, 1), PlainLabel(words), (other, 1), of=row, margins=0)
+
     def _follow(self) -> None:
         for name, when in self._when.items():
-            self.rows.setRowVisible(self.inputs[name], when(self.value))
+            self.show_row(name, when(self.value))
 
     def _input(self, f: Field[Any]) -> QWidget:
         name, meta = f.name, f.metadata
