@@ -52,7 +52,7 @@ MOST = {
     "gelpolight_core/design_check": 316,
     "gelpolight_core/export": 612,
     "gelpolight_core/factors": 187,
-    "gelpolight_core/health": 1208,
+    "gelpolight_core/health": 1209,
     "gelpolight_core/image": 383,
     "gelpolight_core/in_place": 1225,
     "gelpolight_core/io": 648,

@@ -90,7 +90,8 @@ class HealthCheck:
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
         self._limits = Limits.of(interreflection)
-        self._unmix = np.linalg.inv(np.eye(3) if crosstalk is None else crosstalk)
+        mixing = np.eye(3) if crosstalk is None else crosstalk
+        self._unmix = np.asarray(np.linalg.inv(mixing), np.float64)
         self._noise = float(calibration.noise.max())
         self._stripe = 0
         self._lock = Lock()
