@@ -136,7 +136,7 @@ class HealthCheck:
     ) -> Health:
         """Return the changes on the membrane of this sensor."""
         limits, samples = self._limits, self.samples
-        uneven = uneven_change(samples, self._change, self._square, common)
+        uneven = uneven_change(samples, self._change, common)
         shaded = uneven_finding(uneven, limits)
         if uneven is not None and shaded is not None:
             less = evened(samples, self._change, self._square, uneven.shape)
@@ -149,9 +149,9 @@ class HealthCheck:
         moved = moved_finding(common, seen_px)
         changes = light_findings(common, limits)
         gain = light_gain(common, changes, limits)
-        changes += [shaded] if shaded is not None else []
-        if uneven is not None and shaded is not None and not shaded.meaningless:
-            gain = with_shape(gain, common, uneven)
+        if uneven is not None and shaded is not None:
+            changes.append(shaded)
+            gain = None if shaded.meaningless else with_shape(gain, common, uneven)
         if moved is not None and moved.value > FOLLOWED_PX:
             # The pattern of the light has moved, too.
             changes, gain = [finding for finding in changes if finding.meaningless], None

@@ -140,14 +140,12 @@ class Uneven:
     sd: float
 
 
-def uneven_change(
-    samples: Samples, change: Array, square: Array, common: CommonChange
-) -> Uneven | None:
+def uneven_change(samples: Samples, change: Array, common: CommonChange) -> Uneven | None:
     """Fit a smooth change of the light together with the common one; None: too little to fit it.
 
     Parameters
     ----------
-    samples, change, square
+    samples, change
         As for :func:`common_change`.
     common : CommonChange
         What that has found.
@@ -170,14 +168,13 @@ def uneven_change(
     solved = inverse @ right
     centre = shapes[at].mean(axis=0)
     shape = np.concatenate([[-centre @ solved[PARAMETERS:]], solved[PARAMETERS:]])
+    share = samples.shapes @ shape
     # Around a press, interreflection makes the cells scatter by more than their noise.
-    rest, _ = evened(samples, change, square, shape)
     left = np.empty((size.size, 3))
     values = solved[:PARAMETERS].copy()
     values[:6:2] += centre @ solved[PARAMETERS:]
-    _remaining(samples.normal, rest, values, left)
-    scatter = float((size * left.mean(axis=1) ** 2)[at].mean())
-    share = samples.shapes @ shape
+    _remaining(samples.normal, change, values, left)
+    scatter = float((size * (left.mean(axis=1) - share) ** 2)[at].mean())
     worst = int(np.argmax(np.abs(share)))
     there = shapes[worst] - centre
     variance = float(there @ inverse[PARAMETERS:, PARAMETERS:] @ there)
