@@ -81,7 +81,7 @@ MOST = {
     "tests/export": 518,
     "tests/factors": 76,
     "tests/golden": 214,
-    "tests/health": 334,
+    "tests/health": 335,
     "tests/image": 128,
     "tests/in_place": 1014,
     "tests/io": 228,
