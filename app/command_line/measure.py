@@ -19,8 +19,8 @@ from app.command_line.reconstructing import (
 from app.command_line.terminal import say
 from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.health.finding import as_dict
 from gelpolight_core.io.atomic import write_json
+from gelpolight_core.light.finding import as_dict
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES

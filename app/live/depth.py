@@ -19,7 +19,7 @@ from app.sources.source import SourceInfo
 from app.workspace.gel_care import presses_text, read_presses, write_presses
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
-from gelpolight_core.health.watch import HealthWatch
+from gelpolight_core.light.watch import HealthWatch
 from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace_tally import TraceTally

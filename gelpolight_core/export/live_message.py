@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.health.finding import as_dict
+from gelpolight_core.light.finding import as_dict
 from gelpolight_core.reconstruction.height_map import FLAG_NAMES, HeightMap
 from gelpolight_core.translation import tr
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.health.judging import SIGMAS
+from gelpolight_core.light.judging import SIGMAS
 from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
 from gelpolight_core.translation import tr
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from gelpolight_core.health.finding import refuse_meaningless
+from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 

@@ -15,7 +15,7 @@ from scipy import ndimage
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.health.texture_shift import texture_shift_px
+from gelpolight_core.light.texture import texture_shift_px
 from gelpolight_core.masks import LEAST_LIGHT, lit
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.linear import as_linear, linearised

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding
-from gelpolight_core.health.finding import Health
+from gelpolight_core.light.finding import Health
 from gelpolight_core.reconstruction.trace import Trace
 
 COARSE = 4

@@ -14,8 +14,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import calibration_fault
-from gelpolight_core.health.finding import Health
-from gelpolight_core.health.samples import light_over_image
+from gelpolight_core.light.finding import Health
+from gelpolight_core.light.samples import light_over_image
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.reconstruction.checks import accepted
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding
-from gelpolight_core.health.check import HealthCheck
-from gelpolight_core.health.finding import Health, LightGain
+from gelpolight_core.light.check import HealthCheck
+from gelpolight_core.light.finding import Health, LightGain
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reconstruction.checks import condition_notes
 from gelpolight_core.reconstruction.height_map import HeightMap

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.health.judging import LED_OFF
+from gelpolight_core.light.judging import LED_OFF
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reflectance.markers import Markers, find_markers
 

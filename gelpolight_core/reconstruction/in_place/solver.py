@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.health.check import HealthCheck
-from gelpolight_core.health.finding import KEYS, Health, health_of
+from gelpolight_core.light.check import HealthCheck
+from gelpolight_core.light.finding import KEYS, Health, health_of
 from gelpolight_core.reconstruction.checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import (
     COARSE,

@@ -21,7 +21,7 @@ from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.health.finding import Health
+from gelpolight_core.light.finding import Health
 
 DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Verdict.WARN)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.health.finding import Health, health_of
+from gelpolight_core.light.finding import Health, health_of
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]

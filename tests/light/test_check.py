@@ -13,10 +13,10 @@ from scipy.ndimage import shift as moved
 
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.finding import Verdict
-from gelpolight_core.health.check import HealthCheck
-from gelpolight_core.health.finding import KEYS
-from gelpolight_core.health.fit import CommonChange
-from gelpolight_core.health.judging import dirt_finding
+from gelpolight_core.light.check import HealthCheck
+from gelpolight_core.light.finding import KEYS
+from gelpolight_core.light.fit import CommonChange
+from gelpolight_core.light.judging import dirt_finding
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
@@ -317,7 +317,7 @@ def test_a_shaded_corner_is_corrected_and_a_strong_shade_is_refused(
     # Darker to the right: the share falls along x.
     assert tilted.light.shape[1] == pytest.approx(-0.015, abs=0.003)
     assert abs(tilted.light.shape[2]) < 0.002
-    monkeypatch.setattr("gelpolight_core.health.judging.FAR_GAIN", 0.012)
+    monkeypatch.setattr("gelpolight_core.light.judging.FAR_GAIN", 0.012)
     strong = check.check(known.noisy(frame * (1.01 - 0.04 * ramp)))
     assert strong.meaningless is not None
     assert strong.meaningless.key == "uneven"

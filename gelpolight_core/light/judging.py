@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import FAR_SHARE
 from gelpolight_core.channels import channel_name
 from gelpolight_core.finding import Finding, Heights, Verdict
-from gelpolight_core.health.finding import LightGain
-from gelpolight_core.health.fit import LEAST_START, CommonChange, Uneven
-from gelpolight_core.health.movement import FOLLOWED_PX
-from gelpolight_core.health.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samples
+from gelpolight_core.light.finding import LightGain
+from gelpolight_core.light.fit import LEAST_START, CommonChange, Uneven
+from gelpolight_core.light.movement import FOLLOWED_PX
+from gelpolight_core.light.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samples
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.health.fit import CommonChange, common_change
-from gelpolight_core.health.samples import (
+from gelpolight_core.light.fit import CommonChange, common_change
+from gelpolight_core.light.samples import (
     PARAMETERS,
     SHIFT_U,
     SHIFT_V,

@@ -44,7 +44,7 @@ class LightGain:
         Standard deviations.
     shape : (6,) float64 or None
         Smooth change over the image, common to all channels, as factors of
-        :func:`~gelpolight_core.health.samples.image_shapes`; None: the same everywhere.
+        :func:`~gelpolight_core.light.samples.image_shapes`; None: the same everywhere.
     """
 
     share: NDArray[np.float64]

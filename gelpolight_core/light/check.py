@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
 from gelpolight_core.finding import Finding
-from gelpolight_core.health.finding import KEYS, Health, health_of
-from gelpolight_core.health.fit import (
+from gelpolight_core.light.finding import KEYS, Health, health_of
+from gelpolight_core.light.fit import (
     LEAST_START,
     CommonChange,
     common_change,
     evened,
     uneven_change,
 )
-from gelpolight_core.health.judging import (
+from gelpolight_core.light.judging import (
     Limits,
     bad_pixel_findings,
     blur_finding,
@@ -38,8 +38,8 @@ from gelpolight_core.health.judging import (
     uneven_finding,
     with_shape,
 )
-from gelpolight_core.health.movement import FOLLOWED_PX, movement_px
-from gelpolight_core.health.samples import PARAMETERS, Samples, compare_samples, samples_of
+from gelpolight_core.light.movement import FOLLOWED_PX, movement_px
+from gelpolight_core.light.samples import PARAMETERS, Samples, compare_samples, samples_of
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import SensorModel
 

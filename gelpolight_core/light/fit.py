@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.health.samples import PARAMETERS, Samples
+from gelpolight_core.light.samples import PARAMETERS, Samples
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -86,7 +86,7 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     samples : Samples
         The sensor's.
     change, square, full
-        From :func:`~gelpolight_core.health.samples.compare_samples`.
+        From :func:`~gelpolight_core.light.samples.compare_samples`.
     """
     # A saturated sample contains no information about the light.
     usable = full == 0.0
@@ -129,7 +129,7 @@ class Uneven:
     Attributes
     ----------
     shape : (6,)
-        Its share as factors of :func:`~gelpolight_core.health.samples.image_shapes`; 0 on average
+        Its share as factors of :func:`~gelpolight_core.light.samples.image_shapes`; 0 on average
         over the untouched part.
     largest, sd : float
         Its largest share at the cells, and the standard deviation there.
