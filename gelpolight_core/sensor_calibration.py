@@ -16,6 +16,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
 from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, worst_verdict
 from gelpolight_core.image.file import MAX_PIXELS
+from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import saturated
@@ -245,6 +246,10 @@ class SensorModel(Protocol):
     def background(self) -> Map:
         """The untouched membrane as the camera sees it, linear light on the grid."""
 
+    @property
+    def grain(self) -> Grain | None:
+        """Grain of the calibration's images; None if it was not measured."""
+
     def with_background(self, present: Map) -> SensorModel:
         """Return the data with another image of the untouched membrane, on the grid."""
 
@@ -293,6 +298,8 @@ class OpenSensor:
     lens_blur_px : float or None
         Standard deviation of the blur of lens and pixel on the top surface, in raw pixels; None in
         calibrations by programs that did not measure it.
+    grain : Grain or None
+        Grain of the ball presses' images; None in calibrations by programs that did not measure it.
 
     Raises
     ------
@@ -314,6 +321,7 @@ class OpenSensor:
     response: CameraResponse | None = None
     bad: BadPixels | None = None
     lens_blur_px: float | None = None
+    grain: Grain | None = None
 
     @property
     def serial(self) -> str:

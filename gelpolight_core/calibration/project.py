@@ -24,6 +24,7 @@ from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
+    from gelpolight_core.image.grain import Grain
     from gelpolight_core.sensor_calibration import Calibration
 
 
@@ -120,7 +121,19 @@ def assemble(
     quality = {key: table for key, table in tables.items() if table.figures}
     text = recipe.all_inputs(session, inputs or recipe.inputs(session))
     made = provenance_of(session, recipe.files(session), inputs=text)
-    return Run(recipe.finish(session, results, quality, made), session, results)
+    calibration = recipe.finish(session, results, quality, made)
+    grain = _grain_of_presses(calibration, session)
+    return Run(calibration.changed(grain=grain), session, results)
+
+
+def _grain_of_presses(calibration: Calibration, session: Session) -> Grain | None:
+    """Return the grain of the images of the ball presses, which are single frames."""
+    from gelpolight_core.image.grain import grain_of
+    from gelpolight_core.light.samples import samples_of
+
+    images, _ = session.usable_images("balls")
+    bad = calibration.data.bad_pixels
+    return grain_of([bad.left_out(i.rgb) for i in images], samples_of(calibration.data).blocks)
 
 
 @dataclass(frozen=True, slots=True)

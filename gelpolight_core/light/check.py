@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
 from gelpolight_core.finding import Finding
+from gelpolight_core.image.grain import block_grain
 from gelpolight_core.light.finding import KEYS, Health, health_of
 from gelpolight_core.light.fit import (
     LEAST_START,
@@ -23,6 +24,7 @@ from gelpolight_core.light.judging import (
     Limits,
     bad_pixel_findings,
     blur_finding,
+    compressed_finding,
     corrected,
     dark_finding,
     dirt_finding,
@@ -44,6 +46,7 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import SensorModel
 
 Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 LEAST_UNTOUCHED = 0.12
 """Share of the field that must look as at calibration; otherwise all faults are unknown."""
 BOUNDARY_CHANGE, LEAST_RIM = 0.02, 0.5
@@ -157,21 +160,27 @@ class HealthCheck:
             changes, gain = [finding for finding in changes if finding.meaningless], None
         if gain is not None:
             changes = [corrected(change) for change in changes]
-        blurred = None if moved else blur_finding(common, samples.blur_strength)
+        compressed = compressed_finding(self._lost_detail(raw, light, common.untouched))
+        # Lost detail looks like a movement and like blur.
+        detail = compressed or moved
+        blurred = None if detail else blur_finding(common, samples.blur_strength)
         if blurred is not None and blurred.meaningless and common.share < LEAST_START:
             # The texture is missing.
             return health_of([stranger_finding()], untouched=common.share)
         # Specks that have moved or become weaker are not dirt, nor is a bad line.
-        specks = moved or blurred or any(finding.key == "bad_line" for finding in pixels)
+        specks = (
+            moved or compressed or blurred or any(finding.key == "bad_line" for finding in pixels)
+        )
         found = [
             *changes,
-            moved,
+            detail,
             blurred,
             saturated_finding(full),
             None if specks else dirt_finding(samples, self._run_change, common, self._unmix),
             *pixels,
         ]
-        unknown = () if samples.blur_strength.size else ("blurred",)
+        known = {"compressed": self.calibration.grain, "blurred": samples.blur_strength.size}
+        unknown = tuple(key for key, by in known.items() if not by)
         return health_of(
             [f for f in found if f],
             unknown=unknown,
@@ -179,6 +188,14 @@ class HealthCheck:
             cells=common.change,
             light=gain,
         )
+
+    def _lost_detail(self, raw: NDArray[Any], light: Map, untouched: Mask) -> float:
+        """Return the detail that the image has lost; see :meth:`Grain.lost`."""
+        grain = self.calibration.grain
+        if grain is None or not self.samples.blocks.size:
+            return 0.0
+        seen = block_grain(raw, light, self.samples.blocks[untouched])
+        return grain.lost(seen, float((light[:, -1] - light[:, -2]).max()))
 
     def _boundary_fits(self) -> bool:
         """Return whether the boundary looks as at calibration, where a contact covers the rest."""

@@ -14,6 +14,7 @@ from gelpolight_core.finding import Finding, Verdict
 
 KEYS = (
     "dark",
+    "compressed",
     "led_off",
     "led_weak",
     "exposure",

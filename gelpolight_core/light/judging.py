@@ -290,6 +290,24 @@ def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
     return _graded("blurred", text, remedy, size > FAR_BLUR_PX, size, "px")
 
 
+def compressed_finding(lost: float) -> Finding | None:
+    """Return that fine detail of the image is lost.
+
+    Parameters
+    ----------
+    lost : float
+        Of :meth:`~gelpolight_core.image.grain.Grain.lost`.
+    """
+    if lost <= 1.0:
+        return None
+    text = tr("fine detail of the image is lost: it was compressed, resized or filtered")
+    remedy = tr(
+        "Use the camera's images as at calibration: PNG or TIFF, without noise reduction or "
+        "other processing"
+    )
+    return _graded("compressed", text, remedy, False, lost)
+
+
 def saturated_finding(share: float) -> Finding | None:
     """Return that much of the field is saturated."""
     if share < SATURATED_SHARE:

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.image.grain import block_corners
 from gelpolight_core.masks import SATURATED, lit
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.sensor_calibration import SensorModel
@@ -78,6 +79,9 @@ class Samples:
         Cell of each run.
     shapes : (cells, 6) float64
         The smooth shapes of :func:`image_shapes` at the cells.
+    blocks : (cells, 2) int32
+        Where the grain of the image is measured, as for
+        :func:`~gelpolight_core.image.grain.block_grain`.
     blur_strength : (1 + blurs,) float64
         Result of the blur fit for no blur and for `BLURS_PX`; empty if the membrane has too little
         texture.
@@ -94,6 +98,7 @@ class Samples:
     beside: Index
     run_cell: Index
     shapes: Array
+    blocks: Index
     blur_strength: Array
 
 
@@ -131,6 +136,8 @@ def samples_of(calibration: SensorModel) -> Samples:
     )  # fmt: skip
     of_sample = np.repeat(lattice.astype(np.int32), RUN)
     across = core.shape[1] // _cell_nodes(table) + 1
+    count = np.bincount(of_sample, minlength=used.size).astype(np.float64)
+    at_row, at_column = (np.bincount(of_sample, corner[:, k], used.size) / count for k in (0, 1))
     return Samples(
         corner=np.ascontiguousarray(corner, np.int32),
         part=np.ascontiguousarray(np.stack([v, u], -1) - corner, np.float32),
@@ -138,11 +145,12 @@ def samples_of(calibration: SensorModel) -> Samples:
         effects=np.ascontiguousarray(plain * weight[..., None], np.float32),
         weight=weight,
         normal=_normal(plain.astype(np.float64), weight, of_sample, used.size),
-        count=np.bincount(of_sample, minlength=used.size).astype(np.float64),
+        count=count,
         run_light=np.ascontiguousarray(expected.reshape(-1, RUN, 3).sum(axis=1).T, np.float64),
         beside=_neighbours(used, across),
         run_cell=lattice.astype(np.int32),
-        shapes=_shapes_of_cells(camera.height, camera.width, corner, of_sample, used.size),
+        shapes=image_shapes(at_row, at_column, camera.height, camera.width),
+        blocks=block_corners(np.stack([at_row, at_column], axis=-1), camera.height, camera.width),
         blur_strength=_blur_strength(base, (rows, columns), by_blur, weight)
         if textured.any()
         else np.zeros(0),
@@ -164,12 +172,6 @@ def light_over_image(shape: Array, height: int, width: int) -> Map:
     first, by_x, by_y, by_xx, by_xy, by_yy = shape.tolist()
     along = 1.0 + first + by_x * x + by_xx * x * x
     return np.asarray(along + by_y * y + by_yy * y * y + by_xy * x * y, np.float32)
-
-
-def _shapes_of_cells(height: int, width: int, corner: Index, cell: Index, cells: int) -> Array:
-    count = np.maximum(np.bincount(cell, minlength=cells), 1)
-    row, column = (np.bincount(cell, corner[:, k], minlength=cells) / count for k in (0, 1))
-    return image_shapes(row, column, height, width)
 
 
 def _blur_strength(

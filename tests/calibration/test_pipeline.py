@@ -15,6 +15,7 @@ from gelpolight_core.calibration.project import Project, assemble, calibrate
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_session
 
 
@@ -40,6 +41,20 @@ def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
     quality = calibrate(read_session(session)).calibration.quality
     assert quality["radiance"].verdict is Verdict.FAIL
     assert "whiteboard" in quality["balls"]["balls_left_out"].remedy
+
+
+def test_the_grain_of_the_ball_presses_is_in_the_calibration(small_project: Project) -> None:
+    calibration = assemble(FULL, small_project.session, small_project.results).calibration
+    grain = calibration.data.grain
+    assert grain is not None
+    assert grain.ratio == pytest.approx(1.0, abs=0.1)
+    reconstructor = Reconstructor(calibration)
+    for path in small_project.session.files("balls"):
+        seen = cv2.imread(str(path))
+        assert seen is not None
+        found = reconstructor.health(np.ascontiguousarray(seen[..., ::-1]))
+        assert "compressed" not in found.keys
+        assert "compressed" not in found.unknown
 
 
 def test_names_that_are_not_text_make_a_calibration_that_can_be_read(

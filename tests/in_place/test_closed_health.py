@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -56,6 +57,21 @@ def test_colours_in_another_order_are_refused(
 ) -> None:
     for frame in presses:
         assert reconstructor.health(frame[..., order]).keys == ("colour_order",)
+
+
+def test_a_compressed_image_is_named(
+    reconstructor: Reconstructor, presses: list[Frame], tmp_path: Path
+) -> None:
+    assert reconstructor.calibration.data.grain is not None
+    for quality in (50, 90):
+        path = str(tmp_path / f"{quality}.jpg")
+        cv2.imwrite(path, presses[0][..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+        seen = cv2.imread(path)
+        assert seen is not None
+        found = reconstructor.health(np.ascontiguousarray(seen[..., ::-1]))
+        assert found.keys == ("compressed",)
+        assert found.faults
+        assert found.meaningless is None
 
 
 def test_hot_pixels_are_named(reconstructor: Reconstructor, presses: list[Frame]) -> None:

@@ -229,7 +229,7 @@ def test_what_no_texture_shows_is_unknown_and_not_guessed() -> None:
     check = _check_of(known.calibration)
     press = known.pressed(Ball(4.0, 1.0), samples=1).frame
     found = check.check(known.noisy(np.asarray(gaussian_filter(press, (1.5, 1.5, 0)))))
-    assert found.unknown == ("blurred",)
+    assert found.unknown == ("compressed", "blurred")
     assert not found.findings
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
+from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.in_place.grid import ImageSize
@@ -37,6 +38,8 @@ class ClosedSensor:
         Name, x and y of the centre, contact radius and ball radius of each press used, in mm.
     response : CameraResponse or None
         As declared; None where images are used as they are.
+    grain : Grain or None
+        As of an open sensor.
     """
 
     serial: str
@@ -44,6 +47,7 @@ class ClosedSensor:
     noise: NDArray[np.float64]
     balls: tuple[tuple[str, float, float, float, float], ...]
     response: CameraResponse | None = None
+    grain: Grain | None = None
 
     @property
     def camera(self) -> ImageSize:

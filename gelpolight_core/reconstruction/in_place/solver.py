@@ -49,7 +49,7 @@ NOISE_REACH = 8.0
 STATED_CHANGE = 0.01
 """Change of the light that is stated: images of a closed sensor scatter by less."""
 ONE_MODE = tr("calibration in place has one mode")
-SURE = ("dark", "led_off", "colour_order", "bad_pixels", "bad_line")
+SURE = ("dark", "compressed", "led_off", "colour_order", "bad_pixels", "bad_line")
 """Faults that no press can cause."""
 STEPS = (tr("change of colour"), tr("slopes"), INTEGRATION)
 

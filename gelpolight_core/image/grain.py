@@ -1,0 +1,162 @@
+"""The grain of images: how alike neighbouring pixels are, compared with distant ones.
+
+The noise of a camera is as different between neighbours as between distant pixels. Compression,
+noise reduction, resizing and blur make neighbours alike. Other changes of the noise, by exposure,
+gain or an average over frames, change both alike.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+Map = NDArray[np.float32]
+
+FAR = 8
+"""Distance of distant pixels: side of the blocks of a compressed image."""
+BLOCK = 2 * FAR
+SIGMAS = 4.0
+"""Exceeded by chance in one of 30,000 images."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grain:
+    """Grain of single images at calibration; variances in shares of full scale squared.
+
+    Attributes
+    ----------
+    ratio : float
+        Variance of noise between neighbours over that between distant pixels; 1 for white noise.
+    near, far : float
+        What the membrane's texture adds at least to the one, and at most to the other.
+    sd : float
+        Scatter of the variance between neighbours from image to image, as a share.
+    """
+
+    ratio: float
+    near: float
+    far: float
+    sd: float
+
+    def lost(self, seen: Array, step: float) -> float:
+        """Return the variance that neighbours lack, over the most that chance explains.
+
+        Parameters
+        ----------
+        seen : (blocks, 2)
+            From :func:`block_grain`.
+        step : float
+            Between the numbers of the image, share of full scale.
+        """
+        if not len(seen):
+            return 0.0
+        expected, lacking, sd = self._lacking(seen)
+        # Rounding half a step to even numbers, with little noise, rounds neighbours alike.
+        rounding = step**2 / 8.0
+        noise = max(float(np.median(seen[:, 1])) - self.far - rounding, 0.0)
+        alike = rounding * math.exp(-((math.pi / step) ** 2) * noise)
+        return lacking / (SIGMAS * math.hypot(sd, self.sd * expected) + alike)
+
+    def _lacking(self, seen: Array) -> tuple[float, float, float]:
+        """Return the expected variance of neighbours, what they lack, and its deviation."""
+        near, far = np.median(seen, axis=0).tolist()
+        expected = self.near + self.ratio * max(far - self.far, 0.0)
+        each = seen[:, 0] - self.ratio * seen[:, 1]
+        # Half the distance of these quantiles is a standard deviation.
+        low, high = np.quantile(each, (0.16, 0.84))
+        sd = math.sqrt(0.5 * math.pi / len(each)) * 0.5 * float(high - low)
+        return expected, expected - near, sd
+
+
+def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
+    """Return the grain of images of one sensor, pressed at different places.
+
+    Parameters
+    ----------
+    images : sequence of (height, width, 3) float32
+        Linear light; at least three, otherwise None is returned.
+    corner : (blocks, 2) int32
+        As for :func:`block_grain`.
+    """
+    if len(images) < 3 or not len(corner):
+        return None
+    light = np.tile(np.linspace(-1.0, 1.0, 65536, dtype=np.float32), (3, 1))
+
+    def of(image: Map) -> Array:
+        code = np.rint((np.clip(image, -1.0, 1.0) + 1.0) * 32767.5).astype(np.uint16)
+        return block_grain(code, light, corner)
+
+    differences = [0.5 * of(after - image) for image, after in itertools.pairwise(images)]
+    noise = np.median(np.concatenate(differences), axis=0)
+    seen = [of(image) for image in images]
+    usual = np.median(np.concatenate(seen), axis=0)
+    ratio = float(noise[0] / max(noise[1], np.finfo(float).tiny))
+    offsets = [np.median(one[:, 0] - ratio * one[:, 1]) for one in seen]
+    sd = float(np.std(offsets, ddof=1))
+    unsure = SIGMAS * sd / math.sqrt(len(seen))
+    near, far = (usual - noise).tolist()
+    share = sd / max(float(usual[0]), np.finfo(float).tiny)
+    return Grain(ratio, max(near - unsure, 0.0), max(far + unsure, 0.0), share)
+
+
+def block_corners(centres: Array, height: int, width: int) -> Index:
+    """Return corners (blocks, 2) for :func:`block_grain` about centres (blocks, 2), row and column.
+
+    They are odd, because many cameras and files give two pixels the same colour. There are none in
+    an image that is hardly larger than a block.
+    """
+    most = np.array([height, width]) - BLOCK - 1
+    wanted = np.clip(np.rint(centres) - FAR, 0, most).astype(np.int32) | 1
+    return np.ascontiguousarray(wanted if most.min() > 0 else wanted[:0])
+
+
+def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
+    """Return the variance of a pixel (blocks, 2) in square parts of an image.
+
+    By differences between neighbours, and between pixels that are `FAR` apart. Smooth shading has
+    no part in them.
+
+    Parameters
+    ----------
+    raw : (height, width, 3) uint8 or uint16
+        The image.
+    light : (3, levels) float32
+        Linear light of every number.
+    corner : (blocks, 2) int32
+        Row and column of the first pixel of each part, which is `BLOCK` pixels wide.
+    """
+    found = np.empty((len(corner), 2))
+    _block_grain(raw, light, corner, found)
+    return found
+
+
+@numba.njit(nogil=True, fastmath=True, cache=True, forceinline=True)
+def _square(raw, table, r, c, apart, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    upper = table[raw[r, c, k]] - table[raw[r, c + apart, k]]
+    lower = table[raw[r + apart, c, k]] - table[raw[r + apart, c + apart, k]]
+    return (upper - lower) ** 2
+
+
+@numba.njit(nogil=True, fastmath=True, cache=True)
+def _block_grain(raw, light, corner, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    # The variance of each of four pixels, in three channels.
+    products = np.float32(4 * 3 * FAR * FAR // 2)
+    for b in range(corner.shape[0]):
+        r, c = corner[b, 0], corner[b, 1]
+        near, far = np.float32(0.0), np.float32(0.0)
+        for k in range(3):
+            table = light[k]
+            for i in range(0, FAR, 2):
+                for j in range(FAR):
+                    near += _square(raw, table, r + 2 * i, c + 2 * j, 1, k)
+                    far += _square(raw, table, r + i, c + j, FAR, k)
+        found[b, 0], found[b, 1] = near / products, far / products
