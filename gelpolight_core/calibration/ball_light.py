@@ -13,8 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView
-from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.calibration.ball_pixels import BallPixels
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.draped_ball import draped_ball
@@ -22,8 +21,8 @@ from gelpolight_core.reflectance.gathered_light import (
     Receivers,
     Slab,
     Surface,
+    flat_light,
     gathered,
-    returned_to_flat,
 )
 from gelpolight_core.reflectance.membrane import Membrane
 
@@ -56,13 +55,23 @@ def with_light_from_around(
     if not pixels:
         return []
     view = pixels[0].view_of_field
-    flat, returned = flat_light(view, leds_mm, membrane, slab)
+    shape = view.reflecting.shape
+    points = np.concatenate([view.points_mm, np.zeros((len(view.points_mm), 1))], axis=1)
+    facets = points.reshape(*shape, 3)
+    flat, returned = flat_light(
+        facets.reshape(*shape, 3),
+        view.view,
+        view.reflecting,
+        leds_mm,
+        membrane,
+        view.pitch_mm,
+        slab,
+    )
     background = flat + membrane.interreflection * returned
 
     def lit(pair: tuple[BallPixels, BallPose]) -> BallPixels:
         own, ball = pair
         surface, normals, _ = draped_ball(view.points_mm, view.ray_slope, ball, decay_mm=decay_mm)
-        shape = view.reflecting.shape
         field = Surface(
             surface.reshape(*shape, 3),
             normals.reshape(*shape, 3),
@@ -78,36 +87,6 @@ def with_light_from_around(
         return replace(own, around=found / level, around_flat=_at(returned, place) / level)
 
     return list(in_parallel(lit, list(zip(pixels, balls, strict=True))))
-
-
-def flat_light(
-    view: CoarseView, leds_mm: Array, membrane: Membrane, slab: Slab
-) -> tuple[Array, Array]:
-    """Return direct light of the flat membrane, and what a lower face returns, (..., 3) each.
-
-    In units of :meth:`Membrane.response` times z / r^3; the membrane absorbs nothing.
-
-    Parameters
-    ----------
-    view : CoarseView
-        The field.
-    leds_mm, membrane, slab
-        As in :func:`with_light_from_around`.
-    """
-    shape = view.reflecting.shape
-    points = np.concatenate([view.points_mm, np.zeros((len(view.points_mm), 1))], axis=1)
-    light, distance = light_directions(leds_mm, points)
-    up = np.tile([0.0, 0.0, -1.0], (len(points), 1))
-    bright = membrane.response(light, up, view.view.reshape(-1, 3))
-    flat = (-bright * light[..., 2] / distance**2).reshape(*shape, 3)
-    grid, returned = points.reshape(*shape, 3), np.zeros_like(flat)
-    for _ in range(2):
-        seen = (flat + membrane.interreflection * returned) * view.reflecting[..., None]
-        returned = np.asarray(
-            returned_to_flat(seen, grid, view.view, leds_mm, membrane, view.pitch_mm, slab),
-            np.float64,
-        )
-    return flat, returned
 
 
 def _at(values: Array, place: Array) -> Array:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reconstruction.near_light.maps import block_average, middles
 from gelpolight_core.reflectance.gathered_light import ratio_reflected
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
 from gelpolight_core.reflectance.surroundings import view_directions
@@ -59,12 +59,9 @@ class CoarseView:
         """Return the coarse view of a table's grid with its reflecting nodes (rows, columns)."""
         grid = table.grid
         factor = max(round(FIELD_PITCH_MM / grid.pitch_mm), 1)
-        share = block_means(reflecting.astype(np.float32), factor)
-        ray_slope = np.nan_to_num(block_means(table.ray_slope, factor)).astype(np.float64)
-        x, y = (
-            axis[: axis.size // factor * factor].reshape(-1, factor).mean(axis=1)
-            for axis in (grid.x_mm, grid.y_mm)
-        )
+        share = block_average(reflecting.astype(np.float32), factor)
+        ray_slope = np.nan_to_num(block_average(table.ray_slope, factor)).astype(np.float64)
+        x, y = (middles(axis, factor) for axis in (grid.x_mm, grid.y_mm))
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         pitch = factor * grid.pitch_mm
         return cls(
@@ -74,13 +71,6 @@ class CoarseView:
     def index(self, points_mm: Array) -> Array:
         """Return row and column (N, 2) of points (N, 2)."""
         return np.asarray((points_mm - self.points_mm[0])[:, ::-1] / self.pitch_mm)
-
-
-def block_means(values: NDArray[Any], factor: int) -> Map:
-    """Return means over blocks of nodes."""
-    rows, columns = (n // factor for n in values.shape[:2])
-    whole = np.ascontiguousarray(values[: rows * factor, : columns * factor], np.float32)
-    return np.asarray(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA))
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +135,8 @@ def gather_ball_pixels(
     grid = table.grid
     base = np.maximum(background, LEAST_VALUE)
     ratio = np.asarray(image / base, np.float32)
-    whole = block_means(usable.astype(np.float32), view.factor)[..., None] > 0.99
-    seen = np.minimum(block_means(ratio, view.factor), np.float32(MOST_RATIO))
+    whole = block_average(usable.astype(np.float32), view.factor)[..., None] > 0.99
+    seen = np.minimum(block_average(ratio, view.factor), np.float32(MOST_RATIO))
     field = ratio_reflected(seen, whole, view.reflecting)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))

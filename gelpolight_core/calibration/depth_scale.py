@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
-from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.height_map import COARSE
@@ -39,6 +38,7 @@ from gelpolight_core.reconstruction.near_light.structures import (
 )
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
+from gelpolight_core.reflectance.membrane import UP
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 
@@ -217,24 +217,17 @@ def _shaded(
 ) -> tuple[Map, Map]:
     """Return press over background, and the interreflected light in it."""
     points, rays, position, depth, normals = seen
-    view = view_directions(rays)
-    flat = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
-    light, distance = light_directions(
-        full.led_positions_mm, np.concatenate([position, -depth[:, None]], axis=1)
-    )
-    flat_light, flat_distance = light_directions(full.led_positions_mm, flat)
-    up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
-    direct = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
-    direct *= full.membrane.response(light, normals, view)
-    direct /= full.membrane.response(flat_light, up, view)
-    shape = usable.shape
+    view, shape = view_directions(rays), usable.shape
+    leds, place = full.led_positions_mm, np.concatenate([position, -depth[:, None]], axis=1)
+    flat = direct_flat(full, points, view)
+    direct = -full.membrane.direct(leds, place, normals, view) / flat
+    flat = flat.reshape(*shape, 3)
     around, seen_as = np.zeros((*shape, 3)), np.zeros((*shape, 3))
-    flat = direct_flat(full, flat_light, flat_distance, view).reshape(*shape, 3)
     for _ in range(THROWN if full.membrane.interreflection > LEAST_SHARE else 1):
         # Reflected light is reflected again.
         seen_as = direct.reshape(*shape, 3) + around
         surface = Surface(
-            np.concatenate([position, -depth[:, None]], axis=1).reshape(*shape, 3),
+            place.reshape(*shape, 3),
             normals.reshape(*shape, 3),
             view.reshape(*shape, 3),
             seen_as * flat * usable[..., None],
@@ -243,10 +236,10 @@ def _shaded(
     return np.where(usable[..., None], seen_as, 1.0).astype(np.float32), around.astype(np.float32)
 
 
-def direct_flat(full: FullModel, light: Array, distance: Array, view: Array) -> Array:
-    """Return the flat membrane's brightness (N, 3) in units of `Surface.seen`."""
-    up = np.broadcast_to([0.0, 0.0, -1.0], view.shape)
-    return np.asarray(-full.membrane.response(light, up, view) * light[..., 2] / distance**2)
+def direct_flat(full: FullModel, points_mm: Array, view: Array) -> Array:
+    """Return the brightness (N, 3) of points (N, 2) of the flat membrane, as `Surface.seen`."""
+    flat = np.concatenate([points_mm, np.zeros_like(points_mm[:, :1])], axis=1)
+    return -full.membrane.direct(full.led_positions_mm, flat, np.array(UP), view)
 
 
 def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> Array:

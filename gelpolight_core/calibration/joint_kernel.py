@@ -42,7 +42,7 @@ def _rise(bumps, heights, k, cosine, flat_cosine):  # type: ignore[no-untyped-de
 def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     pixels, seen, leds, lobes, heights, bumps, no_curves, reflectance, result
 ):
-    """Write residuals, those of direct light alone, cosines and flat cosines (4, N, 3).
+    """Write the weighted residuals (N, 3) of a press.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         Diffuse curves of the two-lobe membrane, which has none.
     reflectance : float
         For interreflected light.
-    result : (4, N, 3)
+    result : (N, 3)
         Written.
     """
     points, view, ratio, weight, around, around_flat = pixels
@@ -89,7 +89,4 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             # The background also contains interreflected light.
             direct /= 1.0 + reflectance * around_flat[i, k]
             more = reflectance * around[i, k] / (1.0 + reflectance * around_flat[i, k])
-            result[0, i, k] = (direct + more - ratio[i, k]) * scale
-            result[1, i, k] = direct * scale
-            result[2, i, k] = cosine
-            result[3, i, k] = flat_cosine
+            result[i, k] = (direct + more - ratio[i, k]) * scale

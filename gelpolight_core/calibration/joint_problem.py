@@ -41,14 +41,6 @@ _BUMPS = _bumps()
 _NO_CURVES = np.zeros((3, 0))
 
 
-def curve_terms(cosine: Array) -> Array:
-    """Return the spline's terms at cosines (...), (..., nodes - 1)."""
-    position = np.clip(cosine, 0.0, 1.0) * (CURVE_NODES - 1)
-    below = np.minimum(position.astype(np.int64), CURVE_NODES - 2)
-    share = (position - below)[..., None]
-    return np.asarray(_BUMPS[below] * (1.0 - share) + _BUMPS[below + 1] * share)
-
-
 def diffuse_curves(heights: Array) -> tuple[tuple[float, ...], ...]:
     """Return a membrane's diffuse curves from the spline's heights (`CURVE_SIZE`,)."""
     even = np.linspace(0.0, 1.0, CURVE_NODES)
@@ -91,7 +83,7 @@ class Problem:
     def residuals(self, x: Array, surfaces: Sequence[Surface] | None = None) -> list[Array]:
         """Return the weighted residuals of each press, (3 N,); on known surfaces if given."""
         seen = self._surfaces(x) if surfaces is None else surfaces
-        return [self._press(x, i, surface)[0].ravel() for i, surface in enumerate(seen)]
+        return [self._press(x, i, surface).ravel() for i, surface in enumerate(seen)]
 
     def _surfaces(self, x: Array) -> list[Surface]:
         """Return the visible points and normals (N, 3) of each ball, and where it is in contact."""
@@ -105,10 +97,10 @@ class Problem:
             )
         return seen
 
-    def _press(self, x: Array, index: int, seen: Surface) -> tuple[Array, Array, Array, Array]:
-        """Return residuals, those from direct light alone, and its cosines, (N, 3)."""
+    def _press(self, x: Array, index: int, seen: Surface) -> Array:
+        """Return the weighted residuals of a press, (N, 3)."""
         pixels = self.presses[index]
-        result = np.empty((4, *pixels.ratio.shape))
+        result = np.empty(pixels.ratio.shape)
         model_press(
             (
                 pixels.points_mm,
@@ -127,7 +119,7 @@ class Problem:
             float(x[12]),
             result,
         )
-        return result[0], result[1], result[2], result[3]
+        return result
 
     def priors(self, x: Array) -> Array:
         """Return the residuals of the prior knowledge."""
@@ -152,8 +144,8 @@ class Problem:
     def jacobian(self, x: Array) -> Array:
         """Return the Jacobian by finite differences, with as few evaluations as possible.
 
-        A light affects only its own channel, and a ball's parameters only its own press, so one
-        coordinate of all lights, or of all balls, is moved at the same time.
+        A light or a curve affects only its own channel, and a ball's parameters only its own press,
+        so one coordinate of all lights, curves, or balls is moved at the same time.
         """
         surfaces = self._surfaces(x)
         base = self.residuals(x, surfaces)
@@ -181,21 +173,14 @@ class Problem:
         for alone in (9 + np.flatnonzero(self.free[9:COMMON])).tolist():
             for _, rows, slope in slopes([alone], None if alone == DECAY else surfaces):
                 result[rows, alone] = slope
-        for j in np.flatnonzero(self.free[:COMMON]):
+        for j in np.flatnonzero(self.free):
             moved = x.copy()
             moved[j] += _STEP
             result[ends[-1] :, j] = (self.priors(moved) - prior) / _STEP
-        if self.free[self.balls_end :].any():
-            for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
-                result[start:end, self.balls_end :] = self._curve_slopes(x, i, surfaces[i])
-            result[-CURVE_SIZE:, self.balls_end :] = np.eye(CURVE_SIZE) / CURVE_SD
+        terms = CURVE_SIZE // 3
+        for term in range(terms if self.free[self.balls_end :].any() else 0):
+            of_light = self.balls_end + term + terms * np.arange(3)
+            for _, rows, slope in slopes(of_light.tolist(), surfaces):
+                for k in range(3):
+                    result[rows, of_light[k]][k::3] = slope[k::3]
         return result
-
-    def _curve_slopes(self, x: Array, index: int, seen: Surface) -> Array:
-        """Return the derivatives of one press's residuals by the curve heights, in closed form."""
-        _, direct, cosine, flat_cosine = self._press(x, index, seen)
-        rise = (curve_terms(cosine) - curve_terms(flat_cosine)) * direct[..., None]
-        slopes = np.zeros((*direct.shape, 3, rise.shape[-1]))
-        for k in range(3):
-            slopes[:, k, k] = rise[:, k]
-        return slopes.reshape(direct.size, -1)

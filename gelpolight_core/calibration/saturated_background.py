@@ -14,7 +14,6 @@ from scipy.ndimage import find_objects, label
 
 from gelpolight_core.calibration.depth_scale import direct_flat
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import lit, saturated
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.surroundings import view_directions
@@ -96,13 +95,10 @@ def _filled_light(
 
 def _flat(full: FullModel, x_mm: Array, y_mm: Array, ray_slope: NDArray[np.floating]) -> Map:
     """Return the flat membrane's brightness (rows, columns, 3) by the model."""
-    x, y = np.meshgrid(x_mm, y_mm)
-    points = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-    view = view_directions(np.nan_to_num(ray_slope).astype(np.float64)).reshape(-1, 3)
-    directions, distance = light_directions(full.led_positions_mm, points)
-    return np.asarray(direct_flat(full, directions, distance, view), np.float32).reshape(
-        *x.shape, 3
-    )
+    points = np.stack(np.meshgrid(x_mm, y_mm), axis=-1)
+    view = view_directions(np.nan_to_num(ray_slope).astype(np.float64))
+    flat = direct_flat(full, points.reshape(-1, 2), view.reshape(-1, 3))
+    return np.asarray(flat, np.float32).reshape(view.shape)
 
 
 def _evened(values: Map, known: Mask, pitch_mm: float) -> Map:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.optics.refraction import LayerStack
-from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.membrane import UP, Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
 
 Map = NDArray[np.float32]
@@ -249,9 +249,7 @@ def returned_to_flat(
         As in :func:`gathered`.
     """
     rows, columns = flat.shape[:2]
-    up = np.zeros_like(view)
-    up[..., 2] = -1.0
-    surface = Surface(points_mm, up, view, flat)
+    surface = Surface(points_mm, np.broadcast_to(UP, view.shape), view, flat)
     step = 2 * WIDE
     where = np.zeros((rows, columns), bool)
     where[::step, ::step] = True
@@ -261,6 +259,33 @@ def returned_to_flat(
     return np.asarray(
         cv2.remap(some, at[0], at[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     )
+
+
+def flat_light(
+    points_mm: NDArray[np.float64],
+    view: NDArray[np.float64],
+    reflecting: NDArray[np.floating],
+    leds_mm: NDArray[np.float64],
+    membrane: Membrane,
+    side_mm: float,
+    slab: Slab,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return direct light of the flat membrane, and what a lower face returns, (..., 3) each.
+
+    Parameters
+    ----------
+    points_mm, view, leds_mm, membrane, side_mm, slab
+        As in :func:`gathered`; what returns is that of a membrane that absorbs nothing.
+    reflecting : (rows, columns)
+        Share of each facet that reflects light.
+    """
+    direct = -membrane.direct(leds_mm, points_mm, np.array(UP), view)
+    returned = np.zeros_like(direct)
+    for _ in range(2):
+        seen = (direct + membrane.interreflection * returned) * reflecting[..., None]
+        more = returned_to_flat(seen, points_mm, view, leds_mm, membrane, side_mm, slab)
+        returned = np.asarray(more, np.float64)
+    return direct, returned
 
 
 def widened(surface: Surface) -> Surface:

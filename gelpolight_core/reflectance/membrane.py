@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.reflectance.membrane_kernel import brightness_of_points
 
 Array = NDArray[np.float64]
@@ -20,6 +21,8 @@ MEMBRANES = ("two-lobe", "one-dimensional")
 # With this number of even cosines, linear interpolation is accurate to 1e-5 for any fitted or
 # edited curve.
 CURVE_NODES = 257
+UP = (0.0, 0.0, -1.0)
+"""Normal of the flat membrane."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,3 +105,18 @@ class Membrane:
         )
         brightness_of_points(light, normals, view, lobes, self.curves, result)
         return result
+
+    def direct(self, leds_mm: Array, points_mm: Array, normals: Array, view: Array) -> Array:
+        """Return the direct light of points (..., 3), below 0 as the LEDs' z.
+
+        Parameters
+        ----------
+        leds_mm : (3, 3)
+            Sensor frame.
+        points_mm, normals, view : (..., 3)
+            Sensor frame; unit normals, and unit directions to the camera.
+        """
+        light, distance = light_directions(leds_mm, points_mm.reshape(-1, 3))
+        normals = np.broadcast_to(normals, points_mm.shape).reshape(-1, 3)
+        response = self.response(light, normals, view.reshape(-1, 3))
+        return np.asarray((response * light[..., 2] / distance**2).reshape(points_mm.shape))

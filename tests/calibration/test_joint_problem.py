@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView
-from gelpolight_core.calibration.joint_problem import COMMON, CURVE_SIZE, Problem
+from gelpolight_core.calibration.joint_problem import CURVE_SIZE, Problem
 
 STEP = 1e-4
 # Light from around is given: none is gathered.
@@ -49,6 +49,4 @@ def test_slopes_are_those_of_moving_every_parameter_alone(curves: bool) -> None:
     alone = np.stack([(found.all(x + d) - found.all(x)) / STEP for d in STEP * np.eye(x.size)], 1)
     slopes = found.jacobian(x)
     size = np.abs(alone).max(axis=0)
-    # The derivatives by the curves have a closed form, the others use the same steps.
-    assert np.abs(slopes - alone)[:, : COMMON + 6].max() < 1e-9 * size.max()
-    assert (np.abs(slopes - alone).max(axis=0) <= 2e-3 * size).all()
+    assert (np.abs(slopes - alone).max(axis=0) <= 1e-9 * size.max()).all()

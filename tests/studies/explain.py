@@ -23,7 +23,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps, brightness
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.region_solver import SolvedRegion
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
 from gelpolight_core.reconstruction.solver import Wanted
@@ -209,7 +209,7 @@ def _light_at(maps: SensorMaps, truth: TrueDepth, solved: SolvedRegion) -> np.nd
     points, normals = view.points_mm[thinned], view.normals[thinned]
     lit = lit_by(truth, view, leds)[thinned]
     view_to = view_directions(ray_slope[thinned])
-    direct = -brightness(full, points, normals, view_to) / flat[thinned]
+    direct = -full.membrane.direct(full.led_positions_mm, points, normals, view_to) / flat[thinned]
     light, _ = light_directions(leds, points)
     tilted = np.einsum("nkc,nc->nk", light, normals) > -light[..., 2]
     side = np.where(lit, np.where(tilted, 0, 1), 2)

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import DARK_COSINE, reflects_light, usable
 from gelpolight_core.reconstruction.height_map import COARSE, Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
 from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers, Scale
-from gelpolight_core.reflectance.gathered_light import Slab, returned_to_flat
-from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+from gelpolight_core.reflectance.gathered_light import Slab, flat_light
+from gelpolight_core.reflectance.membrane import CURVE_NODES, UP, Membrane
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 
@@ -283,36 +282,15 @@ def _flat_brightness(
     shape, membrane = (y.size, x.size), full.membrane
     view = view_directions(np.moveaxis(ray_slope, 0, -1))
     points = np.stack([*np.meshgrid(x, y), np.zeros(shape)], axis=-1)
-    flat = direct = brightness(full, points, np.broadcast_to([0.0, 0.0, -1.0], points.shape), view)
-    if returned is not None and membrane.interreflection > LEAST_SHARE:
+    if returned is None or membrane.interreflection <= LEAST_SHARE:
+        flat = membrane.direct(full.led_positions_mm, points, np.array(UP), view)
+    else:
         (slab, reflecting), pitch = returned, float(x[1] - x[0])
-        for _ in range(2):
-            more = returned_to_flat(
-                -flat * reflecting[..., None],
-                points,
-                view,
-                full.led_positions_mm,
-                membrane,
-                pitch,
-                slab,
-            )
-            flat = direct - membrane.interreflection * more
+        direct, more = flat_light(
+            points, view, reflecting, full.led_positions_mm, membrane, pitch, slab
+        )
+        flat = -direct - membrane.interreflection * more
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0), np.float32)
-
-
-def brightness(full: FullModel, points_mm: Array, normals: Array, view: Array) -> Array:
-    """Return the direct light of points (rows, columns, 3), below 0 as the LEDs' z.
-
-    Parameters
-    ----------
-    full : FullModel
-        Lights and membrane.
-    points_mm, normals, view : (rows, columns, 3)
-        Sensor frame; unit normals, and unit directions to the camera.
-    """
-    light, distance = light_directions(full.led_positions_mm, points_mm.reshape(-1, 3))
-    response = full.membrane.response(light, normals.reshape(-1, 3), view.reshape(-1, 3))
-    return np.asarray((response * light[..., 2] / distance**2).reshape(points_mm.shape))
 
 
 def block_average(values: NDArray[Any], factor: int) -> Map:

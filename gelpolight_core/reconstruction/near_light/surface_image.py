@@ -18,7 +18,7 @@ from gelpolight_core.reconstruction.height_map import (
     surface_slopes,
 )
 from gelpolight_core.reconstruction.near_light.from_around import CLEAR, FromAround, meeting
-from gelpolight_core.reconstruction.near_light.maps import SensorMaps, brightness
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.solver import thinned
 from gelpolight_core.reflectance.surroundings import view_directions
@@ -98,4 +98,8 @@ def _lit(
     flat = np.dstack([*np.meshgrid(x_mm, y_mm), np.zeros(depth.shape)])
     points = flat + depth[..., None] * np.dstack([ray_slope, -np.ones(depth.shape)])
     view = view_directions(np.asarray(ray_slope, np.float64))
-    return depth, normals, brightness(full, points, normals.astype(np.float64), view)
+    return (
+        depth,
+        normals,
+        full.membrane.direct(full.led_positions_mm, points, normals.astype(np.float64), view),
+    )
