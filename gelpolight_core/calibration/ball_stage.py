@@ -62,20 +62,24 @@ class SeenBall:
         The ball; None if none was found.
     fault : InputError or None
         Why no ball was found.
+    cells : (rows, columns, 3) float32 or None
+        Light of the untouched part; None if the image cannot be used.
     """
 
     file: str
     key: str
-    image: Map | None
-    press: BallPress | None
-    fault: InputError | None
+    image: Map | None = None
+    press: BallPress | None = None
+    fault: InputError | None = None
+    cells: Map | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Balls:
-    """What was found in the images of ball presses."""
+    """What was found in the images of ball presses, and what they say of the background."""
 
     seen: tuple[SeenBall, ...]
+    background: tuple[Finding, ...] = ()
 
     @property
     def presses(self) -> tuple[BallPress, ...]:
@@ -88,8 +92,8 @@ class Balls:
         return tuple(ball.image for ball in self.seen if ball.image is not None)
 
     @property
-    def left_out(self) -> QualityTable:
-        """Which captures were left out, and why."""
+    def together(self) -> QualityTable:
+        """Which captures were left out, and why; figures of all of them together."""
         refused = [
             pattern(
                 "{file}: {found}. {advice}",
@@ -100,13 +104,14 @@ class Balls:
             for ball in self.seen
             if ball.fault is not None
         ]
-        return QualityTable((judge_left_out("balls_left_out", tr("Captures left out"), refused),))
+        left_out = judge_left_out("balls_left_out", tr("Captures left out"), refused)
+        return QualityTable((left_out, *self.background))
 
     @property
     def quality(self) -> QualityTable:
         """What was left out, and of each figure of the presses the worst."""
         worst = worst_figures([press.quality for press in self.presses])
-        return QualityTable((*self.left_out.figures, *worst))
+        return QualityTable((*self.together.figures, *worst))
 
 
 def worst_figures(tables: Sequence[QualityTable]) -> tuple[Finding, ...]:
@@ -126,7 +131,7 @@ def _require_balls(results: Results) -> None:
     balls = results[BALLS]
     if balls.presses:
         return
-    for figure in results[BACKGROUND].quality.figures:
+    for figure in (*balls.background, *results[BACKGROUND].quality.figures):
         if figure.verdict is Verdict.FAIL:
             raise InputError(
                 tr("No ball was found with this background ({label}: {value:.1f} {unit})").format(
@@ -142,6 +147,7 @@ def _require_balls(results: Results) -> None:
 
 def _run_balls(work: Work) -> Balls:
     """Find the ball in each image; those found earlier from the same inputs are used again."""
+    from gelpolight_core.calibration.untouched import cells_of, judge_background
     from gelpolight_core.lights.crosstalk import unmix
     from gelpolight_core.parallel import in_parallel
 
@@ -164,10 +170,14 @@ def _run_balls(work: Work) -> Balls:
         for found in seen:
             work.progress(len(balls) / len(files))
             balls.append(found)
-    return Balls(tuple(balls))
+    table = work[TOP_POSE].table
+    untouched = [ball.cells for ball in balls if ball.cells is not None]
+    agreement = judge_background(cells_of(work[BACKGROUND].light, table), untouched, table)
+    return Balls(tuple(balls), agreement)
 
 
 def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) -> SeenBall:
+    from gelpolight_core.calibration.untouched import cells_of
     from gelpolight_core.lights.crosstalk import unmix
     from gelpolight_core.reflectance.press import find_ball
     from gelpolight_core.sensor_calibration import sensor_stack
@@ -175,7 +185,7 @@ def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) ->
 
     lens, lights, top = work[LENS], work[LIGHTS], work[TOP_POSE]
     radius_mm, plane = session.ball_radius_mm(path.name), top.pose.plane
-    placed = session.decisions.balls.get(path.name)
+    placed, seen = session.decisions.balls.get(path.name), None
     try:
         image = session.image(path)
         require_colour(image, where=str(path))
@@ -196,8 +206,9 @@ def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) ->
             placed=contact,
         )
     except InputError as fault:
-        return SeenBall(path.name, key, None, None, fault)
-    return SeenBall(path.name, key, seen, press, None)
+        cells = None if seen is None else cells_of(seen, top.table)
+        return SeenBall(path.name, key, fault=fault, cells=cells)
+    return SeenBall(path.name, key, seen, press, cells=cells_of(seen, top.table, press))
 
 
 def placed_contact(
@@ -246,7 +257,7 @@ BALLS = Stage(
         Table(
             "balls",
             tr("Ball presses"),
-            lambda balls: balls.left_out,
+            lambda balls: balls.together,
             tr("Finds the pressed balls, whose slopes are known"),
         ),
     ),

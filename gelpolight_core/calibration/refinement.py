@@ -27,6 +27,7 @@ from gelpolight_core.calibration.open_sensor import (
 )
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.saturated_background import beyond_saturation
+from gelpolight_core.calibration.untouched import FAIL_PERCENT, WARN_PERCENT
 from gelpolight_core.finding import Finding, QualityTable, judge
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import reflects_light
@@ -51,10 +52,8 @@ near windows change, besides the reflectance."""
 LEAST_CONTACT_PX = 24.0
 """Median radius of the contacts from which on they show the balls' radii: within 0.5 % at 22 pixels
 and more, but 8 % off at 18."""
-MOST_HEIGHT_ERROR = 4.0
-"""Percent of height from which on a calibration fails: half of the error of the paper's method."""
-RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 3.0, MOST_HEIGHT_ERROR / HEIGHT_BY_RADIUS
-"""Of all ball radii; the larger one makes heights wrong by `MOST_HEIGHT_ERROR`."""
+RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 3.0, FAIL_PERCENT / HEIGHT_BY_RADIUS
+"""Of all ball radii; the larger one makes heights wrong by `FAIL_PERCENT`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,8 +295,8 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
             tr("Height error of reconstructed ball presses"),
             100.0 * scale.balls,
             "%",
-            warn=2.0,
-            fail=MOST_HEIGHT_ERROR,
+            warn=WARN_PERCENT,
+            fail=FAIL_PERCENT,
             remedy=lengths,
         ),
         judge(
@@ -305,8 +304,8 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
             tr("Height uncertainty from the calibration"),
             100.0 * scale.depth,
             "%",
-            warn=2.0,
-            fail=MOST_HEIGHT_ERROR,
+            warn=WARN_PERCENT,
+            fail=FAIL_PERCENT,
             # More balls reduce scatter, but not an error common to all heights.
             remedy=lengths if stated_wrong else tr("Press more balls at more positions"),
         ),
