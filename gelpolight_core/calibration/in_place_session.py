@@ -158,11 +158,17 @@ def find_slopes(
     grid, sd = stated_grid(stated, background.size), stated.mm_per_px_sd
     scale_sd = STATED_SCALE_SD if sd is None else sd / grid.mm_per_px
     presses, unreadable = _presses(session, background)
+    noise = _noise(grid.cut(background.rgb))
     result = calibrate_in_place(
-        background.rgb, presses, grid, scale_sd=scale_sd, towards=towards, progress=progress
+        background.rgb,
+        presses,
+        grid,
+        noise=noise,
+        scale_sd=scale_sd,
+        towards=towards,
+        progress=progress,
     )
-    result = replace(result, refused={**result.refused, **unreadable})
-    return Slopes(result, _noise(grid.cut(background.rgb)))
+    return Slopes(replace(result, refused={**result.refused, **unreadable}), noise)
 
 
 def in_place_calibration(

@@ -38,8 +38,9 @@ from gelpolight_core.in_place.held_out import (
     held_out_presses,
 )
 from gelpolight_core.in_place.next_ball import learning_curve, next_position
+from gelpolight_core.in_place.press_light import press_lights
 from gelpolight_core.in_place.roundness import Stretch, stretch_of
-from gelpolight_core.in_place.same_view import refuse_other_view
+from gelpolight_core.light.usual import changes_of
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reconstruction.in_place.change import (
     SMOOTHING_NODES,
@@ -164,6 +165,7 @@ def calibrate_in_place(
     presses: Sequence[PressImage],
     grid: WorkingGrid,
     *,
+    noise: Array,
     scale_sd: float = 0.0,
     towards: Array | None = None,
     progress: Callable[[float], None] | None = None,
@@ -178,6 +180,8 @@ def calibrate_in_place(
         Images of pressed balls.
     grid : WorkingGrid
         Nodes and scale.
+    noise : (3,)
+        Standard deviation of a pixel of a single image.
     scale_sd : float, optional
         Relative standard deviation of the scale.
     towards : (terms, 2), optional
@@ -189,15 +193,16 @@ def calibrate_in_place(
     ------
     InputError
         If fewer than 3 images show a ball that agrees with the others, or the background is of
-        another gel, crop or exposure.
+        another gel, crop or sensor.
     """
     say = progress or (lambda _share: None)
     reduced = grid.reduce(background)
     base = reference(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
-    refuse_other_view(images, reduced)
     refuse_dead_channel(images, reduced)
-    found, refused = _begin(presses, images, base, grid, say)
+    lights = press_lights([press.rgb for press in presses], grid, reduced, noise)
+    gains = [1.0 + common.gain for common, _ in lights]
+    found, refused = _begin(presses, images, gains, base, grid, say)
     stretch = stretch_of([press.stretches for press in found])
     sums, ridge = _sums(found), FIRST_RIDGE
     for turn in range(ROUNDS):
@@ -224,6 +229,13 @@ def calibrate_in_place(
         max(map(_steepest, balls)),
         error_curve(held_out, pitch_mm=grid.pitch_mm),
         scale_sd=scale_sd,
+        press_light=np.array(
+            [
+                changes_of(*light)
+                for press, light in zip(presses, lights, strict=True)
+                if press.name not in refused
+            ]
+        ),
     )
     say(1.0)
     return InPlaceResult(
@@ -264,14 +276,15 @@ def contact_in(image: Map, base: Reference, *, radius: float, name: str) -> Inde
 def _begin(
     presses: Sequence[PressImage],
     images: Sequence[Map],
+    gains: Sequence[Array],
     base: Reference,
     grid: WorkingGrid,
     say: Callable[[float], None],
 ) -> tuple[list[_Press], dict[str, InputError]]:
     """Find the contact in each reduced image; return the presses, and why others are refused."""
 
-    def find(item: tuple[PressImage, Map]) -> _Press | InputError:
-        press, image = item
+    def find(item: tuple[PressImage, Map, Array]) -> _Press | InputError:
+        press, image, gain = item
         radius = press.radius_mm / grid.pitch_mm
         stretches: tuple[float, ...] = ()
         try:
@@ -283,11 +296,11 @@ def _begin(
         except InputError as fault:
             return fault
         ball = Ball(edge.x, edge.y, edge.radius, radius).limited()
-        return _Press(press.name, colour_change(image, base), ball, ball, stretches)
+        return _Press(press.name, colour_change(image, base, gain), ball, ball, stretches)
 
     found: list[_Press] = []
     refused: dict[str, InputError] = {}
-    with closing(in_parallel(find, list(zip(presses, images, strict=True)))) as contacts:
+    with closing(in_parallel(find, list(zip(presses, images, gains, strict=True)))) as contacts:
         for index, (press, contact) in enumerate(zip(presses, contacts, strict=True)):
             say(0.3 * (index + 1) / len(presses))
             if isinstance(contact, InputError):

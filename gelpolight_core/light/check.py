@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing, isolated_pixels
 from gelpolight_core.finding import Finding
 from gelpolight_core.image.grain import block_grain
-from gelpolight_core.light.finding import KEYS, Health, health_of
+from gelpolight_core.light.finding import KEYS, Health, LightGain, health_of
 from gelpolight_core.light.fit import (
     LEAST_START,
     CommonChange,
+    Uneven,
     common_change,
     evened,
+    scatter_of_cells,
     uneven_change,
 )
 from gelpolight_core.light.judging import (
@@ -42,6 +44,7 @@ from gelpolight_core.light.judging import (
 )
 from gelpolight_core.light.movement import FOLLOWED_PX, movement_px
 from gelpolight_core.light.samples import PARAMETERS, Samples, compare_samples, samples_of
+from gelpolight_core.light.usual import Usual
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import SensorModel
 
@@ -76,6 +79,10 @@ class HealthCheck:
         Of its membrane, which a press makes brighter around it.
     crosstalk : (3, 3), optional
         Of the LEDs in the channels; by default none.
+    closed : bool, optional
+        Whether the light follows each press, so that it is always corrected.
+    usual : Usual, optional
+        Changes of light that healthy presses show; by default those of an open sensor.
     """
 
     def __init__(
@@ -84,6 +91,8 @@ class HealthCheck:
         *,
         interreflection: float = 0.0,
         crosstalk: NDArray[np.float64] | None = None,
+        closed: bool = False,
+        usual: Usual | None = None,
     ) -> None:
         self.calibration = calibration
         self.samples: Samples = samples_of(calibration)
@@ -92,7 +101,7 @@ class HealthCheck:
         self._square, self._full = np.zeros(cells), np.zeros(cells)
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
-        self._limits = Limits.of(interreflection)
+        self._limits, self._closed, self._usual = Limits.of(interreflection), closed, usual
         mixing = np.eye(3) if crosstalk is None else crosstalk
         self._unmix = np.asarray(np.linalg.inv(mixing), np.float64)
         self._noise = float(calibration.noise.max())
@@ -129,6 +138,12 @@ class HealthCheck:
                 return health_of(far or pixels, unknown=UNJUDGED, untouched=common.share)
             return self._strange(raw, light, common.share, whole)
 
+    def change(self, frame: NDArray[Any]) -> tuple[CommonChange, Uneven | None]:
+        """Return the common change of a frame's light, and its uneven one."""
+        with self._lock:
+            common = self._common(*self._coded(frame))
+            return common, uneven_change(self.samples, self._change, common)
+
     def _faults(
         self,
         raw: NDArray[Any],
@@ -140,21 +155,26 @@ class HealthCheck:
         """Return the changes on the membrane of this sensor."""
         limits, samples = self._limits, self.samples
         uneven = uneven_change(samples, self._change, common)
-        shaded = uneven_finding(uneven, limits)
+        usual = self._usual
+        shaded = uneven_finding(uneven if usual is None else usual.uneven(uneven), limits)
         if uneven is not None and shaded is not None:
             less = evened(samples, self._change, self._square, uneven.shape)
             common = common_change(samples, *less, self._full)
         if (common.values[:6:2] < DARK - 1.0).all():
             return health_of([dark_finding()], untouched=common.share)
         full = float(self._full.sum() / samples.count.sum())
-        follow = whole and may_have_moved(common)
+        judged = common if usual is None else usual.common(common)
+        follow = whole and may_have_moved(judged)
         seen_px = movement_px(samples, raw, light) if follow else None
-        moved = moved_finding(common, seen_px)
-        changes = light_findings(common, limits)
+        moved = moved_finding(judged, seen_px)
+        changes = light_findings(judged, limits)
         gain = light_gain(common, changes, limits)
+        if self._closed:
+            gain = LightGain(1.0 + common.gain, scatter_of_cells(samples, common))
         if uneven is not None and shaded is not None:
             changes.append(shaded)
-            gain = None if shaded.meaningless else with_shape(gain, common, uneven)
+            follow = self._closed or not shaded.meaningless
+            gain = with_shape(gain, common, uneven) if follow else None
         if moved is not None and moved.value > FOLLOWED_PX:
             # The pattern of the light has moved, too.
             changes, gain = [finding for finding in changes if finding.meaningless], None
@@ -163,7 +183,7 @@ class HealthCheck:
         compressed = compressed_finding(self._lost_detail(raw, light, common.untouched))
         # Lost detail looks like a movement and like blur.
         detail = compressed or moved
-        blurred = None if detail else blur_finding(common, samples.blur_strength)
+        blurred = None if detail else blur_finding(judged, samples.blur_strength)
         if blurred is not None and blurred.meaningless and common.share < LEAST_START:
             # The texture is missing.
             return health_of([stranger_finding()], untouched=common.share)

@@ -122,6 +122,16 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     return CommonChange(values, sd, kept, left, alone[:3], alone_sd[:3])
 
 
+def scatter_of_cells(samples: Samples, common: CommonChange) -> Array:
+    """Return the standard deviation (3,) of the untouched part's gain by the scatter of its cells.
+
+    A press changes the light of neighbouring cells alike: each group of neighbours counts as one.
+    """
+    at, beside = common.untouched, samples.beside
+    around = common.change[beside[at]].mean(axis=1)
+    return np.asarray(around.std(axis=0) * math.sqrt(beside.shape[1] / at.sum()))
+
+
 @dataclass(frozen=True, slots=True)
 class Uneven:
     """A change of the light that differs smoothly over the image, of all channels alike.

@@ -162,8 +162,11 @@ def with_shape(gain: LightGain | None, common: CommonChange, uneven: Uneven) -> 
 
 
 def corrected(change: Finding) -> Finding:
-    """Return the finding of a change of the light that is corrected; room light is not."""
-    if change.key not in CORRECTABLE:
+    """Return the finding of a change of the light that is corrected; room light is not.
+
+    A large uneven change need not have the shapes that were fitted.
+    """
+    if change.key not in CORRECTABLE or (change.key == "uneven" and change.meaningless):
         return change
     remedy = tr("The depth is corrected for this. {remedy}").format(remedy=change.remedy)
     return replace(change, remedy=remedy, verdict=Verdict.WARN, heights=Heights.STATED)

@@ -15,7 +15,7 @@ from gelpolight_core.measurement.spread import MODE_ERRORS, MODE_PITCH_MM, ModeE
 from gelpolight_core.measurement.tool import Point, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import Mode
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import pattern, tr
 
 AUTO = "auto"
 """The value for automatic selection of the shape."""
@@ -38,12 +38,21 @@ def measure_heightmap(
     Raises
     ------
     InputError
-        As :func:`~gelpolight_core.measurement.measure.measure_object`, or the shape is unclear.
+        As :func:`~gelpolight_core.measurement.measure.measure_object`, or the shape is unclear. If
+        the height map is doubtful, the reason comes first: it may be why nothing was found.
     """
-    if shape == AUTO:
-        shape = _found_shape(heightmap, seed_mm)
-    mode, reach_mm = mode_error(heightmap), TYPICAL_DECAY_MM
-    return measure_object(heightmap, shape=shape, seed_mm=seed_mm, mode=mode, reach_mm=reach_mm)
+    try:
+        if shape == AUTO:
+            shape = _found_shape(heightmap, seed_mm)
+        mode, reach_mm = mode_error(heightmap), TYPICAL_DECAY_MM
+        return measure_object(heightmap, shape=shape, seed_mm=seed_mm, mode=mode, reach_mm=reach_mm)
+    except InputError as error:
+        for doubt in heightmap.doubts:
+            found = pattern("{cause}; {found}", cause=doubt.text, found=error.found)
+            raise InputError(
+                found, where=error.where, advice=doubt.remedy or error.advice
+            ) from error
+        raise
 
 
 def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gelpolight_core import measure
 from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -18,6 +22,7 @@ from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import read_session
 
 Frame = NDArray[np.uint8]
+Map = NDArray[Any]
 
 
 @pytest.fixture(scope="module")
@@ -30,13 +35,96 @@ def presses(closed_folder: Path) -> list[Frame]:
     return [read_raw_image(path)[0] for path in sorted((closed_folder / "balls").glob("*.png"))]
 
 
-def test_presses_and_another_exposure_have_no_fault(
-    reconstructor: Reconstructor, presses: list[Frame]
-) -> None:
+def changed(frame: Frame, light: Map | tuple[float, ...], room: float = 0.0) -> Frame:
+    """Return a frame with other light: factors of its channels or pixels, and room light."""
+    return np.clip(np.rint(frame * np.asarray(light) + 255.0 * room), 0, 255).astype(np.uint8)
+
+
+def vignetting(share: float, shape: tuple[int, ...]) -> Map:
+    """Return the light (rows, columns, 1) that falls by a share to the image's corners."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    half = np.array(shape[:2]) - 1.0
+    size = (2.0 * y / half[0] - 1.0) ** 2 + (2.0 * x / half[1] - 1.0) ** 2
+    return (1.0 - 0.5 * share * size)[..., None]
+
+
+def test_healthy_presses_have_no_fault(reconstructor: Reconstructor, presses: list[Frame]) -> None:
     for frame in presses:
-        assert reconstructor.health(frame).keys == ()
-    darker = np.rint(0.8 * presses[0]).astype(np.uint8)
-    assert reconstructor.health(darker).keys == ()
+        found = reconstructor.health(frame)
+        assert found.keys == ()
+        assert found.light is not None
+        assert found.light.share == pytest.approx(np.ones(3), abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("light", "key"),
+    [
+        ((0.8, 0.8, 0.8), "exposure"),
+        ((1.05, 1.05, 1.05), "exposure"),
+        ((0.95, 1.0, 1.0), "led_weak"),
+        ((1.0, 1.0, 1.2), "led_weak"),
+    ],
+)
+def test_a_change_of_the_light_is_stated_and_corrected(
+    reconstructor: Reconstructor, presses: list[Frame], light: tuple[float, ...], key: str
+) -> None:
+    for frame in presses[:3]:
+        alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
+        found = reconstructor.depth(changed(frame, light), uncertainty=True)
+        assert [finding.key for finding in found.findings] == [key]
+        assert not found.doubts
+        ball = measure(found, shape="ball")
+        assert ball.diameter_mm == pytest.approx(
+            alone.diameter_mm, abs=0.5 * alone.sd["diameter_mm"]
+        )
+        assert ball.height_mm == pytest.approx(alone.height_mm, abs=0.5 * alone.sd["height_mm"])
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1])
+def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(
+    reconstructor: Reconstructor, presses: list[Frame], share: float
+) -> None:
+    for frame in presses[:3]:
+        alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
+        shaded = changed(frame, vignetting(share, frame.shape))
+        found = reconstructor.depth(shaded, uncertainty=True)
+        assert "uneven" in [finding.key for finding in found.findings]
+        ball = measure(found, shape="ball")
+        off = abs(ball.diameter_mm - alone.diameter_mm) / alone.sd["diameter_mm"]
+        assert found.doubts or off < 1.0
+
+
+@pytest.mark.parametrize(
+    ("key", "damage"),
+    [
+        ("room_light", lambda frame: changed(frame, (1.0,), room=0.01)),
+        ("blurred", lambda frame: cv2.GaussianBlur(frame, (0, 0), 1.5)),
+        ("camera_moved", lambda frame: np.roll(frame, 2, axis=1)),
+        ("camera_moved", lambda frame: np.roll(frame, 6, axis=1)),
+    ],
+)
+def test_what_cannot_be_corrected_is_doubtful_and_named_first(
+    reconstructor: Reconstructor, presses: list[Frame], key: str, damage: Callable[[Frame], Frame]
+) -> None:
+    for frame in presses[:3]:
+        seen = damage(frame)
+        found = reconstructor.depth(seen, uncertainty=True, health=reconstructor.health(seen))
+        assert found.doubts[0].key == key
+        try:
+            assert measure(found, shape="ball").verdict == "doubtful"
+        except InputError as error:
+            assert error.found.startswith(found.doubts[0].text)
+
+
+def test_a_calibration_of_an_earlier_program_judges_and_corrects_as_before(
+    closed_run: Run, presses: list[Frame]
+) -> None:
+    model = replace(closed_run.calibration.data.in_place, press_light=None)
+    earlier = Reconstructor(closed_run.calibration.changed(in_place=model))
+    health = earlier.health(changed(presses[0], (0.8, 0.9, 1.0)))
+    assert health.keys == () and "exposure" in health.unknown
+    assert health.light is not None
+    assert health.light.share == pytest.approx([0.8, 0.9, 1.0], abs=0.002)
 
 
 @pytest.mark.parametrize(

@@ -164,7 +164,7 @@ def test_a_wrong_background_is_refused(closed_folder: Path, tmp_path: Path) -> N
         part = image[30:-10, 40:-10]
         assert cv2.imwrite(str(path), cv2.resize(part, image.shape[1::-1]))
     session = read_session(folder)
-    with pytest.raises(InputError, match="the background's"):
+    with pytest.raises(InputError, match="the background looks like"):
         calibrate(session)
 
 

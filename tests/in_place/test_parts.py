@@ -11,9 +11,9 @@ import pytest
 from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
 from gelpolight_core.in_place.next_ball import next_position
+from gelpolight_core.in_place.press_light import press_lights
 from gelpolight_core.in_place.scale import scale_from_pins, scale_from_punch
 from gelpolight_core.reconstruction.height_map import normals_from_slopes, surface_slopes
-from gelpolight_core.reconstruction.in_place.change import light_gain, reference
 from gelpolight_core.reconstruction.in_place.depth import depth_of
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
 from gelpolight_core.reconstruction.in_place.model import (
@@ -57,13 +57,15 @@ def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit() -> None:
 
 def test_the_light_is_that_of_the_untouched_part_also_with_a_third_pressed() -> None:
     random = np.random.default_rng(3)
-    background = random.uniform(0.2, 0.5, (120, 160, 3)).astype(np.float32)
-    base = reference(background)
-    light = np.array([0.8, 1.05, 1.0], np.float32)
-    seen = base.smooth * light * random.normal(1.0, 0.01, background.shape).astype(np.float32)
-    pressed = random.uniform(0.9, 1.8, (120, 54, 3)).astype(np.float32)
-    seen[:, :54] *= pressed
-    assert light_gain(seen, base) == pytest.approx(light, rel=0.003)
+    y, x = np.mgrid[:240, :320] / 320.0
+    background = (0.4 + np.stack([0.1 * x, -0.1 * x, 0.1 * y], axis=-1)).astype(np.float32)
+    grid = WorkingGrid(ImageSize(320, 240), 0.06)
+    light = np.array([0.8, 1.05, 1.0])
+    seen = background * light + random.normal(0.0, 0.004, background.shape)
+    seen[:, :108] *= random.uniform(0.9, 1.8, (240, 108, 3))
+    images = [seen.astype(np.float32)]
+    ((common, _),) = press_lights(images, grid, background, np.full(3, 0.004))
+    assert 1.0 + common.gain == pytest.approx(light, rel=0.003)
 
 
 def test_normals_are_those_of_the_depth_map() -> None:

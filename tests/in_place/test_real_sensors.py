@@ -75,7 +75,7 @@ def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data: Path) 
         def exposed(gain: float, image: np.ndarray = image) -> Measurement:
             frame = np.clip(np.rint(gain * image.astype(float)), 0, 255).astype(np.uint8)
             height_map = reconstructor.depth(frame, uncertainty=True)
-            stated = any(note.key == "light" for note in height_map.findings)
+            stated = any(note.key == "exposure" for note in height_map.findings)
             assert stated or gain == 1.0
             return measure(height_map, shape="ball")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.light.usual import KINDS
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.in_place.grid import ImageSize
 from gelpolight_core.reconstruction.in_place.model import COLOUR_CELLS, InPlaceModel
@@ -70,8 +72,15 @@ class ClosedSensor:
         return self.in_place.background
 
     def with_background(self, present: NDArray[np.float32]) -> ClosedSensor:
-        """Return the data with another image of the untouched membrane, on the grid."""
-        return replace(self, in_place=replace(self.in_place, background=present))
+        """Return the data with another image of the untouched membrane, on the grid.
+
+        How its light differs from that of presses is not known, but how theirs scatters.
+        """
+        light = self.in_place.press_light
+        scatter = None if light is None else light - light.mean(axis=0)
+        return replace(
+            self, in_place=replace(self.in_place, background=present, press_light=scatter)
+        )
 
     def on_grid(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return a camera image (height, width, 3) on the grid (rows, columns, 3)."""
@@ -91,6 +100,8 @@ class ClosedSensor:
         arrays = [m.background, m.coefficients, m.seen_colours, m.errors.slopes, m.errors.slope_sd]
         if self.response is not None:
             arrays.append(self.response.curves)
+        if m.press_light is not None:
+            arrays.append(m.press_light)
         for array in arrays:
             hashed.update(np.ascontiguousarray(array).tobytes())
         return hashed.digest()
@@ -105,13 +116,15 @@ class ClosedSensor:
         """
         m, size = self.in_place, self.camera
         nodes = m.errors.slopes
-        shapes = (
+        shapes: tuple[tuple[NDArray[Any], tuple[int, ...]], ...] = (
             (m.background, (*m.grid.shape, 3)),
             (m.coefficients, (TERMS, 2)),
             (m.seen_colours, (COLOUR_CELLS,) * 3),
             (m.errors.slope_sd, (nodes.size,)),
             (self.noise, (3,)),
         )
+        if m.press_light is not None:
+            shapes += ((m.press_light, (max(len(m.press_light), 2), KINDS)),)
         if not 0 < min(m.grid.shape) or any(array.shape != shape for array, shape in shapes):
             raise ValueError("an array does not fit the size of the images")
         if not (0 < size.width and 0 < size.height and m.grid.mm_per_px > 0.0 < m.steepest):

@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.light.judging import LED_OFF
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reflectance.markers import Markers, find_markers
 
@@ -23,7 +22,6 @@ SMOOTHING_NODES = 2.0
 OFFSET = 0.02
 """Added to the background in the divisor, so that noise of dark areas is not amplified."""
 LARGEST_CHANGE = 4.0
-GAIN_STEP, GAIN_ROUNDS = 5, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +61,11 @@ class ColourChange:
         Known, not saturated and no marker.
     saturated : (rows, columns) bool
         A channel is at its upper end.
-    gain : (3,)
-        Brightness of the image over the background's where nothing touches.
     """
 
     change: Map
     usable: Mask
     saturated: Mask
-    gain: NDArray[np.float64]
 
 
 def reference(background: Map) -> Reference:
@@ -81,7 +76,9 @@ def reference(background: Map) -> Reference:
     return Reference(background, _smooth(background, plain), markers, known, plain)
 
 
-def colour_change(image: Map, base: Reference) -> ColourChange:
+def colour_change(
+    image: Map, base: Reference, gain: NDArray[np.float64] | None = None
+) -> ColourChange:
     """Return how an image differs from the untouched membrane, but for the strength of its light.
 
     Parameters
@@ -90,6 +87,8 @@ def colour_change(image: Map, base: Reference) -> ColourChange:
         Linear light on the working grid; what is not finite is left out.
     base : Reference
         The untouched membrane.
+    gain : (3,), optional
+        Brightness of the image over the background's where nothing touches; by default 1.
     """
     # Channel by channel: a reduction over an axis of three is ten times slower.
     red, green, blue = (image[..., k] for k in range(3))
@@ -102,29 +101,11 @@ def colour_change(image: Map, base: Reference) -> ColourChange:
     # Both from the same nodes: gaps shift the position of an average.
     same = np.array_equal(usable, base.plain)
     there = base.smooth if same else _smooth(base.background, usable)
-    gain = light_gain(smooth, base)
-    change = (smooth / gain.astype(np.float32) - there) / (there + np.float32(OFFSET))
+    if gain is not None:
+        smooth = smooth / gain.astype(np.float32)
+    change = (smooth - there) / (there + np.float32(OFFSET))
     np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE, out=change)
-    return ColourChange(change, usable, saturated, gain)
-
-
-def light_gain(smooth: Map, base: Reference) -> NDArray[np.float64]:
-    """Return the brightness (3,) of an image over its background's, where nothing touches.
-
-    Exposure and LEDs change it from image to image. The half of the nodes that agree best is
-    untouched if the contact covers less than the other half.
-    """
-    thin = np.s_[::GAIN_STEP, ::GAIN_STEP]
-    there = base.smooth[thin]
-    lit = there > 2.0 * OFFSET
-    ratio = np.where(lit, smooth[thin] / np.where(lit, there, 1.0), np.nan)[lit.any(axis=2)]
-    if not lit.any(axis=(0, 1)).all() or (np.nanmedian(ratio, axis=0) < 1.0 + LED_OFF).any():
-        return np.ones(3)
-    gain = np.nanmedian(ratio, axis=0)
-    for _ in range(GAIN_ROUNDS):
-        off = np.nanmax(np.abs(ratio / gain - 1.0), axis=1)
-        gain = np.nanmean(ratio[off <= np.median(off)], axis=0)
-    return np.asarray(gain, np.float64)
+    return ColourChange(change, usable, saturated)
 
 
 def _smooth(rgb: Map, usable: Mask) -> Map:

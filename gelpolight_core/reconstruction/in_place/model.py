@@ -80,6 +80,9 @@ class InPlaceModel:
         files of older programs. Part of the identity.
     scale_sd : float
         Relative standard deviation of `grid.mm_per_px`.
+    press_light : (presses, KINDS) float64 or None
+        Changes of the light in the images of the balls, as
+        :func:`~gelpolight_core.light.usual.changes_of` gives them; None in files of older programs.
     """
 
     grid: WorkingGrid
@@ -90,15 +93,16 @@ class InPlaceModel:
     errors: ErrorCurve
     follow_gain: bool = True
     scale_sd: float = 0.0
+    press_light: Array | None = None
 
     @cached_property
     def reference(self) -> Reference:
         """The background, smoothed."""
         return reference(self.background)
 
-    def change(self, rgb: Map) -> ColourChange:
-        """Return the change of colour in a camera image (height, width, 3)."""
-        return colour_change(self.grid.reduce(rgb), self.reference)
+    def change(self, rgb: Map, gain: Array | None = None) -> ColourChange:
+        """Return the change of colour in a camera image (height, width, 3); see `colour_change`."""
+        return colour_change(self.grid.reduce(rgb), self.reference, gain)
 
     def slopes(self, change: Map, workers: RowWorkers | None = None) -> tuple[Map, Map]:
         """Return d(depth)/dx and d(depth)/dy (rows, columns) of a change of colour."""

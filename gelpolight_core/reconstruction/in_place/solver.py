@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -9,9 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.finding import Heights, Verdict
 from gelpolight_core.light.check import HealthCheck
-from gelpolight_core.light.finding import KEYS, Health, health_of
+from gelpolight_core.light.finding import KEYS, Health, LightGain, health_of
+from gelpolight_core.light.usual import Usual
 from gelpolight_core.reconstruction.checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
@@ -31,26 +33,23 @@ from gelpolight_core.reconstruction.solver import (
     Gain,
     Solved,
     Wanted,
-    light_step,
     thinned,
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
-from gelpolight_core.reconstruction.trace import Trace, TraceRecorder, TraceStep
+from gelpolight_core.reconstruction.trace import Trace, TraceStep
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 
 EXTRAPOLATED_WEIGHT = 0.3
-DIFFERENT = 0.12
-"""Median change of colour above which an image does not show this sensor's membrane."""
 EXAMPLES = 6
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
-STATED_CHANGE = 0.01
-"""Change of the light that is stated: images of a closed sensor scatter by less."""
 ONE_MODE = tr("calibration in place has one mode")
 SURE = ("dark", "compressed", "led_off", "colour_order", "bad_pixels", "bad_line")
 """Faults that no press can cause."""
+SCATTERING = ("led_weak", "exposure", "uneven", "room_light", "camera_moved", "blurred")
+"""Faults that are known by how the light of the calibration's own presses scatters."""
 STEPS = (tr("change of colour"), tr("slopes"), INTEGRATION)
 
 
@@ -79,18 +78,32 @@ class InPlaceSolver:
 
     @cached_property
     def _health(self) -> HealthCheck:
-        return HealthCheck(self.calibration)
+        seen = self._model.press_light
+        return HealthCheck(
+            self.calibration, closed=True, usual=None if seen is None else Usual(seen)
+        )
 
     def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
-        """Return the faults that no press can cause; the others are unknown.
+        """Return the faults of a frame, and the change of its light; see :class:`Solver`.
 
-        The membrane of a closed sensor changes a few percent from press to press, so that smaller
-        changes of the light say nothing. The depth follows them.
+        A change of the light that cannot be corrected makes the depth doubtful, not meaningless.
         """
         found = self._health.check(frame, whole=whole)
-        sure = [finding for finding in found.findings if finding.key in SURE]
-        unknown = tuple(key for key in KEYS if key not in SURE)
-        return health_of(sure, unknown=unknown, untouched=found.untouched)
+        known = (*SURE, "other_sensor")
+        if self._model.press_light is not None:
+            known += SCATTERING
+        return health_of(
+            [
+                finding
+                if finding.key in (*SURE, "camera_moved") or not finding.meaningless
+                else replace(finding, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
+                for finding in found.findings
+                if finding.key in known
+            ],
+            unknown=tuple(key for key in KEYS if key not in known or key in found.unknown),
+            untouched=found.untouched,
+            light=found.light,
+        )
 
     def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
         """Return which steps a frame needs; see :class:`Solver`."""
@@ -98,11 +111,11 @@ class InPlaceSolver:
 
     def depth(self, frame: NDArray[Any], wanted: Wanted) -> Solved:
         """Reconstruct a frame; see :class:`Solver`."""
-        model, record = self._model, TraceRecorder()
+        model, record = self._model, wanted.record()
         linear_frame = linearised(frame, self.calibration.response)
         with record.done(STEPS[0], linear_frame.nbytes) as reason:
             linear = as_linear(linear_frame)
-            seen = model.change(linear)
+            seen = model.change(linear, wanted.gain)
             reason.append(ONE_MODE)
         with record.done(STEPS[1], seen.change.nbytes) as reason:
             slope_x, slope_y = model.slopes(seen.change, self._threads)
@@ -127,10 +140,6 @@ class InPlaceSolver:
             record.left_out(tr("normals"), tr("not requested"))
         if not wanted.uncertainty:
             record.left_out(tr("standard deviations"), tr("not requested"))
-        light = light_step(seen.gain)
-        changed = np.abs(seen.gain - 1.0).max() > STATED_CHANGE
-        notes = [Finding("light", light.reason, verdict=Verdict.WARN)] if changed else []
-        notes += [free_boundary_note()] if crossed else []
         normals = None
         if wanted.normals:
             normals = normals_from_slopes(*surface_slopes(depth, model.grid.pitch_mm))
@@ -138,9 +147,11 @@ class InPlaceSolver:
             depth,
             normals,
             flags,
-            (*notes, *_difference_notes(seen.change)),
-            Trace(wanted.effort, (light, *record.steps)),
-            self._deviations(linear, depth, slope_x, slope_y) if wanted.uncertainty else None,
+            (free_boundary_note(),) if crossed else (),
+            Trace(wanted.effort, tuple(record.steps)),
+            self._deviations(linear, wanted, depth, slope_x, slope_y)
+            if wanted.uncertainty
+            else None,
             # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
             depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
             lateral_scale_sd=model.scale_sd,
@@ -156,7 +167,8 @@ class InPlaceSolver:
         self, frame: NDArray[Any], height_map: HeightMap, gain: Gain | None, *, step: int = 1
     ) -> Map:
         """Return the change of colour minus the predicted one, in the known directions."""
-        seen = self._model.change(as_linear(linearised(frame, self.calibration.response)))
+        linear = as_linear(linearised(frame, self.calibration.response))
+        seen = self._model.change(linear, gain)
         predicted = self._inverse(height_map)
         left = predicted.in_known_directions(seen.change - predicted.change)
         return np.asarray(np.where(seen.usable[..., None], left, np.nan)[thinned(step)], np.float32)
@@ -164,18 +176,22 @@ class InPlaceSolver:
     def _inverse(self, height_map: HeightMap) -> Inverse:
         return inverse(self._model, *surface_slopes(height_map.depth_mm, height_map.pitch_mm))
 
-    def _deviations(self, frame: Map, depth_mm: Map, slope_x: Map, slope_y: Map) -> DepthNoise:
+    def _deviations(
+        self, frame: Map, wanted: Wanted, depth_mm: Map, slope_x: Map, slope_y: Map
+    ) -> DepthNoise:
         """Return the maps of standard deviations, and examples of the depth's noise."""
         errors = self._model.errors
         size = np.hypot(slope_x, slope_y)
         model_sd = np.interp(size, errors.slopes, errors.slope_sd).astype(np.float32)
         depth_model = np.hypot(errors.depth_floor_mm, errors.depth_share * depth_mm)
         noise_sd = self.calibration.noise.astype(np.float32)
+        light = wanted.light or LightGain(np.ones(3), np.zeros(3))
         random = np.random.default_rng(0)
         slopes, depths = [], []
         for _ in range(EXAMPLES):
             noise = random.standard_normal(frame.shape, np.float32) * noise_sd
-            seen = self._model.change(frame + noise)
+            gain = light.share + light.sd * random.standard_normal(3)
+            seen = self._model.change(frame + noise, gain)
             x, y = self._model.slopes(seen.change, self._threads)
             x, y = x - slope_x, y - slope_y
             pitch = self._model.grid.pitch_mm
@@ -196,14 +212,3 @@ class InPlaceSolver:
             np.asarray(depth_model, np.float32),
             np.asarray(blocks.mean(axis=(2, 4)), np.float32),
         )
-
-
-def _difference_notes(change: Map) -> tuple[Finding, ...]:
-    thin = change[::4, ::4]
-    if float(np.median(np.abs(thin).max(axis=2))) <= DIFFERENT:
-        return ()
-    text = tr(
-        "most of the image does not look like this sensor's membrane: another "
-        "exposure, crop, gel or sensor; the depth is not reliable"
-    )
-    return (Finding("other_sensor", text, verdict=Verdict.WARN, heights=Heights.DOUBTFUL),)

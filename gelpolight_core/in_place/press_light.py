@@ -1,0 +1,61 @@
+"""How the light changes in the images of the balls, by the model of every frame's light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.light.check import LEAST_UNTOUCHED, HealthCheck
+from gelpolight_core.light.fit import CommonChange, Uneven
+from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
+from gelpolight_core.reconstruction.in_place.model import COLOUR_CELLS, ErrorCurve, InPlaceModel
+from gelpolight_core.reconstruction.in_place.terms import TERMS
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+
+
+def press_lights(
+    images: Sequence[Map], grid: WorkingGrid, background: Map, noise: Array
+) -> list[tuple[CommonChange, Uneven | None]]:
+    """Return the change of light in each image of a pressed ball.
+
+    Parameters
+    ----------
+    images : sequence of (height, width, 3) float32
+        Linear light, as the camera sees it.
+    grid : WorkingGrid
+        Nodes and scale.
+    background : (rows, columns, 3) float32
+        The untouched membrane on the grid.
+    noise : (3,)
+        Standard deviation of a pixel of a single image.
+
+    Raises
+    ------
+    InputError
+        If the background does not show the membrane around the balls: it is of another gel, crop
+        or sensor.
+    """
+    colours = np.zeros((COLOUR_CELLS,) * 3, np.float32)
+    errors = ErrorCurve(np.arange(2.0), np.zeros(2), 0.0, 0.0)
+    bare = InPlaceModel(grid, background, np.zeros((TERMS, 2)), colours, 0.0, errors)
+    check = HealthCheck(ClosedSensor("", bare, noise, ()))
+    found = [check.change(image) for image in images]
+    untouched = float(np.median([common.share for common, _ in found]))
+    if untouched < LEAST_UNTOUCHED:
+        raise InputError(
+            tr("the background looks like {x:.0f} % of the membrane around the balls").format(
+                x=100.0 * untouched
+            ),
+            where="background",
+            advice=tr(
+                "Use a background of the same gel, crop, size and exposure as the ball images"
+            ),
+        )
+    return found
