@@ -15,12 +15,8 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.in_place.ball import Ball
-from gelpolight_core.in_place.calibrate import (
-    LEAST_PRESSES,
-    InPlaceResult,
-    PressImage,
-    calibrate_in_place,
-)
+from gelpolight_core.in_place.calibrate import LEAST_PRESSES, InPlaceResult, calibrate_in_place
+from gelpolight_core.in_place.press_light import PressImage
 from gelpolight_core.in_place.roundness import judge_stretch
 from gelpolight_core.in_place.scale import (
     MeasuredScale,
@@ -160,13 +156,7 @@ def find_slopes(
     presses, unreadable = _presses(session, background)
     noise = _noise(grid.cut(background.rgb))
     result = calibrate_in_place(
-        background.rgb,
-        presses,
-        grid,
-        noise=noise,
-        scale_sd=scale_sd,
-        towards=towards,
-        progress=progress,
+        background.rgb, presses, grid, noise, scale_sd=scale_sd, towards=towards, progress=progress
     )
     return Slopes(replace(result, refused={**result.refused, **unreadable}), noise)
 

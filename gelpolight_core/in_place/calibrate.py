@@ -38,7 +38,7 @@ from gelpolight_core.in_place.held_out import (
     held_out_presses,
 )
 from gelpolight_core.in_place.next_ball import learning_curve, next_position
-from gelpolight_core.in_place.press_light import press_lights
+from gelpolight_core.in_place.press_light import PressImage, PressLights, press_lights
 from gelpolight_core.in_place.roundness import Stretch, stretch_of
 from gelpolight_core.light.usual import changes_of
 from gelpolight_core.parallel import in_parallel
@@ -57,7 +57,6 @@ from gelpolight_core.reconstruction.in_place.model import (
     evaluate,
 )
 from gelpolight_core.reflectance.ball_detection import find_indentation
-from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.reflectance.indentation import Indentation
 from gelpolight_core.translation import tr
 
@@ -75,28 +74,6 @@ OUTLIER = 3.0
 """A press is left out if its error is this multiple of the median ..."""
 LEAST_OUTLIER = 0.12
 """... and above this root mean square slope."""
-
-
-@dataclass(frozen=True, slots=True)
-class PressImage:
-    """An image of a pressed ball.
-
-    Attributes
-    ----------
-    name : str
-        Its file.
-    rgb : (height, width, 3) float32
-        Linear light.
-    radius_mm : float
-        Of the ball.
-    placed : Circle or None
-        Contact drawn by hand, camera pixels.
-    """
-
-    name: str
-    rgb: Map
-    radius_mm: float
-    placed: Circle | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,8 +141,8 @@ def calibrate_in_place(
     background: Map,
     presses: Sequence[PressImage],
     grid: WorkingGrid,
-    *,
     noise: Array,
+    *,
     scale_sd: float = 0.0,
     towards: Array | None = None,
     progress: Callable[[float], None] | None = None,
@@ -200,9 +177,8 @@ def calibrate_in_place(
     base = reference(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
     refuse_dead_channel(images, reduced)
-    lights = press_lights([press.rgb for press in presses], grid, reduced, noise)
-    gains = [1.0 + common.gain for common, _ in lights]
-    found, refused = _begin(presses, images, gains, base, grid, say)
+    lights = press_lights(presses, grid, reduced, noise)
+    found, refused = _begin(presses, images, lights, base, grid, say)
     stretch = stretch_of([press.stretches for press in found])
     sums, ridge = _sums(found), FIRST_RIDGE
     for turn in range(ROUNDS):
@@ -229,13 +205,7 @@ def calibrate_in_place(
         max(map(_steepest, balls)),
         error_curve(held_out, pitch_mm=grid.pitch_mm),
         scale_sd=scale_sd,
-        press_light=np.array(
-            [
-                changes_of(*light)
-                for press, light in zip(presses, lights, strict=True)
-                if press.name not in refused
-            ]
-        ),
+        press_light=np.array([changes_of(*lights[press.name]) for press in found]),
     )
     say(1.0)
     return InPlaceResult(
@@ -276,15 +246,15 @@ def contact_in(image: Map, base: Reference, *, radius: float, name: str) -> Inde
 def _begin(
     presses: Sequence[PressImage],
     images: Sequence[Map],
-    gains: Sequence[Array],
+    lights: PressLights,
     base: Reference,
     grid: WorkingGrid,
     say: Callable[[float], None],
 ) -> tuple[list[_Press], dict[str, InputError]]:
     """Find the contact in each reduced image; return the presses, and why others are refused."""
 
-    def find(item: tuple[PressImage, Map, Array]) -> _Press | InputError:
-        press, image, gain = item
+    def find(item: tuple[PressImage, Map]) -> _Press | InputError:
+        press, image = item
         radius = press.radius_mm / grid.pitch_mm
         stretches: tuple[float, ...] = ()
         try:
@@ -296,11 +266,12 @@ def _begin(
         except InputError as fault:
             return fault
         ball = Ball(edge.x, edge.y, edge.radius, radius).limited()
-        return _Press(press.name, colour_change(image, base, gain), ball, ball, stretches)
+        seen = colour_change(image, base, 1.0 + lights[press.name][0].gain)
+        return _Press(press.name, seen, ball, ball, stretches)
 
     found: list[_Press] = []
     refused: dict[str, InputError] = {}
-    with closing(in_parallel(find, list(zip(presses, images, gains, strict=True)))) as contacts:
+    with closing(in_parallel(find, list(zip(presses, images, strict=True)))) as contacts:
         for index, (press, contact) in enumerate(zip(presses, contacts, strict=True)):
             say(0.3 * (index + 1) / len(presses))
             if isinstance(contact, InputError):

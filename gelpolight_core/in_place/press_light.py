@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +15,45 @@ from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.reconstruction.in_place.model import COLOUR_CELLS, ErrorCurve, InPlaceModel
 from gelpolight_core.reconstruction.in_place.terms import TERMS
+from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
+PressLights = Mapping[str, tuple[CommonChange, Uneven | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class PressImage:
+    """An image of a pressed ball.
+
+    Attributes
+    ----------
+    name : str
+        Its file.
+    rgb : (height, width, 3) float32
+        Linear light.
+    radius_mm : float
+        Of the ball.
+    placed : Circle or None
+        Contact drawn by hand, camera pixels.
+    """
+
+    name: str
+    rgb: Map
+    radius_mm: float
+    placed: Circle | None = None
 
 
 def press_lights(
-    images: Sequence[Map], grid: WorkingGrid, background: Map, noise: Array
-) -> list[tuple[CommonChange, Uneven | None]]:
-    """Return the change of light in each image of a pressed ball.
+    presses: Sequence[PressImage], grid: WorkingGrid, background: Map, noise: Array
+) -> PressLights:
+    """Return the change of light in each image of a pressed ball, by its name.
 
     Parameters
     ----------
-    images : sequence of (height, width, 3) float32
-        Linear light, as the camera sees it.
+    presses : sequence of PressImage
+        The images.
     grid : WorkingGrid
         Nodes and scale.
     background : (rows, columns, 3) float32
@@ -46,8 +71,8 @@ def press_lights(
     errors = ErrorCurve(np.arange(2.0), np.zeros(2), 0.0, 0.0)
     bare = InPlaceModel(grid, background, np.zeros((TERMS, 2)), colours, 0.0, errors)
     check = HealthCheck(ClosedSensor("", bare, noise, ()))
-    found = [check.change(image) for image in images]
-    untouched = float(np.median([common.share for common, _ in found]))
+    found = {press.name: check.change(press.rgb) for press in presses}
+    untouched = float(np.median([common.share for common, _ in found.values()]))
     if untouched < LEAST_UNTOUCHED:
         raise InputError(
             tr("the background looks like {x:.0f} % of the membrane around the balls").format(

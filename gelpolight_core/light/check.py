@@ -43,11 +43,19 @@ from gelpolight_core.light.judging import (
     with_shape,
 )
 from gelpolight_core.light.movement import FOLLOWED_PX, movement_px
-from gelpolight_core.light.samples import PARAMETERS, Samples, compare_samples, samples_of
+from gelpolight_core.light.samples import (
+    PARAMETERS,
+    SHIFT_U,
+    SHIFT_V,
+    Samples,
+    compare_samples,
+    samples_of,
+)
 from gelpolight_core.light.usual import Usual
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import SensorModel
 
+Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 LEAST_UNTOUCHED = 0.12
@@ -79,10 +87,8 @@ class HealthCheck:
         Of its membrane, which a press makes brighter around it.
     crosstalk : (3, 3), optional
         Of the LEDs in the channels; by default none.
-    closed : bool, optional
-        Whether the light follows each press, so that it is always corrected.
     usual : Usual, optional
-        Changes of light that healthy presses show; by default those of an open sensor.
+        Of a closed sensor, whose light changes with each press, so that it is always corrected.
     """
 
     def __init__(
@@ -91,7 +97,6 @@ class HealthCheck:
         *,
         interreflection: float = 0.0,
         crosstalk: NDArray[np.float64] | None = None,
-        closed: bool = False,
         usual: Usual | None = None,
     ) -> None:
         self.calibration = calibration
@@ -101,7 +106,7 @@ class HealthCheck:
         self._square, self._full = np.zeros(cells), np.zeros(cells)
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
-        self._limits, self._closed, self._usual = Limits.of(interreflection), closed, usual
+        self._limits, self._usual = Limits.of(interreflection), usual
         mixing = np.eye(3) if crosstalk is None else crosstalk
         self._unmix = np.asarray(np.linalg.inv(mixing), np.float64)
         self._noise = float(calibration.noise.max())
@@ -144,6 +149,25 @@ class HealthCheck:
             common = self._common(*self._coded(frame))
             return common, uneven_change(self.samples, self._change, common)
 
+    def light(self, frame: NDArray[Any]) -> Array:
+        """Return the change of the light (cells, 3) of each part of the field, as a share."""
+        with self._lock:
+            self._common(*self._coded(frame))
+            return self._cell_light()
+
+    def movement(self, frame: NDArray[Any], most_sd: float) -> tuple[float, float] | None:
+        """Return how far the membrane has moved in the image, px; None if it is not known."""
+        with self._lock:
+            raw, light = self._coded(frame)
+            sd = self._common(raw, light).sd[[SHIFT_U, SHIFT_V]]
+            # As it looks in the light at calibration.
+            gain = np.maximum(1.0 + np.median(self._cell_light(), axis=0), DARK)
+            same = (light / gain[:, None]).astype(np.float32)
+            return movement_px(self.samples, raw, same) if np.hypot(*sd) < most_sd else None
+
+    def _cell_light(self) -> Array:
+        return self._change[:, :6:2] / self.samples.normal[:, [0, 2, 4], [0, 2, 4]]
+
     def _faults(
         self,
         raw: NDArray[Any],
@@ -169,11 +193,11 @@ class HealthCheck:
         moved = moved_finding(judged, seen_px)
         changes = light_findings(judged, limits)
         gain = light_gain(common, changes, limits)
-        if self._closed:
+        if usual is not None:
             gain = LightGain(1.0 + common.gain, scatter_of_cells(samples, common))
         if uneven is not None and shaded is not None:
             changes.append(shaded)
-            follow = self._closed or not shaded.meaningless
+            follow = usual is not None or not shaded.meaningless
             gain = with_shape(gain, common, uneven) if follow else None
         if moved is not None and moved.value > FOLLOWED_PX:
             # The pattern of the light has moved, too.
@@ -223,8 +247,7 @@ class HealthCheck:
         at_boundary = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (
             self._full == 0.0
         )
-        change = self._change[:, :6:2] / s.normal[:, [0, 2, 4], [0, 2, 4]]
-        fits = (np.abs(change[at_boundary]) < BOUNDARY_CHANGE).all(axis=1)
+        fits = (np.abs(self._cell_light()[at_boundary]) < BOUNDARY_CHANGE).all(axis=1)
         return bool(fits.size and fits.mean() > LEAST_RIM)
 
     def _strange(self, raw: NDArray[Any], light: Map, share: float, whole: bool) -> Health:

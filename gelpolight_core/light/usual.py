@@ -34,11 +34,14 @@ class Usual:
 
     Parameters
     ----------
-    seen : (presses, KINDS) float64
-        Result of :func:`changes_of` for each.
+    seen : (presses, KINDS) float64 or None
+        Result of :func:`changes_of` for each; None: any change may be healthy.
     """
 
-    def __init__(self, seen: Array) -> None:
+    def __init__(self, seen: Array | None) -> None:
+        self._mean, self._sd = np.zeros(KINDS), np.full(KINDS, np.inf)
+        if seen is None:
+            return
         count = len(seen)
         # Of a normal value that few others predict: Student's distribution.
         far = stdtrit(count - 1, 1.0 - FALSE_ALARMS / (2 * KINDS)) / SIGMAS

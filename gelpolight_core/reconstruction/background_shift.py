@@ -7,36 +7,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.light.texture import texture_shift_px
-from gelpolight_core.masks import LEAST_LIGHT, lit
-from gelpolight_core.reconstruction.height_map import COARSE
+from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
 from gelpolight_core.translation import tr
 
-Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-
 TOUCHED_SHARE = 0.08
 """A contact changes the light of its walls by tens of percent; a shift of the background is uniform
 over the field."""
-TOUCHED_AREA_MM2 = 0.3
-"""A smaller area is a speck of dust."""
-QUIET_MM = 0.25
-"""Length over which the light is averaged before the comparison."""
-TOUCH_REACH_MM = 4.0
-"""Length over which a change counts as uniform: wider than a contact, narrower than the field."""
 DIFFERS = 0.03
 """Relative change of the light that counts as different; it tilts a normal by about a degree."""
+MOVED_PX = 0.5
+"""Movement that is stated, and largest standard deviation with which it is known."""
+DARK = -0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +35,8 @@ class BackgroundShift:
     Attributes
     ----------
     shift_px : (float, float) or None
-        How far the membrane's texture has moved in the camera's image, (u, v); None if the membrane
-        has too little texture.
+        How far the membrane has moved in the camera's image, (u, v); None if it is not known by its
+        light and texture.
     brightness_percent : (float, float, float)
         Change of red, green and blue, median over the field.
     differs_percent : float
@@ -80,28 +69,23 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     InputError
         If the frame is not of the calibration's size, or not lit.
     """
-    seen = _on_grid([frame], calibration)
-    base = calibration.data.background
-    usable = np.asarray(lit(base) & np.isfinite(seen).all(axis=2))
-    ratio = np.where(usable[..., None], seen / np.maximum(base, LEAST_LIGHT), 1.0)
-    if not (usable.any() and float(np.median(ratio[usable])) > 0.05):
+    _require_size(frame, calibration)
+    check = HealthCheck(calibration.data)
+    seen = check.light(frame)
+    middle = np.median(seen, axis=0)
+    if not middle.size or float(np.median(middle)) < DARK:
         raise InputError(
             tr("the image is dark where the sensor's membrane is"),
             where=tr("background"),
             advice=tr("Switch all three LEDs on"),
         )
-    coarse, there = _coarse(ratio, usable)
-    middle = np.median(coarse[there], axis=0)
-    pitch = COARSE * calibration.table.grid.pitch_mm
-    touched = _touched(coarse, there, pitch)
-    # Averaged over a quarter of a millimetre, the noise of one image is negligible.
-    quiet = cv2.GaussianBlur(np.where(there[..., None], coarse, 1.0), (0, 0), QUIET_MM / pitch)
-    differs = 100.0 * float((np.abs(quiet[there] - 1.0) > DIFFERS).any(axis=1).mean())
-    change = 100.0 * (middle - 1.0)
-    shift = None if touched else texture_shift_px(seen, base, usable, calibration.table)
-    brightness = (float(change[0]), float(change[1]), float(change[2]))
-    quality = _judge(shift, brightness, differs, touched)
-    return BackgroundShift(shift, brightness, differs, touched, quality)
+    around = seen[check.samples.beside].mean(axis=1)
+    touched = bool((np.abs(seen - around) > TOUCHED_SHARE).any())
+    differs = 100.0 * float((np.abs(seen) > DIFFERS).any(axis=1).mean())
+    shift = None if touched else check.movement(frame, MOVED_PX)
+    red, green, blue = (100.0 * float(change) for change in middle)
+    quality = _judge(shift, (red, green, blue), differs, touched)
+    return BackgroundShift(shift, (red, green, blue), differs, touched, quality)
 
 
 def zeroed(
@@ -139,54 +123,24 @@ def zeroed(
         )
     for frame in frames:
         _refuse_unfit(background_shift(frame, calibration))
-    present = _on_grid(frames, calibration)
+    total = sum(as_linear(linearised(frame, calibration.response)) for frame in frames)
+    present = calibration.data.on_grid(np.asarray(total / len(frames), np.float32))
     edit = HandEdit("background", CHANNEL_KEYS, made, operator)
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
     data = calibration.data.with_background(present)
     return replace(calibration, data=data, provenance=provenance)
 
 
-def _on_grid(frames: Sequence[NDArray[Any]], calibration: Calibration) -> Map:
-    """Return the average of frames in linear light on the membrane's grid."""
-    camera, response = calibration.camera, calibration.response
-    total = np.zeros((camera.height, camera.width, 3), np.float64)
-    for frame in frames:
-        if frame.shape != total.shape:
-            raise InputError(
-                tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
-                    shape="x".join(str(n) for n in frame.shape), w=camera.width, h=camera.height
-                ),
-                where=tr("background"),
-                advice=tr("Use the calibration of this sensor at this image size"),
-            )
-        total += as_linear(linearised(frame, response))
-    mean = (total / len(frames)).astype(np.float32)
-    return calibration.data.on_grid(mean)
-
-
-def _coarse(ratio: Map, usable: Mask) -> tuple[Map, Mask]:
-    """Return averages over blocks of nodes, and which blocks are completely known."""
-    rows, columns = (n // COARSE for n in usable.shape)
-    cut = ratio[: rows * COARSE, : columns * COARSE]
-    mean = cut.reshape(rows, COARSE, columns, COARSE, 3).mean(axis=(1, 3))
-    whole = usable[: rows * COARSE, : columns * COARSE].reshape(rows, COARSE, columns, COARSE)
-    return mean, np.asarray(whole.all(axis=(1, 3)))
-
-
-def _touched(coarse: Map, there: Mask, pitch_mm: float) -> bool:
-    """Return whether a local change of the light shows a contact."""
-    sigma = TOUCH_REACH_MM / pitch_mm
-    share = cv2.GaussianBlur(there.astype(np.float32), (0, 0), sigma)
-    known = np.where(there[..., None], coarse, 0.0)
-    even = cv2.GaussianBlur(known, (0, 0), sigma) / np.maximum(share, 1e-6)[..., None]
-    quiet = cv2.GaussianBlur(np.where(there[..., None], coarse / even, 1.0), (0, 0), 1.0)
-    changed = (np.abs(quiet - 1.0) > TOUCHED_SHARE).any(axis=2) & there
-    # When the camera moves, the edge of the field changes: this is not a contact.
-    changed &= ndimage.binary_erosion(there, iterations=2)
-    labels, count = ndimage.label(changed)
-    if count == 0:
-        return False
-    return bool(np.bincount(labels.ravel())[1:].max() * pitch_mm**2 > TOUCHED_AREA_MM2)
+def _require_size(frame: NDArray[Any], calibration: Calibration) -> None:
+    camera = calibration.camera
+    if frame.shape != (camera.height, camera.width, 3):
+        raise InputError(
+            tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
+                shape="x".join(str(n) for n in frame.shape), w=camera.width, h=camera.height
+            ),
+            where=tr("background"),
+            advice=tr("Use the calibration of this sensor at this image size"),
+        )
 
 
 def _judge(
@@ -211,7 +165,7 @@ def _judge(
                 tr("Membrane moved in the image"),
                 math.hypot(*shift_px),
                 "px",
-                warn=0.5,
+                warn=MOVED_PX,
                 fail=2.0,
                 remedy=tr(
                     "Camera and elastomer have moved against each other: seat them, or "

@@ -11,7 +11,7 @@ import pytest
 from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
 from gelpolight_core.in_place.next_ball import next_position
-from gelpolight_core.in_place.press_light import press_lights
+from gelpolight_core.in_place.press_light import PressImage, press_lights
 from gelpolight_core.in_place.scale import scale_from_pins, scale_from_punch
 from gelpolight_core.reconstruction.height_map import normals_from_slopes, surface_slopes
 from gelpolight_core.reconstruction.in_place.depth import depth_of
@@ -63,8 +63,8 @@ def test_the_light_is_that_of_the_untouched_part_also_with_a_third_pressed() -> 
     light = np.array([0.8, 1.05, 1.0])
     seen = background * light + random.normal(0.0, 0.004, background.shape)
     seen[:, :108] *= random.uniform(0.9, 1.8, (240, 108, 3))
-    images = [seen.astype(np.float32)]
-    ((common, _),) = press_lights(images, grid, background, np.full(3, 0.004))
+    press = PressImage("press", seen.astype(np.float32), 4.0)
+    common, _ = press_lights([press], grid, background, np.full(3, 0.004))["press"]
     assert 1.0 + common.gain == pytest.approx(light, rel=0.003)
 
 

@@ -46,10 +46,10 @@ EXAMPLES = 6
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
 ONE_MODE = tr("calibration in place has one mode")
-SURE = ("dark", "compressed", "led_off", "colour_order", "bad_pixels", "bad_line")
-"""Faults that no press can cause."""
-SCATTERING = ("led_weak", "exposure", "uneven", "room_light", "camera_moved", "blurred")
+SCATTERING = ("led_weak", "exposure", "uneven", "room_light", "blurred", "camera_moved")
 """Faults that are known by how the light of the calibration's own presses scatters."""
+UNKNOWN = ("saturated", "dirt", "not_recovered")
+"""Faults that presses of closed sensors look like; what is saturated is flagged in the map."""
 STEPS = (tr("change of colour"), tr("slopes"), INTEGRATION)
 
 
@@ -78,10 +78,7 @@ class InPlaceSolver:
 
     @cached_property
     def _health(self) -> HealthCheck:
-        seen = self._model.press_light
-        return HealthCheck(
-            self.calibration, closed=True, usual=None if seen is None else Usual(seen)
-        )
+        return HealthCheck(self.calibration, usual=Usual(self._model.press_light))
 
     def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
         """Return the faults of a frame, and the change of its light; see :class:`Solver`.
@@ -89,18 +86,17 @@ class InPlaceSolver:
         A change of the light that cannot be corrected makes the depth doubtful, not meaningless.
         """
         found = self._health.check(frame, whole=whole)
-        known = (*SURE, "other_sensor")
-        if self._model.press_light is not None:
-            known += SCATTERING
+        unknown = {*UNKNOWN, *found.unknown}
+        unknown.update(SCATTERING if self._model.press_light is None else ())
         return health_of(
             [
-                finding
-                if finding.key in (*SURE, "camera_moved") or not finding.meaningless
-                else replace(finding, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
-                for finding in found.findings
-                if finding.key in known
+                replace(f, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
+                if f.meaningless and f.key in (*SCATTERING[:-1], "other_sensor")
+                else f
+                for f in found.findings
+                if f.key not in UNKNOWN
             ],
-            unknown=tuple(key for key in KEYS if key not in known or key in found.unknown),
+            unknown=tuple(key for key in KEYS if key in unknown),
             untouched=found.untouched,
             light=found.light,
         )
