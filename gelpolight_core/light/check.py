@@ -24,6 +24,7 @@ from gelpolight_core.light.fit import (
 )
 from gelpolight_core.light.judging import (
     Limits,
+    all_pressed_finding,
     bad_pixel_findings,
     blur_finding,
     compressed_finding,
@@ -43,6 +44,7 @@ from gelpolight_core.light.judging import (
     with_shape,
 )
 from gelpolight_core.light.movement import FOLLOWED_PX, movement_px
+from gelpolight_core.light.pressed import is_pressed, press_effects
 from gelpolight_core.light.samples import (
     PARAMETERS,
     SHIFT_U,
@@ -89,6 +91,9 @@ class HealthCheck:
         Of the LEDs in the channels; by default none.
     usual : Usual, optional
         Of a closed sensor, whose light changes with each press, so that it is always corrected.
+    leds_mm : (3, 3), optional
+        Positions of the LEDs; without them, a press of the whole field is not told from other
+        light.
     """
 
     def __init__(
@@ -98,6 +103,7 @@ class HealthCheck:
         interreflection: float = 0.0,
         crosstalk: NDArray[np.float64] | None = None,
         usual: Usual | None = None,
+        leds_mm: NDArray[np.float64] | None = None,
     ) -> None:
         self.calibration = calibration
         self.samples: Samples = samples_of(calibration)
@@ -109,6 +115,7 @@ class HealthCheck:
         self._limits, self._usual = Limits.of(interreflection), usual
         mixing = np.eye(3) if crosstalk is None else crosstalk
         self._unmix = np.asarray(np.linalg.inv(mixing), np.float64)
+        self._press = None if leds_mm is None else press_effects(self.samples, leds_mm, self._unmix)
         self._noise = float(calibration.noise.max())
         self._stripe = 0
         self._lock = Lock()
@@ -141,6 +148,8 @@ class HealthCheck:
             far = [finding for finding in pixels if finding.meaningless]
             if far or self._boundary_fits():
                 return health_of(far or pixels, unknown=UNJUDGED, untouched=common.share)
+            if self._is_pressed(common):
+                return self._all_pressed(pixels)
             return self._strange(raw, light, common.share, whole)
 
     def change(self, frame: NDArray[Any]) -> tuple[CommonChange, Uneven | None]:
@@ -202,6 +211,8 @@ class HealthCheck:
         if moved is not None and moved.value > FOLLOWED_PX:
             # The pattern of the light has moved, too.
             changes, gain = [finding for finding in changes if finding.meaningless], None
+        if (changes or moved) and self._is_pressed(common):
+            return self._all_pressed(pixels)
         if gain is not None:
             changes = [corrected(change) for change in changes]
         compressed = compressed_finding(self._lost_detail(raw, light, common.untouched))
@@ -212,9 +223,7 @@ class HealthCheck:
             # The texture is missing.
             return health_of([stranger_finding()], untouched=common.share)
         # Specks that have moved or become weaker are not dirt, nor is a bad line.
-        specks = (
-            moved or compressed or blurred or any(finding.key == "bad_line" for finding in pixels)
-        )
+        specks = detail or blurred or any(finding.key == "bad_line" for finding in pixels)
         found = [
             *changes,
             detail,
@@ -240,6 +249,16 @@ class HealthCheck:
             return 0.0
         seen = block_grain(raw, light, self.samples.blocks[untouched])
         return grain.lost(seen, float((light[:, -1] - light[:, -2]).max()))
+
+    def _is_pressed(self, common: CommonChange) -> bool:
+        """Return whether a press of the whole field explains a frame better than its light."""
+        if self._press is None:
+            return False
+        change, usable = self._cell_light(), self._full == 0.0
+        return is_pressed(self.samples, self._press, change, usable, common.change)
+
+    def _all_pressed(self, pixels: list[Finding]) -> Health:
+        return health_of([all_pressed_finding(), *pixels], unknown=UNJUDGED, untouched=0.0)
 
     def _boundary_fits(self) -> bool:
         """Return whether the boundary looks as at calibration, where a contact covers the rest."""

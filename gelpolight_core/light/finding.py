@@ -15,6 +15,7 @@ from gelpolight_core.finding import Finding, Verdict
 KEYS = (
     "dark",
     "compressed",
+    "all_pressed",
     "led_off",
     "led_weak",
     "exposure",

@@ -293,6 +293,16 @@ def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
     return _graded("blurred", text, remedy, size > FAR_BLUR_PX, size, "px")
 
 
+def all_pressed_finding() -> Finding:
+    """Return that nothing untouched is left to compare with."""
+    text = tr(
+        "nearly everything is pressed: too little untouched membrane is left to compare with, and "
+        "all heights may be wrong by one constant"
+    )
+    remedy = tr("Press so that a part of the field stays free, also at its boundary")
+    return _graded("all_pressed", text, remedy, False)
+
+
 def compressed_finding(lost: float) -> Finding | None:
     """Return that fine detail of the image is lost.
 
@@ -381,13 +391,15 @@ def swapped_finding(order: Sequence[int]) -> Finding:
 
 
 def stranger_finding() -> Finding:
-    """Return that the image does not show this sensor's membrane."""
+    """Return that nothing in the image looks like this sensor's untouched membrane."""
     remedy = tr(
         "Use the calibration of the sensor that captured the image; if it is the "
-        "right one, remove all objects from the field and seat camera and "
-        "elastomer"
+        "right one, press less of the field, and seat camera and elastomer"
     )
-    text = tr("the image does not look like this sensor's membrane")
+    text = tr(
+        "nothing in the image looks like this sensor's untouched membrane: it is another sensor, "
+        "or nearly everything is pressed"
+    )
     return _graded("other_sensor", text, remedy, True)
 
 

@@ -9,6 +9,7 @@ least-squares sums of each cell need only one pass over the samples.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numba
@@ -79,6 +80,8 @@ class Samples:
         Cell of each run.
     shapes : (cells, 6) float64
         The smooth shapes of :func:`image_shapes` at the cells.
+    place_mm, cell_light : (cells, 2), (cells, 3) float64
+        Their middles on the membrane, x and y, and their mean light.
     blocks : (cells, 2) int32
         Where the grain of the image is measured, as for
         :func:`~gelpolight_core.image.grain.block_grain`.
@@ -98,6 +101,8 @@ class Samples:
     beside: Index
     run_cell: Index
     shapes: Array
+    place_mm: Array
+    cell_light: Array
     blocks: Index
     blur_strength: Array
 
@@ -137,7 +142,12 @@ def samples_of(calibration: SensorModel) -> Samples:
     of_sample = np.repeat(lattice.astype(np.int32), RUN)
     across = core.shape[1] // _cell_nodes(table) + 1
     count = np.bincount(of_sample, minlength=used.size).astype(np.float64)
-    at_row, at_column = (np.bincount(of_sample, corner[:, k], used.size) / count for k in (0, 1))
+
+    def mean(values: NDArray[np.floating[Any] | np.integer[Any]]) -> Array:
+        columns = [np.bincount(of_sample, part, used.size) / count for part in values.T]
+        return np.stack(columns, axis=-1)
+
+    middle = mean(corner)
     return Samples(
         corner=np.ascontiguousarray(corner, np.int32),
         part=np.ascontiguousarray(np.stack([v, u], -1) - corner, np.float32),
@@ -149,8 +159,10 @@ def samples_of(calibration: SensorModel) -> Samples:
         run_light=np.ascontiguousarray(expected.reshape(-1, RUN, 3).sum(axis=1).T, np.float64),
         beside=_neighbours(used, across),
         run_cell=lattice.astype(np.int32),
-        shapes=image_shapes(at_row, at_column, camera.height, camera.width),
-        blocks=block_corners(np.stack([at_row, at_column], axis=-1), camera.height, camera.width),
+        shapes=image_shapes(middle[:, 0], middle[:, 1], camera.height, camera.width),
+        place_mm=mean(np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)),
+        cell_light=mean(expected),
+        blocks=block_corners(middle, camera.height, camera.width),
         blur_strength=_blur_strength(base, (rows, columns), by_blur, weight)
         if textured.any()
         else np.zeros(0),

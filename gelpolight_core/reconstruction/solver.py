@@ -206,6 +206,7 @@ class OpenSolver(ABC):
         self.workers = RowWorkers(workers)
         self._finders: dict[bool, ContactFinder] = {}
         self._known = known
+        self._leds_mm = leds_mm
         self._condition_notes = condition_notes(calibration, leds_mm)
 
     @cached_property
@@ -216,6 +217,7 @@ class OpenSolver(ABC):
             self.calibration,
             interreflection=interreflection,
             crosstalk=self.calibration.crosstalk,
+            leds_mm=self._leds_mm,
         )
 
     @cached_property

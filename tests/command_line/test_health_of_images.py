@@ -53,8 +53,8 @@ def test_measure_names_the_image_of_another_sensor(
     cv2.imwrite(str(other), cv2.imread(str(press), cv2.IMREAD_UNCHANGED)[::-1])
     assert main(["measure", str(calibration), str(other), "--shape", "cylinder"]) == MENDABLE
     errors = capsys.readouterr().err
-    assert "does not look like this sensor's membrane" in errors
-    assert "is pressed" not in errors
+    assert "looks like this sensor's untouched membrane" in errors
+    assert "no object is pressed" not in errors
 
 
 def test_a_measurement_on_an_image_with_a_fault_is_doubtful_and_lists_it(
