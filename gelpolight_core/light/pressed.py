@@ -64,13 +64,16 @@ def is_pressed(samples: Samples, effects: Array, change: Array, usable: Mask, le
     left : (cells, 3)
         What the change of light leaves of it.
     """
+    if not usable.any():
+        return False
     sd = CORRELATED / np.sqrt(samples.normal[:, [0, 2, 4], [0, 2, 4]])
     seen, press = change / sd, effects / sd[..., None]
     weight, remaining = usable.astype(np.float64), seen
     for _ in range(ROUNDS):
         weighted = weight[:, None, None] * press
         matrix = np.tensordot(weighted, press, ((0, 1), (0, 1)))
-        depth_mm = np.linalg.solve(matrix, np.tensordot(weighted, seen, ((0, 1), (0, 1))))
+        # Too few cells with light do not determine all parts of a press.
+        depth_mm = np.linalg.pinv(matrix) @ np.tensordot(weighted, seen, ((0, 1), (0, 1)))
         remaining = seen - press @ depth_mm
         size = np.abs(remaining).max(axis=1)
         reach = SIGMAS * max(float(np.median(size[usable])), 1.0)
