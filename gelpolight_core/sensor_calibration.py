@@ -118,11 +118,15 @@ class ScaleSd:
     balls : float
         Relative error of the height of reconstructed ball presses, root mean square; it is part of
         `depth`.
+    shown : tuple of 2 floats, or None
+        How much larger than stated all balls look, relative, with its standard deviation; None
+        where the presses do not show it.
     """
 
     depth: float
     lateral: float
     balls: float = 0.0
+    shown: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

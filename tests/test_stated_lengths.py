@@ -12,6 +12,7 @@ from gelpolight_core.stated_lengths import (
     RADIUS_SD,
     SQUARE_SD,
     THICKNESS_SD,
+    WALL_OVER_BALL,
     stated_sd,
 )
 
@@ -41,5 +42,26 @@ def test_lengths_across_follow_the_rays_of_a_sensor_that_is_otherwise_than_state
     found = stated_sd(stack())
     assert found.lateral == pytest.approx(float(np.linalg.norm(moved)), rel=0.02)
     assert found.depth == pytest.approx(
-        float(np.hypot(found.lateral, HEIGHT_BY_RADIUS * RADIUS_SD)), rel=1e-9
+        float(np.hypot((1.0 + HEIGHT_BY_RADIUS) * found.lateral, HEIGHT_BY_RADIUS * RADIUS_SD))
+        / WALL_OVER_BALL,
+        rel=1e-9,
     )
+
+
+@pytest.mark.parametrize("off_sd", [0.001, 0.01])
+def test_balls_that_look_as_stated_leave_as_much_doubt_as_drawn_sensors(off_sd: float) -> None:
+    """Of many sensors with lengths off as stated, those whose balls look alike scatter so much."""
+    prior, random = stated_sd(stack()), np.random.default_rng(0)
+    lateral = random.normal(0.0, prior.lateral, 2_000_000)
+    radius = random.normal(0.0, RADIUS_SD, lateral.size)
+    looks = lateral - radius + random.normal(0.0, off_sd, lateral.size)
+    height = lateral + HEIGHT_BY_RADIUS * (lateral - radius)
+    for off in (0.0, 0.004):
+        alike = np.abs(looks - off) < 2e-4
+        found = stated_sd(stack(), (off, off_sd))
+        seen = np.sqrt([np.mean(height[alike] ** 2), np.mean(lateral[alike] ** 2)])
+        assert found.depth * WALL_OVER_BALL == pytest.approx(seen[0], rel=0.03)
+        assert found.lateral == pytest.approx(seen[1], rel=0.03)
+    assert stated_sd(stack(), (0.0, off_sd)).lateral < prior.lateral
+    blind = stated_sd(stack(), (0.0, 1e6))
+    assert blind == pytest.approx(prior)

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.from_around import LEVEL_NZ, surface_normals
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
@@ -27,7 +26,6 @@ from gelpolight_core.reconstruction.near_light.maps import (
     LEAST_SHARE,
     kinds,
     membrane_numbers,
-    middles,
     sensor_scale,
 )
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
@@ -36,6 +34,7 @@ from gelpolight_core.reconstruction.near_light.structures import (
     Steps,
     slopes_like,
 )
+from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
 from gelpolight_core.reflectance.membrane import UP
@@ -77,14 +76,12 @@ def ball_height_error(
     """
     assert calibration.full is not None
     solver = NearLightSolver(calibration, workers=1)
-    scale, grid = solver.maps.scale(COARSE), calibration.table.grid
-    points = np.stack(np.meshgrid(middles(grid.x_mm, COARSE), middles(grid.y_mm, COARSE)), axis=-1)
-    rays = np.moveaxis(scale.rays[:2], 0, -1)
-    errors = []
+    points, errors = calibration.table.grid.points_mm(), []
     for rgb, ball in zip(images, balls, strict=True):
-        depth = solver.coarse_depth(rgb)
-        away = np.linalg.norm(points + depth[..., None] * rays - ball.centre_mm, axis=-1)
-        top = (away < TOP_MM) & (scale.kind == 2)
+        # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
+        depth = solver.depth(rgb, Wanted(normals=False)).depth_mm
+        away = np.linalg.norm(points - ball.centre_mm, axis=-1)
+        top = (away < TOP_MM) & (solver.maps.scale(1).kind == 2)
         if top.any():
             true = ball.depth_mm - ball.radius_mm + np.sqrt(ball.radius_mm**2 - away[top] ** 2)
             errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)

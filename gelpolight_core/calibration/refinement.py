@@ -42,7 +42,7 @@ from gelpolight_core.sensor_calibration import (
     sensor_stack,
 )
 from gelpolight_core.session.session import Session
-from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS
+from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS, SHOWN_SD
 from gelpolight_core.translation import pattern, tr
 
 CHECKED_BALLS = 4
@@ -147,7 +147,10 @@ def _scale_sd(session: Session, results: Results, found: Joint) -> ScaleSd:
     fitted = depth_scale_sd(full, calibration.table, covariance)
     gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
     together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
-    return ScaleSd(together, lateral, unexplained)
+    seen, shown = joint.radius_factor, None
+    if seen is not None:
+        shown = (seen - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
+    return ScaleSd(together, lateral, unexplained, shown)
 
 
 def press_noise(presses: Sequence[BallPress]) -> NDArray[np.float64]:

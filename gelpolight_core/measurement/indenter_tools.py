@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -15,6 +16,7 @@ from gelpolight_core.measurement.spread import MODE_ERRORS, MODE_PITCH_MM, ModeE
 from gelpolight_core.measurement.tool import Point, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import Mode
+from gelpolight_core.reconstruction.near_light.contact import MARGIN_DECAYS
 from gelpolight_core.translation import pattern, tr
 
 AUTO = "auto"
@@ -80,12 +82,16 @@ def mode_error(heightmap: HeightMap) -> ModeError:
     effort = "fast" if heightmap.trace is None else heightmap.trace.effort
     found = MODE_ERRORS[Mode(heightmap.model, effort)]
     node_mm = heightmap.pitch_mm * found.node_mm
+    # Beyond its margin, the drape may have any depth up to what is left of the smallest visible
+    # one; the ground around an object is fitted with it.
+    hidden_mm = math.exp(-MARGIN_DECAYS) * (heightmap.visible_depth_mm or 0.0)
     return replace(
         found,
         depth_per_slope=found.depth_per_slope * (heightmap.pitch_mm / MODE_PITCH_MM) ** 2,
         lateral_per_mm=heightmap.lateral_per_mm,
         node_mm=node_mm,
         blur_mm2=found.blur_mm2 * node_mm**2 / 3.0,
+        level_mm=hidden_mm / math.sqrt(12.0),
     )
 
 

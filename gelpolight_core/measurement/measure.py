@@ -111,7 +111,7 @@ def measure_object(
     scale = {}
     if depth_sd is not None and lateral_sd is not None:
         scale = calibration_sd(shape, fit.values, depth_sd, lateral_sd)
-    of_mode = {} if mode is None else mode_sd(shape, fit.values, mode)
+    of_mode = {} if mode is None else mode_sd(shape, fit, window, mode)
     parts = (noise, scale, of_mode)
     return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
 

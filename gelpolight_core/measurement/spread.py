@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.measurement.fit import FitResult, WindowData
+from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measured import noise_at
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
@@ -57,6 +58,8 @@ class ModeError:
         Distance between the solved nodes: a large distance rounds the upper end of walls.
     blur_mm2 : float
         Variance of the map's blur by these nodes; 0 if it is not known.
+    level_mm : float
+        Standard deviation of heights by the drape beyond the solved region, which is left out.
     """
 
     depth: float
@@ -64,6 +67,7 @@ class ModeError:
     lateral_per_mm: float = 0.0
     node_mm: float = 0.0
     blur_mm2: float = 0.0
+    level_mm: float = 0.0
 
 
 WIDTH_BY_NODES = 0.7
@@ -142,23 +146,45 @@ def calibration_sd(
     return _systematic(shape, values, share, lateral_scale_sd)
 
 
-def mode_sd(shape: str, values: Mapping[str, float], mode: ModeError) -> dict[str, float]:
+def mode_sd(shape: str, fit: FitResult, window: WindowData, mode: ModeError) -> dict[str, float]:
     """Return the standard deviations of the fit's parameters by the mode.
 
     Parameters
     ----------
     shape : str
         What was fitted.
-    values : mapping
-        The fit's parameters.
+    fit : FitResult
+        The fit.
+    window : WindowData
+        What it was fitted to.
     mode : ModeError
         Of the height map.
     """
+    values = fit.values
     share = math.hypot(mode.depth, mode.depth_per_slope * _wall_slope(values))
     found = _systematic(shape, values, share, mode.lateral_per_mm * abs(values["height_mm"]))
-    rounded_mm = WIDTH_BY_NODES * mode.node_mm**2 / values["drape_decay_mm"]
-    flat = [name for name in LENGTHS if name in found and shape != "ball"]
-    return found | {name: math.hypot(found[name], rounded_mm) for name in flat}
+    found["height_mm"] = math.hypot(found["height_mm"], mode.level_mm)
+    if shape == "ball":
+        blurred = _blurred_away(fit, window, mode)
+    else:
+        rounded_mm = WIDTH_BY_NODES * mode.node_mm**2 / values["drape_decay_mm"]
+        blurred = {name: rounded_mm for name in LENGTHS if name in found}
+    return found | {name: math.hypot(found.get(name, 0.0), sd) for name, sd in blurred.items()}
+
+
+def _blurred_away(fit: FitResult, window: WindowData, mode: ModeError) -> dict[str, float]:
+    """Return how far the map's blur, which the shape of a ball leaves out, moves each parameter.
+
+    A blur changes the depth by half its variance times the Laplacian, here over one node.
+    """
+    if mode.blur_mm2 == 0.0:
+        return {}
+    x, y = window.x_mm[fit.chosen], window.y_mm[fit.chosen]
+    steps = ((mode.node_mm, 0.0), (-mode.node_mm, 0.0), (0.0, mode.node_mm), (0.0, -mode.node_mm))
+    ball = MODELS["ball"].depth
+    beside = sum(ball(fit.values, x + dx, y + dy) - ball(fit.values, x, y) for dx, dy in steps)
+    moved = fit.gain @ (0.5 * mode.blur_mm2 / mode.node_mm**2 * beside)
+    return {name: abs(float(sd)) for name, sd in zip(fit.values, moved, strict=True)}
 
 
 def _wall_slope(values: Mapping[str, float]) -> float:

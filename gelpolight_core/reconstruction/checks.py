@@ -43,6 +43,11 @@ UNSOLVED_SHARE = 1e-3
 MOST_PITCH = 0.25
 """Node distance over the drape's decay length: at 0.28 a cylinder of 1 mm loses 4 % of its height,
 at 0.7 8 %."""
+MOST_LOST = 0.02
+"""Share of a depth that the nodes may take without a word: half of the height error from which on a
+calibration fails."""
+SURE = 3.0
+"""Standard deviations beyond which an error is not noise."""
 MOST_HIDDEN_MM = 0.1
 """Sensors of 320 x 240 pixels and 50 dB show 25 um; a depth of 0 from a worse one needs a note."""
 LEAST_USABLE = 0.02
@@ -213,6 +218,30 @@ def small_image_notes(pitch_mm: float, decay_mm: float) -> tuple[Finding, ...]:
         "by several percent; use larger images"
     )
     return (_note("small_image", text.format(p=pitch_mm, d=decay_mm)),)
+
+
+def too_coarse_notes(
+    top: tuple[float, float], noise_mm: float, node_mm: float
+) -> tuple[Finding, ...]:
+    """Return the note on a map whose nodes do not resolve its deepest top, if they do not.
+
+    Parameters
+    ----------
+    top : (float, float)
+        Depth, and what the nodes take from it, in mm.
+    noise_mm : float
+        Standard deviation of the depth of the smallest visible face.
+    node_mm : float
+        Distance between the solved nodes.
+    """
+    depth_mm, lost_mm = top
+    if lost_mm <= max(MOST_LOST * depth_mm, SURE * noise_mm):
+        return ()
+    text = tr(
+        "the deepest point is finer than nodes of {p:.2f} mm resolve: its depth may be {um:.0f} um "
+        "too small; use a finer effort or larger images"
+    )
+    return (_note("too_coarse", text.format(p=node_mm, um=1e3 * lost_mm)),)
 
 
 def visible_depth_notes(visible_mm: float) -> tuple[Finding, ...]:

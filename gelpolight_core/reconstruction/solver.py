@@ -84,7 +84,7 @@ class DepthNoise:
     Attributes
     ----------
     slope_sd, depth_sd_mm : (rows, columns) float32
-        Standard deviations from the noise of a single image.
+        Standard deviations from the noise of a single image, and from the correction of its light.
     slope_model_sd, depth_model_sd_mm : (rows, columns) float32
         Standard deviations from errors of the model.
     noise_mm : (examples, rows / 4, columns / 4) float32

@@ -25,13 +25,18 @@ from gelpolight_core.reconstruction.checks import (
     refuse_dark_membrane,
     rounds_notes,
     small_image_notes,
+    too_coarse_notes,
     unanchored_note,
     unsolved_notes,
     visible_depth_notes,
 )
 from gelpolight_core.reconstruction.height_map import COARSE, Flag, HeightMap
 from gelpolight_core.reconstruction.linear import linearised
-from gelpolight_core.reconstruction.near_light.contact import margin_mm, padded_region
+from gelpolight_core.reconstruction.near_light.contact import (
+    AREA_SIGMAS,
+    margin_mm,
+    padded_region,
+)
 from gelpolight_core.reconstruction.near_light.from_around import FromAround
 from gelpolight_core.reconstruction.near_light.image_noise import image_noise
 from gelpolight_core.reconstruction.near_light.maps import MISSING_CODE, SensorMaps
@@ -52,6 +57,7 @@ from gelpolight_core.reconstruction.near_light.settings import MOVED, SETTINGS, 
 from gelpolight_core.reconstruction.near_light.structures import Region, Slopes
 from gelpolight_core.reconstruction.near_light.surface_image import surface_image
 from gelpolight_core.reconstruction.near_light.uncertainty import depth_noise, no_contact_noise
+from gelpolight_core.reconstruction.resolution import lost_at_top
 from gelpolight_core.reconstruction.solver import (
     INTEGRATION,
     LOOKING,
@@ -64,7 +70,7 @@ from gelpolight_core.reconstruction.solver import (
     flat_normals,
     unseen_reason,
 )
-from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
 from gelpolight_core.sensor_calibration import OpenSensor
 from gelpolight_core.stated_lengths import stated_sd
@@ -221,22 +227,6 @@ class NearLightSolver(OpenSolver):
             region = self._region(image, record, wanted.everywhere)
             return None if region is None else self._solved(image, region, wanted, record)[1]
 
-    def coarse_depth(self, frame: NDArray[Any]) -> Map:
-        """Return the depth along the rays (rows / 4, columns / 4) of the whole field.
-
-        Parameters
-        ----------
-        frame
-            As in :meth:`depth`.
-        """
-        with self._lock:
-            raw, linear, _ = self._image(frame, Wanted())
-            region = Region((0, 0), self.maps.scale(COARSE).kind.shape)
-            found = self._sampler.compare(
-                raw, region, factor=COARSE, linear=linear, terms=ALL_TERMS
-            )
-            return self._solver.rounds(region, found, self._settings["best"], ALL_TERMS)[1].depth_mm
-
     def _depth(
         self, image: Image, region: Region | None, wanted: Wanted, record: TraceRecorder
     ) -> Solved:
@@ -258,6 +248,8 @@ class NearLightSolver(OpenSolver):
             notes += small_image_notes(
                 self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
             )
+            top, noise_mm = lost_at_top(solved.depth_mm), self.visible_mm / AREA_SIGMAS
+            notes += too_coarse_notes(top, noise_mm, solved.scale.pitch_mm)
             with record.done(PLACING, depth.size * SHOWN_BYTES) as reason:
                 self._show(solved, wanted.terms, depth, flags, shown)
                 if boundary.level_sd_mm > 0.0:
@@ -271,7 +263,8 @@ class NearLightSolver(OpenSolver):
             record.left_out(tr("normals"), tr("not requested"))
         if not wanted.uncertainty:
             record.left_out(tr("standard deviations"), tr("not requested"))
-        scale, stated = self.maps.full.scale_sd, stated_sd(self.calibration.stack)
+        scale = self.maps.full.scale_sd
+        stated = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
         return Solved(
             depth,
             shown,

@@ -4,9 +4,10 @@ Slopes: each channel is changed by plus and minus its noise and the normals are 
 the conditioning, missing channels and weights of the result. Depth: random fields of slope errors
 are integrated with the weights of the result at quarter scale. Noise is white; each octave of its
 wavelengths adds equally to the variance of the depth. Quarter scale leaves out two octaves, of
-which the average of uniform areas has removed most. Repeated images scatter by this. Errors of the
-model, known from the ball presses, are correlated over lengths like that of the drape and occur
-only where the membrane is deformed; they are equal in every repeat and different in every press.
+which the average of uniform areas has removed most. Repeated images scatter by this, and by the
+error of the correction of their light. Errors of the model, known from the ball presses, are
+correlated over lengths like that of the drape and occur only where the membrane is deformed; they
+are equal in every repeat and different in every press.
 Errors of the calibration are common to all presses and are stored with it (:class:`ScaleSd`).
 
 Outside the solved region the depth is 0 in every repeat; its error is part of the model error.
@@ -118,6 +119,12 @@ def depth_noise(
     times = model_times(answer.compared.fine.ratio, sd, maps.full.misfit)
     coarse = maps.scale(COARSE)
     white = depth_examples(moves, block, answer, coarse.pitch_mm, workers=workers)
+    if light_sd is not None:
+        # Each image has its own light, and with it its own error of the correction.
+        shares = light_sd.astype(np.float32)[:, None, None]
+        moved = gain_errors(moves, shares * answer.compared.fine.ratio / sd, answer, coarse)
+        drawn = np.random.default_rng(0).standard_normal((EXAMPLES, len(moved)), np.float32)
+        white += np.tensordot(drawn, moved, 1)
     model = depth_examples(
         moves,
         times,
@@ -140,11 +147,6 @@ def depth_noise(
     one_sided = answer.boundary.depth_sd * np.abs(depth_mm)
     level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
     level_sd = np.hypot(level_sd, wall_sd_mm(depth_mm))
-    if light_sd is not None:
-        shares = light_sd.astype(np.float32)[:, None, None]
-        moved = gain_errors(moves, shares * answer.compared.fine.ratio / sd, answer, coarse)
-        moved_sd = _root_mean_square(place_examples(moved, answer, coarse), (rows, columns))
-        level_sd = np.hypot(level_sd, np.sqrt(len(moved)) * moved_sd)
     result.depth_model_sd_mm[here] = np.hypot(model_sd, level_sd)
     (top, left), (rows, columns) = answer.region.corner, answer.region.shape
     result.noise_mm[:, top : top + rows, left : left + columns] = placed
@@ -291,27 +293,19 @@ def depth_examples(
     along = np.sqrt((moved_x**2).sum(axis=0))
     across = (moved_x * moved_y).sum(axis=0) / np.maximum(along, 1e-12)
     own = np.sqrt(np.maximum((moved_y**2).sum(axis=0) - across**2, 0.0))
-    weight = block_average(answer.weight, COARSE)
-    hold = None if answer.hold is None else block_average(answer.hold, COARSE)
+    depth = _integration(answer, pitch_mm)
     sigma = reach_mm / (pitch_mm * np.sqrt(2.0))
-    found = np.empty((examples, *weight.shape), np.float32)
+    found = np.empty((examples, *along.shape), np.float32)
 
     def draw(first: int, last: int) -> None:
         for n in range(first, last):
             # Each example has its own source, so that the threads do not matter.
             random = np.random.default_rng(n)
-            drawn = random.standard_normal((2, *weight.shape), dtype=np.float32)
+            drawn = random.standard_normal((2, *along.shape), dtype=np.float32)
             if sigma > 0.0:
                 drawn = np.stack([cv2.GaussianBlur(d, (0, 0), sigma) for d in drawn])
                 drawn /= drawn.std()
-            found[n] = integrate_weighted(
-                along * drawn[0],
-                across * drawn[0] + own * drawn[1],
-                weight,
-                pitch_mm=pitch_mm,
-                hold=hold,
-                tolerance=TOLERANCE,
-            ).depth_mm
+            found[n] = depth(along * drawn[0], across * drawn[0] + own * drawn[1])
 
     workers.run(examples, draw)
     return found
@@ -336,21 +330,25 @@ def gain_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Sca
     (3, rows / 4, columns / 4) float32
         Depth along the rays.
     """
+    depth = _integration(answer, coarse.pitch_mm)
+    parts = zip(noise.moved_x, noise.moved_y, times, strict=True)
+    return np.stack(
+        [depth(block_average(x * n, COARSE), block_average(y * n, COARSE)) for x, y, n in parts]
+    )
+
+
+def _integration(answer: SolvedRegion, pitch_mm: float) -> Callable[[Map, Map], Map]:
+    """Return what integrates slopes at quarter scale with the weights of a result."""
     weight = block_average(answer.weight, COARSE)
     hold = None if answer.hold is None else block_average(answer.hold, COARSE)
-    return np.stack(
-        [
-            integrate_weighted(
-                block_average(x * n, COARSE),
-                block_average(y * n, COARSE),
-                weight,
-                pitch_mm=coarse.pitch_mm,
-                hold=hold,
-                tolerance=TOLERANCE,
-            ).depth_mm
-            for x, y, n in zip(noise.moved_x, noise.moved_y, times, strict=True)
-        ]
-    )
+
+    def depth(slope_x: Map, slope_y: Map) -> Map:
+        found = integrate_weighted(
+            slope_x, slope_y, weight, pitch_mm=pitch_mm, hold=hold, tolerance=TOLERANCE
+        )
+        return found.depth_mm
+
+    return depth
 
 
 def model_times(ratio: Map, ratio_sd: Map, misfit: float) -> Map:

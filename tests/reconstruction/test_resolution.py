@@ -1,0 +1,145 @@
+"""What the nodes take from fine tips is stated, and said where it is much."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gelpolight_core.finding import Verdict
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.resolution import lost_at_top
+from gelpolight_core.reconstruction.trace import EFFORTS
+from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter, Relief
+from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
+
+Maps = Callable[[str, str], HeightMap]
+H = 0.1
+
+
+def around(height_mm: float, radius_mm: float) -> Relief:
+    """Return a bar with a round back (0: a cone) of a height above its base."""
+    cells = 0.0125 * np.arange(-120, 121)
+    x, y = np.meshgrid(cells, cells)
+    if radius_mm == 0.0:
+        return Relief(1.5 - np.hypot(x, y), 0.0125, height_mm)
+    back = np.sqrt(np.maximum(radius_mm**2 - y**2, 0.0))
+    return Relief(np.where(np.abs(y) < radius_mm, back, np.nan), 0.0125, height_mm)
+
+
+OBJECTS: dict[str, Indenter] = {
+    "ball 2": Ball(2.0, 0.6),
+    "ball 0.5": Ball(0.5, 0.4),
+    "ball 0.25": Ball(0.25, 0.2),
+    "needle": around(0.5, 0.0),
+    "wire 0.3": around(0.2, 0.15),
+    "cylinder": Cylinder(5.0, 1.0),
+    "cuboid": Cuboid(4.0, 1.0),
+    "plate": Cylinder(6.0, 0.05),
+    "square plate": Cuboid(6.0, 0.05),
+}
+
+
+@pytest.fixture(scope="module")
+def known() -> KnownSensor:
+    """Return a matt sensor of 640 x 480 pixels, without an error of the calibration."""
+    return known_sensor(matt_design(0.5))
+
+
+@pytest.fixture(scope="module")
+def sensor(known: KnownSensor) -> Reconstructor:
+    """Return its reconstructor."""
+    return Reconstructor(known.calibration)
+
+
+@pytest.fixture(scope="module")
+def pressed(known: KnownSensor, sensor: Reconstructor) -> Maps:
+    """Return what gives the map of an object at an effort, of one noisy image each."""
+
+    @cache
+    def frame(name: str) -> np.ndarray:
+        light = known.pressed(OBJECTS[name], x_mm=1.23, y_mm=-0.77, samples=2).frame
+        return known.noisy(light, seed=1)
+
+    def at(name: str, effort: str) -> HeightMap:
+        return sensor.at_effort(effort).depth(frame(name))
+
+    return at
+
+
+def test_a_smooth_top_loses_an_eighth_of_its_laplacian() -> None:
+    x, y = np.meshgrid(*[H * np.arange(-20, 21) + 0.03] * 2)
+    depth = np.maximum(1.0 - (x**2 + y**2) / 4.0, 0.0).astype(np.float32)
+    top, lost = lost_at_top(depth)
+    assert top == pytest.approx(1.0, abs=2e-3)
+    assert lost == pytest.approx(H**2 / 8.0, rel=0.02)
+
+
+def test_a_kink_loses_in_proportion_to_the_distance_of_the_nodes() -> None:
+    """The mean of a cone of slope 1 over a square node is 0.38 of the node below its tip."""
+    x, y = np.meshgrid(*[H * np.arange(-20, 21)] * 2)
+    sharp = np.maximum(1.0 - np.hypot(x, y), 0.0).astype(np.float32)
+    assert 0.38 * H < lost_at_top(sharp)[1] < 4 * 0.38 * H
+    assert lost_at_top(sharp[::2, ::2])[1] == pytest.approx(2.0 * lost_at_top(sharp)[1], rel=0.01)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.005])
+def test_a_face_loses_nothing_although_its_edge_is_sharp(tilt: float) -> None:
+    x, y = np.meshgrid(*[H * np.arange(-40, 41)] * 2)
+    noise = np.random.default_rng(1).normal(0.0, 1e-3, x.shape)
+    away = np.maximum(np.maximum(np.abs(x), np.abs(y)) - 2.0, 0.0)
+    depth = ((1.0 + tilt * x) * np.exp(-away / 0.7) + noise).astype(np.float32)
+    assert lost_at_top(depth)[1] < 3e-3
+    assert lost_at_top(depth[:4]) == (float(depth[:4].max()), 0.0)
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("name", ["ball 2", "ball 0.5", "ball 0.25"])
+def test_small_balls_are_within_their_deviations_in_every_effort(
+    pressed: Maps, name: str, effort: str
+) -> None:
+    ball = OBJECTS[name]
+    assert isinstance(ball, Ball)
+    found = measure_heightmap(pressed(name, effort), shape="ball")
+    assert abs(found.height_mm - ball.depth_mm) < 3.0 * found.sd["height_mm"]
+    assert abs(found.size_mm - 2.0 * ball.radius_mm) < 3.0 * found.size_sd_mm
+    # Not more than is needed: a ball of 4 mm loses next to nothing at full scale.
+    if (name, effort) == ("ball 2", "best"):
+        assert found.sd["height_mm"] < 0.005
+
+
+@pytest.mark.parametrize(
+    ("name", "efforts"),
+    [("needle", EFFORTS), ("ball 0.25", EFFORTS[:2]), ("wire 0.3", EFFORTS[:1])],
+)
+def test_tips_finer_than_the_nodes_are_doubtful(
+    pressed: Maps, name: str, efforts: tuple[str, ...]
+) -> None:
+    for effort in efforts:
+        found = pressed(name, effort)
+        assert [f.key for f in found.doubts] == ["too_coarse"]
+        lost = OBJECTS[name].depth_mm - found.depth_mm.max()
+        assert lost > 0.02 * OBJECTS[name].depth_mm
+        (note,) = found.doubts
+        assert note.verdict is Verdict.WARN
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_what_the_nodes_resolve_is_not_doubted(pressed: Maps, effort: str) -> None:
+    for name in ("ball 2", "cylinder", "cuboid", "plate", "square plate"):
+        assert not pressed(name, effort).doubts
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_shallow_plates_are_within_their_deviations_in_every_effort(
+    pressed: Maps, effort: str
+) -> None:
+    for name, shape in (("plate", "cylinder"), ("square plate", "cuboid")):
+        found = measure_heightmap(pressed(name, effort), shape=shape)
+        off_mm = found.height_mm - OBJECTS[name].depth_mm
+        assert abs(off_mm) < 2.0 * found.sd["height_mm"]
+        assert found.sd["height_mm"] < 2e-3
