@@ -1,7 +1,7 @@
 """Dead and hot pixels and lines of a camera: finding them, and leaving them out of an image.
 
-A lens spreads every point of light over neighbouring pixels. A pixel that differs from all its
-neighbours, which agree with each other, is therefore a fault of the camera.
+A lens spreads every point of light over neighbouring pixels. A pixel that differs from its
+neighbours, which agree with each other but for one, is therefore a fault of the camera.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ OF_SPREAD = 1.5
 LINE_SHARE = 0.5
 """A column (row) is bad where at least this share of its pixels differs from both sides."""
 ACROSS, DOWN = 1, 2
-FAR_SHARE = 0.02
-"""Share of single bad pixels from which on the error of a depth is a third of its value."""
+FAR_SHARE = 0.05
+"""Share of bad pixels from which on so many have others beside them that not all are found."""
+ROUNDS = 4
+"""With the bad pixels of a round left out, more of those between them are seen."""
 REACH = 12
 """Distance to the nearest good pixel above which bad pixels are not single pixels or lines."""
 
@@ -154,11 +156,18 @@ def isolated_pixels(raw: NDArray[Any], light: NDArray[np.float32], *, noise: flo
     raw, light, noise
         As for :func:`differing`.
     """
-    marks = differing(raw, light, np.arange(len(raw)), noise=noise)
-    bad = marks == (ACROSS | DOWN)
-    bad[:, bad_lines(marks, ACROSS)] = True
-    bad[bad_lines(marks.T, DOWN), :] = True
-    return BadPixels(np.argwhere(bad).astype(np.int32), *marks.shape)
+    height, width = raw.shape[:2]
+    found = no_bad_pixels(height, width)
+    for share in (1.0, *[0.0] * ROUNDS):
+        rest, rows = found.left_out(raw), np.arange(height)
+        marks = differing(rest, light, rows, noise=noise, share=share)
+        bad = marks == (ACROSS | DOWN)
+        bad[:, bad_lines(marks, ACROSS)] = True
+        bad[bad_lines(marks.T, DOWN), :] = True
+        if not bad.any():
+            break
+        found = BadPixels(np.argwhere(bad | found.mask).astype(np.int32), height, width)
+    return found
 
 
 def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
@@ -172,7 +181,12 @@ def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
 
 
 def differing(
-    raw: NDArray[Any], light: NDArray[np.float32], rows: NDArray[np.intp], *, noise: float
+    raw: NDArray[Any],
+    light: NDArray[np.float32],
+    rows: NDArray[np.intp],
+    *,
+    noise: float,
+    share: float = 1.0,
 ) -> NDArray[np.uint8]:
     """Return which pixels of some rows differ from their neighbours.
 
@@ -186,6 +200,9 @@ def differing(
         The rows that are checked.
     noise : float
         Standard deviation of a pixel, share of full scale.
+    share : float, optional
+        Of the neighbours' light, by which a pixel differs that is like one of them. No speck of the
+        membrane doubles the light; where pixels are known to be bad, 0 finds them all.
 
     Returns
     -------
@@ -195,20 +212,27 @@ def differing(
     marks = np.zeros((len(rows), raw.shape[1]), np.uint8)
     if min(raw.shape[:2]) > 4:
         least = np.float32(max(LEAST_STEP, 8.0 * noise))
-        _differing(raw, light, np.asarray(rows, np.int64), least, marks)
+        _differing(raw, light, np.asarray(rows, np.int64), least, np.float32(share), marks)
     return marks
 
 
 @numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True, forceinline=True)
-def _differs(p, a, b, c, d, least):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return whether p is far from a, b, c and d, which agree."""
+def _differs(p, a, b, c, d, least, share):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return whether p is far from a, b, c and d, which agree, or by more from all but one."""
     low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
-    limit = least + np.float32(OF_SPREAD) * (high - low)
-    return p > high + limit or p < low - limit
+    spread = np.float32(OF_SPREAD)
+    limit = least + spread * (high - low)
+    if p > high + limit or p < low - limit:
+        return True
+    one, other = max(min(a, b), min(c, d)), min(max(a, b), max(c, d))
+    inner_low, inner_high = min(one, other), max(one, other)
+    above = inner_high + max(least, share * inner_high) + spread * (inner_high - low)
+    below = inner_low - max(least, share * inner_low) - spread * (high - inner_low)
+    return p > above or p < below
 
 
 @numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
-def _differing(raw, light, rows, least, marks):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _differing(raw, light, rows, least, share, marks):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write the marks of some rows; the outermost two pixels are left out."""
     height, width = raw.shape[0], raw.shape[1]
     for i in range(rows.size):
@@ -219,15 +243,15 @@ def _differing(raw, light, rows, least, marks):  # type: ignore[no-untyped-def] 
             for k in range(3):
                 p = light[k, raw[r, c, k]]
                 a, d = light[k, raw[r, c - 1, k]], light[k, raw[r, c + 1, k]]
-                # Most pixels lie between their neighbours, or near them.
-                if abs(p - a) > least and abs(p - d) > least:
+                # Most pixels are like the one before. Of several alike, the first is found.
+                if abs(p - a) > least:
                     b, e = light[k, raw[r, c - 2, k]], light[k, raw[r, c + 2, k]]
-                    if _differs(p, b, a, d, e, least):
+                    if _differs(p, b, a, d, e, least, share):
                         mark |= ACROSS
                 if inner:
                     a, d = light[k, raw[r - 1, c, k]], light[k, raw[r + 1, c, k]]
-                    if abs(p - a) > least and abs(p - d) > least:
+                    if abs(p - a) > least:
                         b, e = light[k, raw[r - 2, c, k]], light[k, raw[r + 2, c, k]]
-                        if _differs(p, b, a, d, e, least):
+                        if _differs(p, b, a, d, e, least, share):
                             mark |= DOWN
             marks[i, c] = mark

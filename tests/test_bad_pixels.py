@@ -69,6 +69,18 @@ def test_images_of_healthy_cameras_show_no_share_of_hot_pixels(
         assert (marks == (ACROSS | DOWN)).mean() < 1e-4, path
 
 
+def test_bad_pixels_beside_each_other_are_found() -> None:
+    image = scene(0)
+    for row, column in ((10, 20), (10, 21), (30, 40), (31, 40), (50, 60), (50, 61), (51, 60)):
+        image[row, column] = 1.0
+    image[20, 50] = image[21, 50] = 0.0
+    image[40, 10] = 0.0
+    bad = find_bad_pixels([image], noise=0.004).mask
+    assert bad.sum() == 10
+    assert bad[image[..., 1] == 1.0].all()
+    assert bad[image[..., 1] == 0.0].all()
+
+
 def test_dirt_in_one_scene_and_specks_are_no_bad_pixels() -> None:
     dirty, clean = scene(0), scene(1)
     dirty[10, 50] = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 from threading import Lock
 from typing import Any
@@ -136,21 +137,22 @@ class HealthCheck:
             return Health(unknown=("other_sensor",), untouched=0.0)
         with self._lock:
             raw, light = self._coded(frame)
-            common = self._common(raw, light)
             pixels = self._bad_pixels(raw, light, whole)
-            if common.share < LEAST_UNTOUCHED and pixels:
-                # Hot pixels in most cells hide the light there.
-                bad = isolated_pixels(raw, light, noise=self._noise)
-                raw = bad.left_out(raw)
-                common = self._common(raw, light)
-            if common.share >= LEAST_UNTOUCHED:
-                return self._faults(raw, light, common, whole, pixels)
-            far = [finding for finding in pixels if finding.meaningless]
-            if far or self._boundary_fits():
-                return health_of(far or pixels, unknown=UNJUDGED, untouched=common.share)
-            if self._is_pressed(common):
-                return self._all_pressed(pixels)
-            return self._strange(raw, light, common.share, whole)
+            bad = isolated_pixels(raw, light, noise=self._noise) if pixels else None
+            raw = raw if bad is None else bad.left_out(raw)
+            return replace(self._judged(raw, light, whole, pixels), bad=bad)
+
+    def _judged(self, raw: NDArray[Any], light: Map, whole: bool, pixels: list[Finding]) -> Health:
+        """Return the findings on a frame without its bad pixels, of which `pixels` tell."""
+        common = self._common(raw, light)
+        if common.share >= LEAST_UNTOUCHED:
+            return self._faults(raw, light, common, whole, pixels)
+        far = [finding for finding in pixels if finding.meaningless]
+        if far or self._boundary_fits():
+            return health_of(far or pixels, unknown=UNJUDGED, untouched=common.share)
+        if self._is_pressed(common):
+            return self._all_pressed(pixels)
+        return self._strange(raw, light, common.share, whole)
 
     def change(self, frame: NDArray[Any]) -> tuple[CommonChange, Uneven | None]:
         """Return the common change of a frame's light, and its uneven one."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
 
@@ -72,6 +73,8 @@ class Health:
     light : LightGain or None
         Change of the light that is corrected; None if the light has not changed within its noise,
         or if the change cannot be corrected.
+    bad : BadPixels or None
+        Bad pixels of the image, which the depth leaves out; None where there are none.
     """
 
     findings: tuple[Finding, ...] = ()
@@ -79,6 +82,7 @@ class Health:
     untouched: float = 1.0
     cells: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
     light: LightGain | None = field(default=None, compare=False)
+    bad: BadPixels | None = field(default=None, repr=False, compare=False)
 
     @property
     def faults(self) -> tuple[Finding, ...]:

@@ -322,7 +322,12 @@ class Reconstructor:
         return self.solver.check(frame, whole=True)
 
     def _evened(self, frame: NDArray[Any], health: Health | None) -> NDArray[Any]:
-        """Return a frame without an uneven change of its light, then in linear light."""
+        """Return a frame without bad pixels, and without an uneven change of its light.
+
+        If it has the latter, it is in linear light then.
+        """
+        if health is not None and health.bad is not None:
+            frame = health.bad.left_out(frame)
         light = None if health is None else health.light
         if light is None or light.shape is None:
             return frame

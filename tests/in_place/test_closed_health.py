@@ -162,10 +162,16 @@ def test_a_compressed_image_is_named(
         assert found.meaningless is None
 
 
-def test_hot_pixels_are_named(reconstructor: Reconstructor, presses: list[Frame]) -> None:
+@pytest.mark.parametrize("value", [0, 255])
+def test_hot_and_dead_pixels_are_named_and_left_out(
+    reconstructor: Reconstructor, presses: list[Frame], value: int
+) -> None:
     frame = presses[0].copy()
-    frame[np.random.default_rng(0).random(frame.shape[:2]) < 0.01] = 255
+    frame[np.random.default_rng(0).random(frame.shape[:2]) < 0.01] = value
     assert "bad_pixels" in reconstructor.health(frame).keys
+    clean, found = reconstructor.depth(presses[0]), reconstructor.depth(frame)
+    assert found.doubts
+    assert np.abs(found.depth_mm - clean.depth_mm).max() < 0.02 * clean.depth_mm.max()
 
 
 def test_colours_of_a_real_sensor_in_another_order_are_refused(shared_data: Path) -> None:

@@ -88,18 +88,15 @@ class InPlaceSolver:
         found = self._health.check(frame, whole=whole)
         unknown = {*UNKNOWN, *found.unknown}
         unknown.update(SCATTERING if self._model.press_light is None else ())
-        return health_of(
-            [
-                replace(f, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
-                if f.meaningless and f.key in (*SCATTERING[:-1], "other_sensor")
-                else f
-                for f in found.findings
-                if f.key not in UNKNOWN
-            ],
-            unknown=tuple(key for key in KEYS if key in unknown),
-            untouched=found.untouched,
-            light=found.light,
-        )
+        findings = [
+            replace(f, verdict=Verdict.WARN, heights=Heights.DOUBTFUL)
+            if f.meaningless and f.key in (*SCATTERING[:-1], "other_sensor")
+            else f
+            for f in found.findings
+            if f.key not in UNKNOWN
+        ]
+        ordered = health_of(findings, unknown=tuple(key for key in KEYS if key in unknown))
+        return replace(ordered, untouched=found.untouched, light=found.light, bad=found.bad)
 
     def needs(self, frame: NDArray[Any], wanted: Wanted) -> Trace:
         """Return which steps a frame needs; see :class:`Solver`."""
