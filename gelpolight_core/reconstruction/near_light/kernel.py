@@ -665,3 +665,80 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
             _store(w, _NORMAL + 1, slopes.normal_y, i, begin, count)
             for j in range(count):
                 slopes.flags[i, begin + j] = np.uint8(w[_FLAG * _B + j])
+
+
+@_part
+def _left_over(w, j, dark, curves, table, gloss, interreflection):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a node's light that no normal explains, its whole light there, noise and slope.
+
+    Three channels have one direction more than a normal: that in which no change of the normal
+    changes them. All are NaN where a channel is dark, saturated or hidden.
+    """
+    n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
+    (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, interreflection, True)
+    s0, s1, s2 = _triple(w, _SCALED, j)
+    f0, x0, y0, z0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)
+    f1, x1, y1, z1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)
+    f2, x2, y2, z2 = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)
+    c0, c1, c2 = _cross(
+        (
+            (n[0] * z0 - n[2] * x0) / s0,
+            (n[0] * z1 - n[2] * x1) / s1,
+            (n[0] * z2 - n[2] * x2) / s2,
+        ),
+        (
+            (n[1] * z0 - n[2] * y0) / s0,
+            (n[1] * z1 - n[2] * y1) / s1,
+            (n[1] * z2 - n[2] * y2) / s2,
+        ),
+    )
+    short = ONE / sqrt(c0 * c0 + c1 * c1 + c2 * c2 + _TINY)
+    c = (c0 * short, c1 * short, c2 * short)
+    left = _inner(((t0 - f0) / s0, (t1 - f1) / s1, (t2 - f2) / s2), c)
+    whole = _inner((f0 / s0, f1 / s1, f2 / s2), c)
+    g0, g1, g2 = _triple(w, _NOISE, j)
+    noise = sqrt(g0 * g0 * c[0] * c[0] + g1 * g1 * c[1] * c[1] + g2 * g2 * c[2] * c[2])
+    slope = sqrt(n[0] * n[0] + n[1] * n[1]) / -n[2]
+    known = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
+    gap = single(np.nan)
+    return (left, whole, noise, slope) if known else (gap, gap, gap, gap)
+
+
+@_whole
+def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Compare every `step`-th row of a solved region with the light that its normals explain.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows of `left`.
+    image, depth, scale, corner, membrane, slopes
+        As for :func:`solve_rows`, solved.
+    step : int
+        Rows to a row of `left`.
+    left : (4, rows / step, columns) float32
+        Light that no normal explains, the whole light in the same direction, its noise, all over
+        the flat membrane's, and the slope; NaN where they are not known. Written.
+    """
+    columns = depth.shape[1]
+    leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
+    gloss, interreflection = membrane.gloss, membrane.interreflection
+    w = np.zeros(sum(_WIDTHS) * _B, np.float32)
+    pitch = single(scale.pitch_mm)
+    for k in range(first, last):
+        i = k * step
+        y = single(scale.y_mm + scale.pitch_mm * (i + corner[0]))
+        for begin in range(0, columns, _B):
+            count = min(_B, columns - begin)
+            position = corner[1] + begin
+            _load(w, image, depth, scale, corner, slopes, True, i, begin, count)
+            at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
+            rays = ray_ramps(scale, i + corner[0], position, count)
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, interreflection, True, ONE)
+            for j in range(count):
+                nx, ny = slopes.normal_x[i, begin + j], slopes.normal_y[i, begin + j]
+                nz = -sqrt(_most(ONE - nx * nx - ny * ny, _TINY))
+                _put(w, _NORMAL, j, (nx, ny, nz))
+                found = _left_over(w, j, dark, curves, table, gloss, interreflection)
+                for part in range(4):
+                    left[part, k, begin + j] = found[part]

@@ -28,7 +28,7 @@ from gelpolight_core.reconstruction.near_light.from_around import (
     surface_normals,
     with_surroundings,
 )
-from gelpolight_core.reconstruction.near_light.kernel import UNSOLVED_WEIGHT, solve_rows
+from gelpolight_core.reconstruction.near_light.kernel import UNSOLVED_WEIGHT, left_rows, solve_rows
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.ratio import Compared
 from gelpolight_core.reconstruction.near_light.settings import Settings
@@ -339,6 +339,22 @@ class RegionSolver:
             down = -np.sqrt(1.0 - slopes.normal_x**2 - slopes.normal_y**2)
             slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down
         return slopes
+
+    def light_left(self, solved: SolvedRegion) -> tuple[Map, int]:
+        """Return the light that a region's normals do not explain, and the step from row to row.
+
+        As :func:`.kernel.left_rows`; rows are half the drape's decay length apart.
+        """
+        scale = solved.scale
+        step = max(round(0.5 * self.maps.full.decay_mm / scale.pitch_mm), 1)
+        rows, columns = solved.depth_mm.shape
+        left = np.empty((4, rows // step, columns), np.float32)
+        corner = solved.region.at(COARSE // scale.factor)[0]
+        found = (scale, corner, self.maps.membrane, solved.slopes)
+        self._workers.run(
+            rows // step, left_rows, solved.compared.fine, solved.start_mm, *found, step, left
+        )
+        return left, step
 
     def _integrated(
         self, scale: Scale, weighted: Weighted, depth: Map, tolerance: float, terms: Terms
