@@ -7,6 +7,7 @@ that the calibration's own balls have left.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -43,26 +44,19 @@ class ContactLight:
         (its area over the flat one's, less 1), and the standard deviation.
     spread : float
         Size of what is left on gentle slopes, in standard deviations.
+    uneven : float
+        Share of the slopes that belongs to no surface, over the misfit of the calibration's balls.
     """
 
     stretch: float
     stretch_sd: float
     spread: float
+    uneven: float
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What this says about the height map."""
-        if self.spread > SIGMAS:
-            text = tr(
-                "the image does not fit the surface found: what is left is {n:.1f} times that of "
-                "the calibration's balls"
-            )
-            remedy = tr(
-                "Hold object and sensor still during the exposure, clean the contact, and press "
-                "again"
-            )
-            return (_doubtful("residual", text.format(n=self.spread), self.spread, "", remedy),)
-        if abs(self.stretch) > SIGMAS * self.stretch_sd:
+        if abs(self.stretch) > SIGMAS * self.stretch_sd and self.spread < SIGMAS:
             percent = 100.0 * self.stretch
             text = tr(
                 "the stretched membrane is {how} than in the calibration's presses, by {p:.0f} % "
@@ -71,10 +65,21 @@ class ContactLight:
             text = text.format(how=tr("darker") if percent < 0 else tr("brighter"), p=abs(percent))
             remedy = tr("Press the balls again and calibrate, or replace a worn membrane")
             return (_doubtful("stretched", text, percent, "%", remedy),)
+        worst = max(self.spread, self.uneven)
+        if worst > SIGMAS:
+            text = tr(
+                "the image does not fit the surface found: what is left is {n:.1f} times that of "
+                "the calibration's balls"
+            )
+            remedy = tr(
+                "Hold object and sensor still during the exposure, clean the membrane, and press "
+                "again"
+            )
+            return (_doubtful("residual", text.format(n=worst), worst, "", remedy),)
         return ()
 
 
-def contact_light(left: Map, step: int, misfit: float) -> ContactLight:
+def contact_light(left: Map, step: int, uneven: Map, misfit: float) -> ContactLight:
     """Return what is left of the light of a contact.
 
     Parameters
@@ -84,6 +89,9 @@ def contact_light(left: Map, step: int, misfit: float) -> ContactLight:
         the flat membrane's, and the slope; NaN where not known.
     step : int
         Distance of the rows in nodes: half the drape's decay length.
+    uneven : (2, rows, columns) float32
+        Size of the part of the slopes that belongs to no surface, and of the slopes, both averaged
+        over squares; NaN where not known.
     misfit : float
         Relative misfit of the calibration's balls.
     """
@@ -97,28 +105,43 @@ def contact_light(left: Map, step: int, misfit: float) -> ContactLight:
     stretch = np.sqrt(1.0 + slope**2) - 1.0
     sigma = np.hypot(noise, misfit)
     kinds = np.digitize(slope, EDGES) - 1
-    top = bottom = 0.0
+    seen = []
     for kind in range(len(EDGES) - 1):
         at = kinds == kind
         if at.sum() < LEAST_NODES:
             continue
         middle = np.median(rest[at])
         scatter = ROBUST * float(np.median(np.abs(rest[at] - middle)))
-        at &= np.abs(rest - middle) < SIGMAS * scatter
-        size = max(float((whole[at] ** 2).sum()), 1e-12)
-        number = max(int(at.sum()), 1)
-        by = float(stretch[at].mean()) if at.any() else 0.0
-        variance = (misfit**2 + scatter**2 * TOGETHER / number) * number / size
-        top += by * float((rest[at] * whole[at]).sum()) / size / variance
-        bottom += by**2 / variance
-    found = top / bottom if bottom else 0.0
+        at &= np.abs(rest - middle) <= SIGMAS * scatter
+        share, number = float((whole[at] ** 2).mean()), np.count_nonzero(at)
+        if share > 0.0:
+            darker = float((rest[at] * whole[at]).mean()) / share
+            variance = (misfit**2 + scatter**2 * TOGETHER / number) / share
+            seen.append((darker, float(stretch[at].mean()), variance))
+    found, found_sd = _proportional(np.array(seen).reshape(-1, 3).T)
     judged = clear & (kinds == GENTLE)
     spread = 0.0
     if judged.sum() >= LEAST_NODES:
         deviation = (rest - found * stretch * whole)[judged] / sigma[judged]
         usual = NormalDist().inv_cdf(0.5 * (1.0 + OFTEN))
         spread = float(np.quantile(np.abs(deviation), OFTEN)) / usual
-    return ContactLight(found, bottom**-0.5 if bottom else np.inf, spread)
+    off, size_of = uneven[:, uneven[1] > EDGES[0]]
+    share = float(np.median(off / (EDGES[0] + size_of))) if off.size >= LEAST_NODES else 0.0
+    return ContactLight(found, found_sd, spread, share / misfit)
+
+
+def _proportional(seen: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the factor from stretch to brightness and its sd, of rows of both and a variance.
+
+    Where brightness is not proportional to stretch, the deviation is larger.
+    """
+    brighter, stretch, variance = seen
+    if not brighter.size:
+        return 0.0, math.inf
+    weight = float((stretch**2 / variance).sum())
+    factor = float((brighter * stretch / variance).sum()) / weight
+    square = float(((brighter - factor * stretch) ** 2 / variance).sum())
+    return factor, math.sqrt(max(square / max(brighter.size - 1, 1), 1.0) / weight)
 
 
 def _doubtful(key: str, text: str, value: float, unit: str, remedy: str) -> Finding:

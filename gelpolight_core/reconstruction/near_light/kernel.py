@@ -742,3 +742,40 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
                 found = _left_over(w, j, dark, curves, table, gloss, interreflection)
                 for part in range(4):
                     left[part, k, begin + j] = found[part]
+
+
+@_whole
+def uneven_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Compare slopes with those of the depth that was integrated from them.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows of `uneven`.
+    slopes, depth, pitch_mm
+        Of a solved region.
+    size : int
+        Nodes to a side of a square whose slopes are averaged.
+    uneven : (2, squares down, squares across) float32
+        Size of the mean difference, and of the mean slope, of every second square along both axes;
+        NaN where less than half a square has two lights. Written.
+    """
+    weight, slope_x, slope_y = slopes.weight, slopes.slope_x, slopes.slope_y
+    per_mm = ONE / pitch_mm
+    for row in range(first, last):
+        for column in range(uneven.shape[2]):
+            count, off_x, off_y, mean_x, mean_y = ZERO, ZERO, ZERO, ZERO, ZERO
+            top, left = 2 * row * size, 2 * column * size
+            for i in range(top, min(top + size, depth.shape[0] - 1)):
+                for j in range(left, min(left + size, depth.shape[1] - 1)):
+                    known = ONE if weight[i, j] >= _ONE_DARK else ZERO
+                    x = HALF * (slope_x[i, j] + slope_x[i, j + 1])
+                    y = HALF * (slope_y[i, j] + slope_y[i + 1, j])
+                    off_x += known * (x - (depth[i, j + 1] - depth[i, j]) * per_mm)
+                    off_y += known * (y - (depth[i + 1, j] - depth[i, j]) * per_mm)
+                    mean_x += known * x
+                    mean_y += known * y
+                    count += known
+            share = ONE / count if count > HALF * single(size * size) else single(np.nan)
+            uneven[0, row, column] = share * sqrt(off_x * off_x + off_y * off_y)
+            uneven[1, row, column] = share * sqrt(mean_x * mean_x + mean_y * mean_y)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -11,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.light.contact import ContactLight, contact_light
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import (
@@ -28,7 +30,12 @@ from gelpolight_core.reconstruction.near_light.from_around import (
     surface_normals,
     with_surroundings,
 )
-from gelpolight_core.reconstruction.near_light.kernel import UNSOLVED_WEIGHT, left_rows, solve_rows
+from gelpolight_core.reconstruction.near_light.kernel import (
+    UNSOLVED_WEIGHT,
+    left_rows,
+    solve_rows,
+    uneven_rows,
+)
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.ratio import Compared
 from gelpolight_core.reconstruction.near_light.settings import Settings
@@ -340,21 +347,21 @@ class RegionSolver:
             slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down
         return slopes
 
-    def light_left(self, solved: SolvedRegion) -> tuple[Map, int]:
-        """Return the light that a region's normals do not explain, and the step from row to row.
-
-        As :func:`.kernel.left_rows`; rows are half the drape's decay length apart.
-        """
-        scale = solved.scale
+    def left_over(self, solved: SolvedRegion) -> ContactLight:
+        """Return what a solved surface leaves of the light, and of the slopes, of its contact."""
+        scale, misfit = solved.scale, self.maps.full.misfit
         step = max(round(0.5 * self.maps.full.decay_mm / scale.pitch_mm), 1)
         rows, columns = solved.depth_mm.shape
         left = np.empty((4, rows // step, columns), np.float32)
         corner = solved.region.at(COARSE // scale.factor)[0]
         found = (scale, corner, self.maps.membrane, solved.slopes)
-        self._workers.run(
-            rows // step, left_rows, solved.compared.fine, solved.start_mm, *found, step, left
-        )
-        return left, step
+        image, start = solved.compared.fine, solved.start_mm
+        self._workers.run(rows // step, left_rows, image, start, *found, step, left)
+        uneven = np.empty((2, rows // (2 * step), columns // (2 * step)), np.float32)
+        surface = (solved.slopes, solved.depth_mm, np.float32(scale.pitch_mm), step)
+        self._workers.run(uneven.shape[1], uneven_rows, *surface, uneven)
+        coarse = (scale.pitch_mm / self.maps.full.decay_mm) ** 2 / 8.0
+        return contact_light(left, step, uneven, math.hypot(misfit, coarse))
 
     def _integrated(
         self, scale: Scale, weighted: Weighted, depth: Map, tolerance: float, terms: Terms

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.light.contact import contact_light
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
     free_boundary_note,
@@ -244,8 +243,7 @@ class NearLightSolver(OpenSolver):
             boundary = solved.boundary
             notes += [] if boundary.free is None else [free_boundary_note()]
             notes += [unanchored_note()] if boundary.level_sd_mm > 0.0 else []
-            left = contact_light(*self._solver.light_left(solved), self.maps.full.misfit)
-            notes += left.findings
+            notes += self._solver.left_over(solved).findings
             notes += rounds_notes(rounds.stopped)
             notes += unsolved_notes(unsolved_share(solved))
             notes += small_image_notes(
