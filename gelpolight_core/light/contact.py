@@ -19,7 +19,8 @@ from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
-SIGMAS = 3.0
+SIGMAS, EXPLAINED = 3.0, 2.0
+"""Standard deviations from which on a finding is doubtful, and the deviations are wider."""
 EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
 """Classes of slope: an error of the model is common to all nodes of one."""
 GENTLE = 1
@@ -54,6 +55,20 @@ class ContactLight:
     uneven: float
 
     @property
+    def times(self) -> float:
+        """How many times larger the model's errors are than in the calibration's balls, at least 1.
+
+        As the factor of Birge widens the deviations of measurements that scatter more than stated.
+        """
+        return max(1.0, self.spread, self.uneven)
+
+    @property
+    def darkening(self) -> float:
+        """Change of brightness by unit stretch beyond what errors of the model explain, 0..."""
+        explained = EXPLAINED * self.stretch_sd
+        return math.sqrt(max(self.stretch**2 - explained**2, 0.0))
+
+    @property
     def findings(self) -> tuple[Finding, ...]:
         """What this says about the height map."""
         if abs(self.stretch) > SIGMAS * self.stretch_sd and self.spread < SIGMAS:
@@ -79,7 +94,9 @@ class ContactLight:
         return ()
 
 
-def contact_light(left: Map, step: int, uneven: Map, misfit: float) -> ContactLight:
+def contact_light(
+    left: Map, step: int, uneven: Map, misfit: float, *, resolved: bool = True
+) -> ContactLight:
     """Return what is left of the light of a contact.
 
     Parameters
@@ -94,6 +111,8 @@ def contact_light(left: Map, step: int, uneven: Map, misfit: float) -> ContactLi
         over squares; NaN where not known.
     misfit : float
         Relative misfit of the calibration's balls.
+    resolved : bool, optional
+        Whether the nodes resolve the drape; otherwise single nodes are not judged.
     """
     known = np.isfinite(left[0])
     # Lamps are not points: beside a shadow they are hidden in part.
@@ -121,7 +140,7 @@ def contact_light(left: Map, step: int, uneven: Map, misfit: float) -> ContactLi
     found, found_sd = _proportional(np.array(seen).reshape(-1, 3).T)
     judged = clear & (kinds == GENTLE)
     spread = 0.0
-    if judged.sum() >= LEAST_NODES:
+    if resolved and judged.sum() >= LEAST_NODES:
         deviation = (rest - found * stretch * whole)[judged] / sigma[judged]
         usual = NormalDist().inv_cdf(0.5 * (1.0 + OFTEN))
         spread = float(np.quantile(np.abs(deviation), OFTEN)) / usual

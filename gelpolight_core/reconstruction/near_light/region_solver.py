@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.light.contact import ContactLight, contact_light
 from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import (
     FREE,
@@ -360,8 +361,10 @@ class RegionSolver:
         uneven = np.empty((2, rows // (2 * step), columns // (2 * step)), np.float32)
         surface = (solved.slopes, solved.depth_mm, np.float32(scale.pitch_mm), step)
         self._workers.run(uneven.shape[1], uneven_rows, *surface, uneven)
-        coarse = (scale.pitch_mm / self.maps.full.decay_mm) ** 2 / 8.0
-        return contact_light(left, step, uneven, math.hypot(misfit, coarse))
+        # Where nodes do not resolve the drape, a node at an edge has no single normal.
+        coarse = scale.pitch_mm / self.maps.full.decay_mm
+        level = math.hypot(misfit, coarse**2 / 8.0)
+        return contact_light(left, step, uneven, level, resolved=coarse <= MOST_PITCH)
 
     def _integrated(
         self, scale: Scale, weighted: Weighted, depth: Map, tolerance: float, terms: Terms

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.checks import (
     free_boundary_note,
@@ -243,7 +244,8 @@ class NearLightSolver(OpenSolver):
             boundary = solved.boundary
             notes += [] if boundary.free is None else [free_boundary_note()]
             notes += [unanchored_note()] if boundary.level_sd_mm > 0.0 else []
-            notes += self._solver.left_over(solved).findings
+            left = self._solver.left_over(solved)
+            notes += left.findings
             notes += rounds_notes(rounds.stopped)
             notes += unsolved_notes(unsolved_share(solved))
             notes += small_image_notes(
@@ -258,7 +260,7 @@ class NearLightSolver(OpenSolver):
                 reason.append(tr("and to the scale of the whole grid"))
             if wanted.uncertainty:
                 with record.done(tr("standard deviations"), depth.nbytes) as reason:
-                    noise = self._noise(image, solved, wanted)
+                    noise = self._noise(image, solved, left, wanted)
                     reason.append(tr("requested"))
         if not wanted.normals:
             record.left_out(tr("normals"), tr("not requested"))
@@ -278,7 +280,9 @@ class NearLightSolver(OpenSolver):
             visible_depth_mm=None if wanted.everywhere else self.visible_mm,
         )
 
-    def _noise(self, image: Image, solved: SolvedRegion, wanted: Wanted) -> DepthNoise:
+    def _noise(
+        self, image: Image, solved: SolvedRegion, left: ContactLight, wanted: Wanted
+    ) -> DepthNoise:
         """Return how far a solved region may be off."""
         compared, at = solved.compared.fine, (solved.scale, solved.region.at(COARSE)[0])
         # Solving again overwrites the slopes' buffers.
@@ -292,7 +296,7 @@ class NearLightSolver(OpenSolver):
         levels = self._sampler.levels(image.raw.dtype, image.linear)
         noise = image_noise(image.raw, levels, self.workers)
         light_sd = None if wanted.light is None else wanted.light.sd
-        return depth_noise(kept, self.maps, noise, solve, self.workers, light_sd=light_sd)
+        return depth_noise(kept, self.maps, noise, solve, self.workers, left, light_sd=light_sd)
 
     def _region(self, image: Image, record: TraceRecorder, everywhere: bool) -> Region | None:
         scale = self.maps.scale(COARSE)

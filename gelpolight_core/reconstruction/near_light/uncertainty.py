@@ -23,12 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate2d
 
+from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.compiled import whole
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
 from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
+from gelpolight_core.reconstruction.near_light.kernel import STEEPEST_NZ
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps, block_average
 from gelpolight_core.reconstruction.near_light.region_solver import SolvedRegion
 from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, slopes_like
@@ -86,6 +88,7 @@ def depth_noise(
     noise: ImageNoise,
     solve: Solve,
     workers: RowWorkers,
+    contact: ContactLight,
     *,
     light_sd: NDArray[np.float64] | None = None,
 ) -> DepthNoise:
@@ -104,6 +107,8 @@ def depth_noise(
         overwrites.
     workers : RowWorkers
         Threads.
+    contact : ContactLight
+        What the surface does not explain of the contact.
     light_sd : (3,), optional
         Standard deviation of each channel's gain, where the image was corrected for it.
     """
@@ -116,7 +121,7 @@ def depth_noise(
     moves = slope_noise(answer.compared.fine.ratio, sd, answer.slopes, solve)
     # A block's average has the noise of all raw pixels in it; no filter reduces that.
     block = (1.0 / (COARSE * np.sqrt(count) * share)).astype(np.float32)
-    times = model_times(answer.compared.fine.ratio, sd, maps.full.misfit)
+    times = model_times(answer.compared.fine.ratio, sd, contact.times * maps.full.misfit)
     coarse = maps.scale(COARSE)
     white = depth_examples(moves, block, answer, coarse.pitch_mm, workers=workers)
     if light_sd is not None:
@@ -134,6 +139,20 @@ def depth_noise(
         examples=MODEL_EXAMPLES,
         workers=workers,
     )
+    ratio, shares = answer.compared.fine.ratio, np.zeros((0, 3, *sd.shape[1:]), np.float32)
+    if light_sd is not None:
+        of_light = np.eye(3, dtype=np.float32) * light_sd.astype(np.float32)
+        shares = of_light[:, :, None, None] * ratio
+    if contact.darkening > 0.0:
+        normal_x, normal_y = answer.slopes.normal_x, answer.slopes.normal_y
+        down = np.sqrt(np.maximum(1.0 - normal_x**2 - normal_y**2, STEEPEST_NZ**2))
+        stretched = np.float32(contact.darkening) * (1.0 / down - 1.0) * ratio
+        shares = np.concatenate([shares, stretched[None]])
+    if len(shares):
+        # An error of the light is the same everywhere in one example.
+        common = np.stack([light_errors(moves, s / sd, answer, coarse) for s in shares])
+        drawn = np.random.default_rng(len(white)).standard_normal((len(white), len(common)))
+        white += np.einsum("nk,kij->nij", drawn.astype(np.float32), common)
     placed, placed_model = (place_examples(e, answer, coarse) for e in (white, model))
     result = no_contact_noise(maps.flags.shape)
     # Moving normals to true positions averages them again.
@@ -311,15 +330,15 @@ def depth_examples(
     return found
 
 
-def gain_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Scale) -> Map:
-    """Integrate the error of the gain of each channel, at quarter scale.
+def light_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Scale) -> Map:
+    """Integrate an error of the light, at quarter scale.
 
     Parameters
     ----------
     noise : SlopeNoise
         Slopes moved by each channel.
     times : (3, rows, columns) float32
-        Error of the gain, in standard deviations of `noise`.
+        Error of each channel, in standard deviations of `noise`.
     answer : SolvedRegion
         Its weights are used.
     coarse : Scale
@@ -327,9 +346,10 @@ def gain_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Sca
 
     Returns
     -------
-    (3, rows / 4, columns / 4) float32
+    (rows / 4, columns / 4) float32
         Depth along the rays.
     """
+<<<<<<< HEAD
     depth = _integration(answer, coarse.pitch_mm)
     parts = zip(noise.moved_x, noise.moved_y, times, strict=True)
     return np.stack(
@@ -340,7 +360,12 @@ def gain_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Sca
 def _integration(answer: SolvedRegion, pitch_mm: float) -> Callable[[Map, Map], Map]:
     """Return what integrates slopes at quarter scale with the weights of a result."""
     weight = block_average(answer.weight, COARSE)
+||||||| parent of e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
+    weight = block_average(answer.weight, COARSE)
+=======
+>>>>>>> e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
     hold = None if answer.hold is None else block_average(answer.hold, COARSE)
+<<<<<<< HEAD
 
     def depth(slope_x: Map, slope_y: Map) -> Map:
         found = integrate_weighted(
@@ -349,6 +374,30 @@ def _integration(answer: SolvedRegion, pitch_mm: float) -> Callable[[Map, Map], 
         return found.depth_mm
 
     return depth
+||||||| parent of e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
+    return np.stack(
+        [
+            integrate_weighted(
+                block_average(x * n, COARSE),
+                block_average(y * n, COARSE),
+                weight,
+                pitch_mm=coarse.pitch_mm,
+                hold=hold,
+                tolerance=TOLERANCE,
+            ).depth_mm
+            for x, y, n in zip(noise.moved_x, noise.moved_y, times, strict=True)
+        ]
+    )
+=======
+    return integrate_weighted(
+        block_average((noise.moved_x * times).sum(axis=0), COARSE),
+        block_average((noise.moved_y * times).sum(axis=0), COARSE),
+        block_average(answer.weight, COARSE),
+        pitch_mm=coarse.pitch_mm,
+        hold=hold,
+        tolerance=TOLERANCE,
+    ).depth_mm
+>>>>>>> e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
 
 
 def model_times(ratio: Map, ratio_sd: Map, misfit: float) -> Map:
