@@ -124,12 +124,6 @@ def depth_noise(
     times = model_times(answer.compared.fine.ratio, sd, contact.times * maps.full.misfit)
     coarse = maps.scale(COARSE)
     white = depth_examples(moves, block, answer, coarse.pitch_mm, workers=workers)
-    if light_sd is not None:
-        # Each image has its own light, and with it its own error of the correction.
-        shares = light_sd.astype(np.float32)[:, None, None]
-        moved = gain_errors(moves, shares * answer.compared.fine.ratio / sd, answer, coarse)
-        drawn = np.random.default_rng(0).standard_normal((EXAMPLES, len(moved)), np.float32)
-        white += np.tensordot(drawn, moved, 1)
     model = depth_examples(
         moves,
         times,
@@ -139,20 +133,17 @@ def depth_noise(
         examples=MODEL_EXAMPLES,
         workers=workers,
     )
-    ratio, shares = answer.compared.fine.ratio, np.zeros((0, 3, *sd.shape[1:]), np.float32)
-    if light_sd is not None:
-        of_light = np.eye(3, dtype=np.float32) * light_sd.astype(np.float32)
-        shares = of_light[:, :, None, None] * ratio
+    # Each image has its own light, and with it its own error of the correction.
+    shares = [] if light_sd is None else [*np.diag(light_sd.astype(np.float32))[..., None, None]]
     if contact.darkening > 0.0:
         normal_x, normal_y = answer.slopes.normal_x, answer.slopes.normal_y
         down = np.sqrt(np.maximum(1.0 - normal_x**2 - normal_y**2, STEEPEST_NZ**2))
-        stretched = np.float32(contact.darkening) * (1.0 / down - 1.0) * ratio
-        shares = np.concatenate([shares, stretched[None]])
-    if len(shares):
-        # An error of the light is the same everywhere in one example.
-        common = np.stack([light_errors(moves, s / sd, answer, coarse) for s in shares])
-        drawn = np.random.default_rng(len(white)).standard_normal((len(white), len(common)))
-        white += np.einsum("nk,kij->nij", drawn.astype(np.float32), common)
+        shares.append(np.float32(contact.darkening) * (1.0 / down - 1.0)[None])
+    relative = answer.compared.fine.ratio / sd
+    for number, error in enumerate(shares):
+        moved = light_errors(moves, error * relative, answer, coarse)
+        drawn = np.random.default_rng(number).standard_normal((EXAMPLES, 1, 1), np.float32)
+        white += drawn * moved
     placed, placed_model = (place_examples(e, answer, coarse) for e in (white, model))
     result = no_contact_noise(maps.flags.shape)
     # Moving normals to true positions averages them again.
@@ -349,23 +340,15 @@ def light_errors(noise: SlopeNoise, times: Map, answer: SolvedRegion, coarse: Sc
     (rows / 4, columns / 4) float32
         Depth along the rays.
     """
-<<<<<<< HEAD
     depth = _integration(answer, coarse.pitch_mm)
-    parts = zip(noise.moved_x, noise.moved_y, times, strict=True)
-    return np.stack(
-        [depth(block_average(x * n, COARSE), block_average(y * n, COARSE)) for x, y, n in parts]
-    )
+    slopes = ((part * times).sum(axis=0) for part in (noise.moved_x, noise.moved_y))
+    return depth(*(block_average(slope, COARSE) for slope in slopes))
 
 
 def _integration(answer: SolvedRegion, pitch_mm: float) -> Callable[[Map, Map], Map]:
     """Return what integrates slopes at quarter scale with the weights of a result."""
     weight = block_average(answer.weight, COARSE)
-||||||| parent of e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
-    weight = block_average(answer.weight, COARSE)
-=======
->>>>>>> e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
     hold = None if answer.hold is None else block_average(answer.hold, COARSE)
-<<<<<<< HEAD
 
     def depth(slope_x: Map, slope_y: Map) -> Map:
         found = integrate_weighted(
@@ -374,30 +357,6 @@ def _integration(answer: SolvedRegion, pitch_mm: float) -> Callable[[Map, Map], 
         return found.depth_mm
 
     return depth
-||||||| parent of e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
-    return np.stack(
-        [
-            integrate_weighted(
-                block_average(x * n, COARSE),
-                block_average(y * n, COARSE),
-                weight,
-                pitch_mm=coarse.pitch_mm,
-                hold=hold,
-                tolerance=TOLERANCE,
-            ).depth_mm
-            for x, y, n in zip(noise.moved_x, noise.moved_y, times, strict=True)
-        ]
-    )
-=======
-    return integrate_weighted(
-        block_average((noise.moved_x * times).sum(axis=0), COARSE),
-        block_average((noise.moved_y * times).sum(axis=0), COARSE),
-        block_average(answer.weight, COARSE),
-        pitch_mm=coarse.pitch_mm,
-        hold=hold,
-        tolerance=TOLERANCE,
-    ).depth_mm
->>>>>>> e09b86f2 (What the contact leaves over widens its deviations; an error of the light is one error for the whole map)
 
 
 def model_times(ratio: Map, ratio_sd: Map, misfit: float) -> Map:
