@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.light.fit import CORRELATED, LEAST_CELLS, SIGMAS
+from gelpolight_core.light.fit import CORRELATED, SIGMAS
 from gelpolight_core.light.samples import Samples
 
 Array = NDArray[np.float64]
@@ -64,14 +64,8 @@ def is_pressed(samples: Samples, effects: Array, change: Array, usable: Mask, le
     left : (cells, 3)
         What the change of light leaves of it.
     """
-<<<<<<< HEAD
     if not usable.any():
         return False
-||||||| parent of 59ed63c7 (Golden outputs of the glossy sensor: an error of the light is common to a height map, so a height's deviation contains it)
-=======
-    if np.count_nonzero(usable) < LEAST_CELLS:
-        return False
->>>>>>> 59ed63c7 (Golden outputs of the glossy sensor: an error of the light is common to a height map, so a height's deviation contains it)
     sd = CORRELATED / np.sqrt(samples.normal[:, [0, 2, 4], [0, 2, 4]])
     seen, press = change / sd, effects / sd[..., None]
     weight, remaining = usable.astype(np.float64), seen
