@@ -32,6 +32,10 @@ BALLS = ("lowest_cosine", "press_dirt_percent", "press_radius_percent")
 HEIGHTS = ("ball_height_error_percent", "depth_sd_percent")
 MODEL = ("scatter_percent", "factor_spread_percent", "gloss")
 """Light that no reflectance curve explains: it is fitted as gloss and as an uneven membrane."""
+NAMING = ("background_light_percent", "background_place_percent", "stated_percent")
+"""Findings that name their cause themselves, the first one first."""
+ALSO = ("balls_left_out", "depth_sd_percent", "joint_misfit_percent", "worst_press_ratio")
+"""What follows from these, besides what others move."""
 CAUSES = (
     Cause(
         "led_height",
@@ -95,7 +99,11 @@ def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]
         Findings whose own remedies are not shown.
     """
     figures = [figure for table in quality.values() for figure in table.figures]
-    poor = {figure.key for figure in figures if figure.verdict is not Verdict.PASS}
+    remedies = {f.key: f.remedy for f in figures if f.verdict is not Verdict.PASS}
+    poor = set(remedies)
+    for key in NAMING:
+        if key in poor:
+            return remedies[key], frozenset().union(*(c.moves for c in CAUSES), ALSO) - {key}
     likely = sorted(
         (
             (2 * len(cause.moves & poor) - len(cause.moves), cause)

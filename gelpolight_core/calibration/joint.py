@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from gelpolight_core.calibration.joint_problem import (
     COMMON,
     CURVE_SIZE,
     DECAY,
+    STATED,
     Problem,
     diffuse_curves,
 )
@@ -45,10 +47,32 @@ Map = NDArray[np.float32]
 INTERREFLECTION = 12
 SIGNIFICANT = 3.0
 """Interreflection counts as present above this many standard deviations."""
-RADIUS_FACTORS, RADIUS_STEP, RADIUS_CHANGE, RADIUS_TOLERANCE = (0.5, 2.0), 1e-4, 0.05, 1e-4
-"""Limits of the factor on all ball radii, its step for derivatives, its typical change, and the
-tolerance of its fit."""
+STATED_RANGE, STATED_STEP, STATED_CHANGE = (0.4, 2.5), 1e-4, 0.05
+"""Limits of the factor on a stated length, its step for derivatives, which is also the tolerance of
+its fit, and its typical change."""
 _NAMES = ("exponent", "gloss", "roughness", "interreflection", "decay_mm")
+
+
+class Stated(NamedTuple):
+    """A stated length, or the evenness of the coating, as the presses show it.
+
+    Attributes
+    ----------
+    key : str
+        One of `STATED`.
+    value, sd : float
+        Factor on the length that fits best, with its standard deviation; for the coating 1 plus its
+        exponent.
+    """
+
+    key: str
+    value: float
+    sd: float
+
+    @property
+    def sds(self) -> float:
+        """Difference from what is stated, in standard deviations."""
+        return abs(self.value - 1.0) / self.sd
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +93,8 @@ class JointResult:
         Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light and decay
         length and, if the membrane is one-dimensional, of the heights of its curves; from
         leaving out one press at a time. 0 for fixed parameters.
-    radius_factor : float or None
-        All ball radii times this fit the images best. None if it was not looked for.
+    stated : tuple of Stated
+        What contradicts the presses, the most likely first. Empty if it was not looked for.
     """
 
     full: FullModel
@@ -78,7 +102,7 @@ class JointResult:
     ball_misfits: Array
     ball_names: tuple[str, ...]
     covariance: Array
-    radius_factor: float | None = None
+    stated: tuple[Stated, ...] = ()
 
 
 def refine_jointly(
@@ -89,7 +113,7 @@ def refine_jointly(
     background: Map,
     *,
     board: BesideBoard | None = None,
-    check_radii: bool = False,
+    bright_mm: Array | None = None,
 ) -> JointResult:
     """Refine LEDs, membrane and balls together.
 
@@ -108,8 +132,9 @@ def refine_jointly(
         The contact-free membrane, which the full model holds.
     board : BesideBoard, optional
         The untouched membrane and the white board, which give the reflectance.
-    check_radii : bool, optional
-        Look for a common error of all ball radii, with four presses or more.
+    bright_mm : (3, 2), optional
+        Where the LEDs are seen in the mirror. With it and four presses or more, the fit looks for
+        stated lengths that contradict the presses.
     """
     lit = _first_light(presses, pixels, led_positions_mm, slab)
     # Without interreflection, no frame needs to compute it.
@@ -154,7 +179,7 @@ def refine_jointly(
         solved.ball_misfits,
         tuple(press.name for press in presses),
         shared_covariance(solved.problem, x),
-        _radius_factor(solved) if check_radii and len(presses) >= LEAST_PRESSES else None,
+        () if bright_mm is None or len(presses) < LEAST_PRESSES else _compared(solved, bright_mm),
     )
 
 
@@ -293,42 +318,47 @@ def _typical_change(problem: Problem) -> Array:
     return scale
 
 
-def _radius_factor(solved: _Solution) -> float:
-    """Return the factor on all ball radii that fits the images best.
+def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
+    """Return what of `STATED` contradicts the presses, the one that explains most first.
 
-    Slopes on a ball are positions over its radius. To first order, a membrane of another
-    reflectance, or LEDs at another height, look the same as balls of another radius. The curvature
-    of the brightness across a contact, and presses under other directions of light, tell them
-    apart. The factor is fitted with all other parameters, from their solution.
+    To first order, balls of another radius, a membrane of another reflectance, other layers and
+    LEDs at another height look alike. The curvature of the brightness across a contact, and presses
+    at other places, tell them apart. Each is fitted with all other parameters.
     """
     problem = replace(solved.problem, presses=[thinned(thinned(p)) for p in solved.problem.presses])
-    free, (low, high) = problem.free, solved.limits
+    free, (low, high), scale = problem.free, solved.limits, _typical_change(problem)
 
-    def at(part: Array) -> tuple[Problem, Array]:
-        x = solved.x.copy()
-        x[free] = part[:-1]
-        return problem.with_radii(part[-1]), x
+    def fitted(key: str) -> Stated:
+        def at(part: Array) -> tuple[Problem, Array]:
+            changed, x = problem.with_stated(key, part[-1], bright_mm), solved.x.copy()
+            x[free] = part[:-1]
+            x[:9] += changed.start[:9] - problem.start[:9]
+            return changed, x
 
-    def jacobian(part: Array) -> Array:
-        scaled, x = at(part)
-        more = problem.with_radii(part[-1] + RADIUS_STEP)
-        by_radius = (more.all(x) - scaled.all(x)) / RADIUS_STEP
-        return np.column_stack([scaled.jacobian(x)[:, free], by_radius])
+        def residuals(part: Array) -> Array:
+            changed, x = at(part)
+            return changed.all(x)
 
-    def residuals(part: Array) -> Array:
-        scaled, x = at(part)
-        return scaled.all(x)
+        def jacobian(part: Array) -> Array:
+            changed, x = at(part)
+            more = part + STATED_STEP * (np.arange(part.size) == part.size - 1)
+            by_value = (residuals(more) - residuals(part)) / STATED_STEP
+            return np.column_stack([changed.jacobian(x)[:, free], by_value])
 
-    found = fit_least_squares(
-        residuals,
-        jacobian,
-        np.append(solved.x[free], 1.0),
-        (np.append(low[free], RADIUS_FACTORS[0]), np.append(high[free], RADIUS_FACTORS[1])),
-        scale=np.append(_typical_change(problem)[free], RADIUS_CHANGE),
-        robust=True,
-        tolerance=RADIUS_TOLERANCE,
-    )
-    return float(found.x[-1])
+        found = fit_least_squares(
+            residuals,
+            jacobian,
+            np.append(solved.x[free], 1.0),
+            (np.append(low[free], STATED_RANGE[0]), np.append(high[free], STATED_RANGE[1])),
+            scale=np.append(scale[free], STATED_CHANGE),
+            robust=True,
+            tolerance=STATED_STEP,
+        ).x
+        slopes = jacobian(found)
+        sd = float(np.sqrt(np.linalg.pinv(slopes.T @ slopes)[-1, -1]))
+        return Stated(key, float(found[-1]), sd)
+
+    return tuple(sorted(in_parallel(fitted, STATED), key=lambda one: -one.sds))
 
 
 def _described(problem: Problem, x: Array, limits: tuple[Array, Array]) -> _Solution:

@@ -28,6 +28,10 @@ CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
 CURVE_SIZE = 3 * (CURVE_COSINES.size - 1)
 CURVE_SD = 0.1
 _STEP = 1e-4
+STATED = ("radius", "layers", "square", "led_height", "coating")
+"""What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
+layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
+coating that stays as it is where it is stretched."""
 
 
 def _bumps() -> Array:
@@ -62,23 +66,45 @@ class Problem:
 
     The parameters are the common ones, then x, y and depth of each ball and, if the membrane is
     one-dimensional, the heights of its curves; only those that are `free` are solved for. The
-    reflectance for interreflected light may be expected, with a standard deviation.
+    reflectance for interreflected light may be expected, with a standard deviation. The coating's
+    reflectance is the cosine of the slope, which is the unstretched over the stretched area, to the
+    power of `coating`.
     """
 
     presses: Sequence[BallPixels]
     start: Array
     free: NDArray[np.bool_]
     reflectance: tuple[float, float] | None = None
+    coating: float = 0.0
 
     @property
     def balls_end(self) -> int:
         """Index after the last ball parameter."""
         return COMMON + 3 * len(self.presses)
 
-    def with_radii(self, factor: float) -> Problem:
-        """Return the problem with all ball radii times a factor."""
-        scaled = [replace(p, radius_mm=factor * p.radius_mm) for p in self.presses]
-        return replace(self, presses=scaled)
+    def with_stated(self, key: str, value: float, bright_mm: Array) -> Problem:
+        """Return the problem with another value of one of `STATED`.
+
+        Parameters
+        ----------
+        key, value
+            A factor on a stated length, or 1 plus the coating's exponent.
+        bright_mm : (3, 2)
+            Where the LEDs are seen in the mirror.
+        """
+        presses, leds = self.presses, self.start[:9].reshape(3, 3).copy()
+        if key == "coating":
+            return replace(self, coating=value - 1.0)
+        if key == "radius":
+            presses = [replace(p, radius_mm=value * p.radius_mm) for p in presses]
+        elif key == "led_height":
+            leds += (value - 1.0) * (leds - np.pad(bright_mm, ((0, 0), (0, 1))))
+        else:
+            # All that is seen on the top surface; the board also places the LEDs.
+            presses = [replace(p, points_mm=value * p.points_mm) for p in presses]
+            leds[:, :2] += (value - 1.0) * bright_mm * (key == "square")
+        start = np.concatenate([leds.ravel(), self.start[9:]])
+        return replace(self, presses=presses, start=start)
 
     def residuals(self, x: Array, surfaces: Sequence[Surface] | None = None) -> list[Array]:
         """Return the weighted residuals of each press, (3 N,); on known surfaces if given."""
@@ -101,12 +127,13 @@ class Problem:
         """Return the weighted residuals of a press, (N, 3)."""
         pixels = self.presses[index]
         result = np.empty(pixels.ratio.shape)
+        grey = (-seen[1][:, 2:]) ** self.coating
         model_press(
             (
                 pixels.points_mm,
                 pixels.view,
-                pixels.ratio,
-                pixels.weight,
+                pixels.ratio / grey,
+                pixels.weight * grey,
                 pixels.around,
                 pixels.around_flat,
             ),

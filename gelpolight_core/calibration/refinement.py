@@ -16,7 +16,7 @@ from gelpolight_core.calibration.depth_scale import (
     depth_scale_sd,
     lateral_scale_sd,
 )
-from gelpolight_core.calibration.joint import JointResult, refine_jointly
+from gelpolight_core.calibration.joint import JointResult, Stated, refine_jointly
 from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
     LENS,
@@ -29,11 +29,12 @@ from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.untouched import FAIL_PERCENT, WARN_PERCENT
 from gelpolight_core.finding import Finding, QualityTable, judge
+from gelpolight_core.labels import label
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import reflects_light
+from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.agreement import LEAST_PRESSES
 from gelpolight_core.reflectance.gathered_light import Slab
-from gelpolight_core.reflectance.membrane import MEMBRANES
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import (
     FullModel,
@@ -41,9 +42,10 @@ from gelpolight_core.sensor_calibration import (
     ScaleSd,
     sensor_stack,
 )
-from gelpolight_core.session.session import Session
+from gelpolight_core.session.session import SensorData, Session
+from gelpolight_core.set_up import LEAST_INDEX
 from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS, SHOWN_SD
-from gelpolight_core.translation import pattern, tr
+from gelpolight_core.translation import joined, tr
 
 CHECKED_BALLS = 4
 GATHERED_SD = 0.005
@@ -52,8 +54,6 @@ near windows change, besides the reflectance."""
 LEAST_CONTACT_PX = 24.0
 """Median radius of the contacts from which on they show the balls' radii: within 0.5 % at 22 pixels
 and more, but 8 % off at 18."""
-RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 3.0, FAIL_PERCENT / HEIGHT_BY_RADIUS
-"""Of all ball radii; the larger one makes heights wrong by `FAIL_PERCENT`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,16 +68,19 @@ class Joint:
         With the background filled in where it is saturated, and the uncertainty of lengths.
     factors : (rows, columns, 3) float32
         Reflectance factors, filled in likewise.
+    stated : tuple of Finding
+        About what is stated of the sensor.
     """
 
     refined: JointResult
     full: FullModel
     factors: NDArray[np.float32]
+    stated: tuple[Finding, ...] = ()
 
     @property
     def quality(self) -> QualityTable:
         """Figures of the refinement and its model."""
-        return judge_joint(self.refined, self.full)
+        return judge_joint(self.refined, self.full, self.stated)
 
 
 def refine(session: Session, results: Results) -> Joint:
@@ -107,20 +110,23 @@ def refine(session: Session, results: Results) -> Joint:
         )
         for press, image in zip(balls.presses, balls.images, strict=True)
     ]
-    slab = Slab.of(sensor_stack(session.sensor, top.pose.plane))
+    stack = sensor_stack(session.sensor, top.pose.plane)
+    slab = Slab.of(stack)
     radiance = results[RADIANCE].radiance
     board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds_mm)
     contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
+    bright_mm = lights.leds.bright_points_mm if large else None
     joint = refine_jointly(
-        balls.presses, pixels, leds_mm, slab, background, board=board, check_radii=large
+        balls.presses, pixels, leds_mm, slab, background, board=board, bright_mm=bright_mm
     )
     full = joint.full
     if full.kept == "mirror":
         variance = np.diagonal(lights.leds.led_covariance_mm2, axis1=1, axis2=2)
         full = replace(full, led_sd_mm=np.sqrt(variance))
     lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
-    found = Joint(joint, replace(full, background=lit), known)
+    stated = judge_stated(joint.stated, session.sensor, stack)
+    found = Joint(joint, replace(full, background=lit), known, stated)
     return replace(found, full=replace(found.full, scale_sd=_scale_sd(session, results, found)))
 
 
@@ -147,9 +153,9 @@ def _scale_sd(session: Session, results: Results, found: Joint) -> ScaleSd:
     fitted = depth_scale_sd(full, calibration.table, covariance)
     gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
     together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
-    seen, shown = joint.radius_factor, None
-    if seen is not None:
-        shown = (seen - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
+    seen, shown = {one.key: one.value for one in joint.stated}, None
+    if seen:
+        shown = (seen["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
     return ScaleSd(together, lateral, unexplained, shown)
 
 
@@ -195,7 +201,9 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
     )
 
 
-def judge_joint(joint: JointResult, full: FullModel) -> QualityTable:
+def judge_joint(
+    joint: JointResult, full: FullModel, stated: tuple[Finding, ...] = ()
+) -> QualityTable:
     """Judge the joint refinement and its model."""
     return QualityTable(
         (
@@ -218,7 +226,7 @@ def judge_joint(joint: JointResult, full: FullModel) -> QualityTable:
                 remedy=tr("Press more balls at more positions"),
             ),
             *judge_presses(joint),
-            *judge_radii(joint),
+            *stated,
             *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
@@ -260,28 +268,56 @@ def judge_presses(joint: JointResult) -> tuple[Finding, ...]:
     )
 
 
-def judge_radii(joint: JointResult) -> tuple[Finding, ...]:
-    """Judge whether all stated ball radii have a common error, or contradict the other lengths."""
-    factor = joint.radius_factor
-    if factor is None:
+def judge_stated(
+    stated: Sequence[Stated], sensor: SensorData, stack: LayerStack
+) -> tuple[Finding, ...]:
+    """Judge what is stated of a sensor by its ball presses; without a result, there is no finding.
+
+    Parameters
+    ----------
+    stated : sequence of Stated
+        What contradicts the presses, the most likely first.
+    sensor, stack
+        As stated, and the layers that follow from it.
+    """
+    if not stated:
         return ()
-    off = 100.0 * (max(factor, 1.0 / factor) - 1.0)
-    seen = tr("In the images all balls look {p:.0f} % smaller than stated")
-    if factor > 1.0:
-        seen = tr("In the images all balls look {p:.0f} % larger than stated")
-    advice = tr(
-        "Measure the ball diameters and correct them. If they are right, measure the squares of"
-        " the board on the top surface, and check the layers"
+    best = stated[0]
+    apparent_mm = sum(t / n for t, n in zip(stack.thicknesses_mm, stack.indices, strict=True))
+    texts = {
+        "radius": tr("the ball radii ({x:.3f} times the stated ones fit)"),
+        "square": tr("the squares of the board on the top surface ({x:.3f} times the stated fit)"),
+        "led_height": tr("the LED height ({height:.1f} mm fits)"),
+        "coating": tr("the coating: where stretched, it is darker or brighter"),
+        "layers": tr(
+            "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
+            " {window:+.1f} mm of window fit)"
+        ),
+    }
+    gel, window = (
+        1.0 / (1.0 - 1.0 / max(index, LEAST_INDEX))
+        for index in (sensor.elastomer_refractive_index, sensor.window_refractive_index)
     )
+    found = [
+        texts[key].format(
+            x=value,
+            height=value * sensor.led_height_mm,
+            gel=(1.0 - value) * apparent_mm * gel,
+            window=(1.0 - value) * apparent_mm * window,
+        )
+        for key, value, sd in stated
+        # As likely as the first.
+        if ((value - 1.0) / sd) ** 2 >= best.sds**2 - 1.0
+    ]
     return (
         judge(
-            "common_radius_percent",
-            tr("All stated ball radii against the images"),
-            off,
+            "stated_percent",
+            tr("What is stated of the sensor against the ball presses, worst"),
+            100.0 * abs(best.value - 1.0),
             "%",
-            warn=RADIUS_WARN_PERCENT,
-            fail=RADIUS_FAIL_PERCENT,
-            remedy=pattern("{seen}. {advice}", seen=seen.format(p=off), advice=advice),
+            warn=200.0 * best.sd,
+            fail=FAIL_PERCENT / HEIGHT_BY_RADIUS,
+            remedy=tr("Check {what}").format(what=joined(tr(" or "), found)),
         ),
     )
 
@@ -320,11 +356,6 @@ def _membrane_figures(full: FullModel) -> tuple[Finding, ...]:
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()
-    label = {
-        MEMBRANES[0]: tr("Held-out error ratio, one-dimensional over two-lobe (two-lobe kept)"),
-        MEMBRANES[1]: tr(
-            "Held-out error ratio, one-dimensional over two-lobe (one-dimensional kept)"
-        ),
-    }
-    ratio = one_dimensional / two_lobe
-    return (judge("membrane_held_out_ratio", label[full.membrane_kept], ratio),)
+    text = tr("Held-out error ratio, one-dimensional over two-lobe ({form} kept)")
+    text = text.format(form=label(full.membrane_kept))
+    return (judge("membrane_held_out_ratio", text, one_dimensional / two_lobe),)

@@ -66,6 +66,7 @@ class Truth:
     interreflection: float = 0.0
     decay_mm: float = 0.7
     grazing: float = 0.0  # so much brighter than Lambert's law under grazing light
+    coating: float = 0.0  # exponent of the unstretched over the stretched area
 
 
 def truth(**changes: float) -> Truth:
@@ -102,7 +103,7 @@ def shaded(truth: Truth, place: Array, normals: Array, view: Array) -> Array:
             1.0 + truth.grazing * (1.0 - lit)
         ) + lobe
         columns.append(both * -light[:, 2] / r2[:, 0])
-    return np.stack(columns, axis=-1)
+    return np.stack(columns, axis=-1) * (-normals[:, 2:]) ** truth.coating
 
 
 def pixels_of(

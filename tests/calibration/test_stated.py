@@ -1,0 +1,54 @@
+"""What is stated wrong is found by the fit of all presses, and named with the value that fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_joint import BALLS, MIRROR, NO_MAP, SLAB, found_press, pixels_of, truth
+
+from gelpolight_core.calibration.joint import refine_jointly
+from gelpolight_core.calibration.refinement import judge_stated
+from gelpolight_core.causes import explained
+from gelpolight_core.finding import QualityTable, Verdict
+from gelpolight_core.optics.refraction import LayerStack
+from gelpolight_core.session.session import SensorData
+
+BRIGHT = 0.75 * MIRROR[:, :2]
+SENSOR = SensorData("A", 13.7, 14.0, 1.41, 0.0, 1.49, 26.0)
+
+
+@pytest.mark.parametrize(
+    ("key", "stated", "named"),
+    [
+        ("", 1.0, ""),
+        ("radius", 1.1, "the ball radii (0.9"),
+        ("layers", 1.03, "mm of elastomer or"),
+        ("square", 1.04, "the squares of the board"),
+        ("led_height", 0.7, "the LED height (19."),
+        ("coating", 1.0, "the coating"),
+    ],
+)
+def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> None:
+    known = truth(gloss=0.3, roughness=0.45, decay_mm=0.6, coating=0.3 * (key == "coating"))
+    random, leds = np.random.default_rng(0), MIRROR.copy()
+    presses = [found_press(pose, random) for pose in BALLS]
+    pixels = [pixels_of(pose, known, 0.003, random) for pose in BALLS]
+    if key == "radius":
+        of_balls = [replace(p.pose, radius_mm=stated * p.pose.radius_mm) for p in presses]
+        presses = [replace(p, pose=pose) for p, pose in zip(presses, of_balls, strict=True)]
+        pixels = [replace(p, radius_mm=stated * p.radius_mm) for p in pixels]
+    if key in ("layers", "square"):
+        pixels = [replace(p, points_mm=stated * p.points_mm) for p in pixels]
+    if key == "square":
+        leds[:, :2] += (stated - 1.0) * BRIGHT
+    if key == "led_height":
+        leds += (stated - 1.0) * (leds - np.pad(BRIGHT, ((0, 0), (0, 1))))
+    joint = refine_jointly(presses, pixels, leds, SLAB, NO_MAP, bright_mm=BRIGHT)
+    (figure,) = judge_stated(joint.stated, SENSOR, LayerStack((25.0, 14.0), (1.0, 1.41)))
+    cause, _ = explained({"joint": QualityTable((figure,))})
+    if key:
+        assert joint.stated[0].key == key
+        assert named in cause
+    assert (figure.verdict is Verdict.PASS) == (not key)
