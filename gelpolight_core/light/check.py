@@ -230,7 +230,7 @@ class HealthCheck:
             *changes,
             detail,
             blurred,
-            saturated_finding(full),
+            saturated_finding(full, 1.0 - common.share),
             None if specks else dirt_finding(samples, self._run_change, common, self._unmix),
             *pixels,
         ]

@@ -52,7 +52,9 @@ LED_OFF, LEAST_LIT = -0.8, -0.5
 FAR_GAIN, FAR_OFFSET = 0.05, 0.005
 """Above these, the error of the depth is a third of its value or more."""
 FAR_SHIFT_PX, FAR_BLUR_PX = 10.0, 6.0
-SATURATED_SHARE, MOSTLY_SATURATED = 0.01, 0.3
+SATURATED_SHARE, SATURATED_CONTACT, MOSTLY_SATURATED = 0.01, 0.05, 0.3
+"""Of the field, and of its part that has changed: a shiny membrane saturates in a contact, and
+less than a twentieth of it that is left out costs little."""
 DIRT_CHANGE, DIRT_SPREAD, DIRT_RUNS = -0.06, 0.12, 2
 """Dirt darkens the channels alike; a slope does not."""
 BAD_SHARE, LEAST_BAD = 1e-4, 3
@@ -321,9 +323,9 @@ def compressed_finding(lost: float) -> Finding | None:
     return _graded("compressed", text, remedy, False, lost)
 
 
-def saturated_finding(share: float) -> Finding | None:
-    """Return that much of the field is saturated."""
-    if share < SATURATED_SHARE:
+def saturated_finding(share: float, changed: float = 1.0) -> Finding | None:
+    """Return that much of the field is saturated, and of its `changed` share."""
+    if share < max(SATURATED_SHARE, SATURATED_CONTACT * changed):
         return None
     text = tr("{p:.0f} % of the membrane is saturated").format(p=100.0 * share)
     remedy = tr("Restore the exposure of the calibration, and shade the sensor")

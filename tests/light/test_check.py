@@ -242,6 +242,17 @@ def test_hot_and_dead_pixels_are_left_out_of_the_depth(
     assert abs(float((found.depth_mm - clean.depth_mm)[pressed].mean())) < 0.004
 
 
+def test_saturation_in_a_small_part_of_a_contact_is_no_fault_but_overexposure_is() -> None:
+    bright = SensorDesign().scaled(0.5)
+    photometry = replace(bright.photometry, whiteboard_peak=1.5)
+    known = known_sensor(replace(bright, photometry=photometry))
+    check = _check_of(known.calibration)
+    frame = known.pressed(Cuboid(7.0, 1.0), x_mm=3.0, y_mm=6.0, samples=1).frame
+    assert not check.check(known.noisy(frame)).findings
+    assert check._full.sum() > 0.01 * check.samples.count.sum()
+    assert "saturated" in check.check(known.noisy(1.5 * frame)).keys
+
+
 def test_hot_pixels_in_groups_are_found(
     known: KnownSensor, frames: dict[str, Map], check: HealthCheck
 ) -> None:
