@@ -20,7 +20,7 @@ from gelpolight_core.measurement.fit import (
     near_wall,
 )
 from gelpolight_core.measurement.fit_checks import fit_problems, no_anchor
-from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.measurement.indenter import MODELS, TYPICAL_DECAY_MM
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.segmentation import (
     SECONDARY_SHARE,
@@ -35,6 +35,7 @@ from gelpolight_core.measurement.spread import (
     mode_sd,
     noise_of_fit,
 )
+from gelpolight_core.reconstruction.checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
@@ -130,7 +131,8 @@ def find_object(
     heightmap, seed_mm, reach_mm
         As for :func:`measure_object`.
     blur_mm2 : float, optional
-        Variance of the map's blur, known to one pixel squared; 0 if it is not known.
+        Variance of the map's blur, a third of a node squared, known to one pixel squared; 0 if it
+        is not known.
 
     Raises
     ------
@@ -157,7 +159,9 @@ def find_object(
     window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
     pixel_mm2 = window.pitch_mm**2
     blur = (blur_mm2, pixel_mm2) if blur_mm2 else (pixel_mm2, UNKNOWN_BLUR_MM**2)
-    edge = EdgePrior(EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, *blur, blur_known=blur_mm2 > 0.0)
+    # Nodes that do not resolve the drape have errors at walls that would be taken for a fillet.
+    known = 0.0 < blur_mm2 <= (MOST_PITCH * TYPICAL_DECAY_MM) ** 2 / 3.0
+    edge = EdgePrior(EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, *blur, blur_known=known)
     return window, region, edge
 
 

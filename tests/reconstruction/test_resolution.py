@@ -39,6 +39,7 @@ OBJECTS: dict[str, Indenter] = {
     "wire 0.3": around(0.2, 0.15),
     "cylinder": Cylinder(5.0, 1.0),
     "cuboid": Cuboid(4.0, 1.0),
+    "wide cuboid": Cuboid(6.0, 1.0),
     "plate": Cylinder(6.0, 0.05),
     "square plate": Cuboid(6.0, 0.05),
 }
@@ -143,3 +144,11 @@ def test_shallow_plates_are_within_their_deviations_in_every_effort(
         off_mm = found.height_mm - OBJECTS[name].depth_mm
         assert abs(off_mm) < 2.0 * found.sd["height_mm"]
         assert found.sd["height_mm"] < 2e-3
+
+
+def test_an_edge_is_not_taken_for_a_large_fillet_where_nodes_do_not_resolve_the_drape(
+    pressed: Maps,
+) -> None:
+    found = measure_heightmap(pressed("wide cuboid", "fast"), shape="cuboid")
+    assert found.edge_radius_mm == pytest.approx(0.05, abs=0.1)
+    assert abs(found.size_mm - 6.0) < 2.0 * found.size_sd_mm
