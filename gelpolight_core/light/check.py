@@ -24,7 +24,8 @@ from gelpolight_core.light.fit import (
     uneven_change,
 )
 from gelpolight_core.light.judging import (
-    Limits,
+    PRESS,
+    PRESS_BY_INTERREFLECTION,
     all_pressed_finding,
     bad_pixel_findings,
     blur_finding,
@@ -113,7 +114,8 @@ class HealthCheck:
         self._square, self._full = np.zeros(cells), np.zeros(cells)
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
-        self._limits, self._usual = Limits.of(interreflection), usual
+        self._press_sd = PRESS + PRESS_BY_INTERREFLECTION * interreflection
+        self._usual = usual
         mixing = np.eye(3) if crosstalk is None else crosstalk
         self._unmix = np.asarray(np.linalg.inv(mixing), np.float64)
         self._press = None if leds_mm is None else press_effects(self.samples, leds_mm, self._unmix)
@@ -188,10 +190,10 @@ class HealthCheck:
         pixels: list[Finding],
     ) -> Health:
         """Return the changes on the membrane of this sensor."""
-        limits, samples = self._limits, self.samples
+        press_sd, samples = self._press_sd, self.samples
         uneven = uneven_change(samples, self._change, common)
         usual = self._usual
-        shaded = uneven_finding(uneven if usual is None else usual.uneven(uneven), limits)
+        shaded = uneven_finding(uneven if usual is None else usual.uneven(uneven), press_sd)
         if uneven is not None and shaded is not None:
             less = evened(samples, self._change, self._square, uneven.shape)
             common = common_change(samples, *less, self._full)
@@ -202,8 +204,8 @@ class HealthCheck:
         follow = whole and may_have_moved(judged)
         seen_px = movement_px(samples, raw, light) if follow else None
         moved = moved_finding(judged, seen_px)
-        changes = light_findings(judged, limits)
-        gain = light_gain(common, changes, limits)
+        changes = light_findings(judged, press_sd)
+        gain = light_gain(common, changes, press_sd)
         if usual is not None:
             gain = LightGain(1.0 + common.gain, scatter_of_cells(samples, common))
         if uneven is not None and shaded is not None:

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.light.judging import CLEAR, SIGMAS
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
-SIGMAS, EXPLAINED = 3.0, 2.0
-"""Standard deviations from which on a finding is doubtful, and the deviations are wider."""
 EDGES = (0.1, 0.3, 0.6, 1.0, 2.0)
 """Classes of slope: an error of the model is common to all nodes of one."""
 GENTLE = 1
@@ -65,7 +64,7 @@ class ContactLight:
     @property
     def darkening(self) -> float:
         """Change of brightness by unit stretch beyond what errors of the model explain, 0..."""
-        explained = EXPLAINED * self.stretch_sd
+        explained = CLEAR * self.stretch_sd
         return math.sqrt(max(self.stretch**2 - explained**2, 0.0))
 
     @property

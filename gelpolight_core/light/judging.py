@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,26 +22,15 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 Array = NDArray[np.float64]
-SIGMAS = 3.0
-LEAST_GAIN = 0.0014
-"""Change of all three channels; 0.22 % costs 10 um of a press 1 mm deep."""
-LEAST_CHANNEL = 0.003
-"""Change of one channel; 0.5 % costs 10 um."""
+SIGMAS, CLEAR = 3.0, 2.0
+"""Standard deviations from which on a change is stated, and from which on it is corrected."""
+PRESS, PRESS_BY_INTERREFLECTION = 0.001, 0.0015
+"""Standard deviation of the change of a channel that presses cause in the untouched membrane, and
+its part over the membrane's interreflection. 10 um of a press 1 mm deep are the cost of a change by
+0.5 %, and of one of all channels by 0.22 %."""
 LEAST_OFFSET, LEAST_LOSS = 0.0002, 0.0006
 """More and less room light than at calibration, share of full scale; 0.0003 costs 10 um. A shallow
 press over much of the field looks like a loss of up to 0.0005. """
-GAIN_BY_INTERREFLECTION = 0.004
-"""A deep press changes the light from the membrane around it by this factor times the
-interreflection."""
-LEAST_CORRECTED, LEAST_MEAN_CORRECTED = 0.001, 0.0005
-"""Smaller changes of a channel, and of all channels, are not corrected: they cost 3 to 5 um, and
-shallow faces have the same effect."""
-CLEAR_ROOM_LIGHT = 3.0
-"""Room light above this multiple of the limit counts, although a gain can cancel it."""
-MEAN_BY_INTERREFLECTION = 0.002
-"""As `GAIN_BY_INTERREFLECTION`, of the mean of the channels."""
-PRESS_BY_INTERREFLECTION = 0.0015
-"""Standard deviation of the change of light around presses, over the interreflection."""
 CORRECTABLE = ("exposure", "led_weak", "uneven")
 LEAST_SHIFT_PX = 0.5
 """0.6 px cost 10 um."""
@@ -61,75 +50,45 @@ BAD_SHARE, LEAST_BAD = 1e-4, 3
 BACKGROUND = tr("set to zero or capture the background again")
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits above which a change is a fault.
-
-    Attributes
-    ----------
-    gain, channel, offset : float
-        Share of the light of all channels and of one; share of full scale.
-    corrected, corrected_mean, press_sd : float
-        Shares of a channel's light, and of the mean of the channels, from which on the depth is
-        corrected; what is not known of them because of the press.
-    """
-
-    gain: float
-    channel: float
-    offset: float
-    corrected: float
-    corrected_mean: float
-    press_sd: float
-
-    @staticmethod
-    def of(interreflection: float) -> Limits:
-        """Return the limits of a sensor, by the strength of its interreflection."""
-        more = GAIN_BY_INTERREFLECTION * interreflection
-        return Limits(
-            LEAST_GAIN + more,
-            LEAST_CHANNEL + more,
-            LEAST_OFFSET,
-            LEAST_CORRECTED + more,
-            LEAST_MEAN_CORRECTED + MEAN_BY_INTERREFLECTION * interreflection,
-            PRESS_BY_INTERREFLECTION * interreflection,
-        )
-
-
 def may_have_moved(common: CommonChange) -> bool:
     """Return whether the camera may have moved by more than the fit can follow."""
     large = math.hypot(common.values[SHIFT_U], common.values[SHIFT_V]) > 1.0
     return bool(large or common.values[BLUR] > 1.0)
 
 
-def light_findings(common: CommonChange, limits: Limits) -> list[Finding]:
-    """Return changes of the LEDs, the exposure and the room's light."""
+def light_findings(common: CommonChange, press_sd: float) -> list[Finding]:
+    """Return changes of the LEDs, the exposure and the room's light.
+
+    `press_sd` is the standard deviation of what a press changes in a channel around it.
+    """
     found = []
     gains, gain_sd = common.values[:6:2], common.sd[:6:2]
     offsets, offset_sd = common.values[1:6:2], common.sd[1:6:2]
     # A shallow wide face in much noise looks like a gain and room light that cancel each other.
     net, net_sd = abs(float(common.gain.mean())), float(common.gain_sd.max()) / math.sqrt(3.0)
-    single = _led_finding(gains, gain_sd, limits)
+    single = _led_finding(gains, press_sd + gain_sd)
     if single is not None:
         found.append(single)
     else:
         mean, sd = float(gains.mean()), float(gain_sd.max()) / math.sqrt(3.0)
-        if abs(mean) > limits.gain + SIGMAS * sd and net > limits.gain + SIGMAS * net_sd:
+        of_press = press_sd / math.sqrt(3.0)
+        if abs(mean) > SIGMAS * (of_press + sd) and net > SIGMAS * (of_press + net_sd):
             found.append(_exposure_finding(mean))
     worst = int(np.argmax(np.abs(offsets)))
     mean = float(offsets.mean())
     least, least_of_one = (
-        limits.offset if offset > 0.0 else LEAST_LOSS for offset in (mean, offsets[worst])
+        LEAST_OFFSET if offset > 0.0 else LEAST_LOSS for offset in (mean, offsets[worst])
     )
     common_size = least + SIGMAS * float(offset_sd.max()) / math.sqrt(3.0)
     own_size = 2.0 * least_of_one + SIGMAS * float(offset_sd[worst])
     size = max(abs(mean) / common_size, float(abs(offsets[worst])) / own_size)
-    if size > (1.0 if net > SIGMAS * net_sd else CLEAR_ROOM_LIGHT):
+    if size > (1.0 if net > SIGMAS * net_sd else SIGMAS):
         found.append(_room_finding(float(offsets[worst])))
     return found
 
 
 def light_gain(
-    common: CommonChange, changes: Sequence[Finding], limits: Limits
+    common: CommonChange, changes: Sequence[Finding], press_sd: float
 ) -> LightGain | None:
     """Return the correction of the light; None if the light is the same, or too different.
 
@@ -139,8 +98,8 @@ def light_gain(
         The fit to the untouched membrane.
     changes : sequence of Finding
         From :func:`light_findings`. An LED that is off has no light to correct.
-    limits : Limits
-        The sensor's.
+    press_sd : float
+        Standard deviation of what a press changes in a channel around it.
     """
     if any(found.meaningless for found in changes):
         return None
@@ -150,11 +109,11 @@ def light_gain(
             return None
         # With room light, which remains a fault, the gain is that of the joint fit.
         gain, sd = common.values[:6:2], common.sd[:6:2]
-    sure = np.abs(gain) > limits.corrected + SIGMAS * sd
-    mean, mean_sd = float(gain.mean()), float(sd.max()) / math.sqrt(3.0)
-    if not (sure.any() or abs(mean) > limits.corrected_mean + SIGMAS * mean_sd):
+    mean, of_mean = abs(float(gain.mean())), math.sqrt(1.0 / 3.0)
+    sure = (np.abs(gain) > CLEAR * press_sd + SIGMAS * sd).any()
+    if not sure and mean < of_mean * (CLEAR * press_sd + SIGMAS * float(sd.max())):
         return None
-    return LightGain(1.0 + gain, np.hypot(sd, limits.press_sd))
+    return LightGain(1.0 + gain, np.hypot(sd, press_sd))
 
 
 def with_shape(gain: LightGain | None, common: CommonChange, uneven: Uneven) -> LightGain:
@@ -174,9 +133,9 @@ def corrected(change: Finding) -> Finding:
     return replace(change, remedy=remedy, verdict=Verdict.WARN, heights=Heights.STATED)
 
 
-def uneven_finding(uneven: Uneven | None, limits: Limits) -> Finding | None:
+def uneven_finding(uneven: Uneven | None, press_sd: float) -> Finding | None:
     """Return that the light has another distribution over the image; None where it has not."""
-    if uneven is None or abs(uneven.largest) < limits.gain + SIGMAS * uneven.sd:
+    if uneven is None or abs(uneven.largest) < SIGMAS * (press_sd + uneven.sd):
         return None
     text = tr("parts of the image are up to {p:.1f} % {how} than at calibration")
     text = text.format(
@@ -188,12 +147,12 @@ def uneven_finding(uneven: Uneven | None, limits: Limits) -> Finding | None:
     return _graded("uneven", text, remedy.format(again=BACKGROUND), far, largest, "%")
 
 
-def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:
+def _led_finding(gains: Array, sd: Array) -> Finding | None:
     """Return the LED whose channel has changed differently from the others, or None."""
     middle = float(np.median(gains))
     k = int(np.argmax(np.abs(gains - middle)))
     change = float(gains[k])
-    if abs(change - middle) < limits.channel + SIGMAS * float(sd[k]):
+    if abs(change - middle) < SIGMAS * float(sd[k]):
         return None
     if change < LED_OFF:
         return _led_off_finding(k, change)
