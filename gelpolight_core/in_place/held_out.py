@@ -21,8 +21,6 @@ Map = NDArray[np.float32]
 
 INSIDE = 0.9
 """Share of the contact radius in which normals and shape are compared."""
-TOP, RING = 0.15, (0.82, 0.92)
-"""Shares of the contact radius between which the height of the cap is taken."""
 FAR = 2.2
 """Distance from the centre, in contact radii, beyond which the membrane counts as untouched."""
 CURVE_NODES = 6
@@ -37,7 +35,8 @@ class HeldOutPress:
     normal_deg : float
         Mean angle between the normals and the ball's.
     cap_ratio : float
-        Height of the cap over the ball's.
+        Height over the ball's, by regression of the slopes inside the contact; NaN where the border
+        cuts it: such a press is not measured.
     diameter_ratio : float
         Diameter of the sphere through the depth over the ball's.
     slope : (N,)
@@ -74,19 +73,13 @@ def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldO
     depth = depth_of(slope_x, slope_y, pitch_mm=1.0, weight=weight)[0]
     found_x, found_y = surface_slopes(depth, 1.0)
     found = np.stack([found_x[inside], found_y[inside]], axis=-1).astype(np.float64)
-    own = np.sqrt(ball.radius**2 - np.minimum(rho, 0.99 * ball.radius) ** 2)
-    top = (rho < TOP * ball.contact) & seen.usable
-    ring = (rho > RING[0] * ball.contact) & (rho < RING[1] * ball.contact) & seen.usable
     far = depth[(rho > FAR * ball.contact) & seen.usable]
-    cap = diameter = np.nan
-    if top.any() and ring.any():
-        height = float(own[top].mean() - own[ring].mean())
-        cap = float(np.mean(depth[top]) - np.mean(depth[ring])) / height
-        diameter = _sphere_radius(dx, dy, depth[inside].astype(np.float64)) / ball.radius
+    rim = np.concatenate([rho[0], rho[-1], rho[:, 0], rho[:, -1]])
+    height = (found * wanted).sum() / (wanted**2).sum()
     return HeldOutPress(
         float(np.degrees(_angles(found, wanted)).mean()),
-        cap,
-        diameter,
+        float(height) if rim.min() > ball.contact else np.nan,
+        _sphere_radius(dx, dy, depth[inside].astype(np.float64)) / ball.radius,
         np.hypot(wanted[:, 0], wanted[:, 1]),
         np.sqrt(0.5 * ((found - wanted) ** 2).sum(axis=1)),
         float(np.sqrt(np.mean(far**2))) if far.size else np.nan,

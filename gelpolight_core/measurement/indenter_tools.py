@@ -91,6 +91,7 @@ def mode_error(heightmap: HeightMap) -> ModeError:
         lateral_per_mm=heightmap.lateral_per_mm,
         node_mm=node_mm,
         blur_mm2=found.blur_mm2 * node_mm**2 / 3.0,
+        smoothed_mm2=found.smoothed_mm2 * node_mm**2,
         level_mm=hidden_mm / math.sqrt(12.0),
     )
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -101,6 +102,8 @@ def measure_object(
         )
     blur_mm2 = 0.0 if mode is None else mode.blur_mm2
     window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, blur_mm2=blur_mm2)
+    if shape == "ball" and mode is not None and mode.smoothed_mm2:
+        window = replace(window, depth_mm=_sharpened(window, mode.smoothed_mm2))
     model = MODELS[shape]
     fit = fit_indenter(model, window, model.start(region), edge=prior)
     anchor = no_anchor(heightmap.flags, region)
@@ -111,10 +114,17 @@ def measure_object(
     depth_sd, lateral_sd = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
     scale = {}
     if depth_sd is not None and lateral_sd is not None:
-        scale = calibration_sd(shape, fit.values, depth_sd, lateral_sd)
+        common = 0.0 if mode is None else mode.depth_by_lateral
+        scale = calibration_sd(shape, fit.values, depth_sd, lateral_sd, common)
     of_mode = {} if mode is None else mode_sd(shape, fit, window, mode)
     parts = (noise, scale, of_mode)
     return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
+
+
+def _sharpened(window: WindowData, smoothed_mm2: float) -> Array:
+    """Return the depth without a smoothing, to the first order of its variance."""
+    bend = cv2.Laplacian(window.depth_mm, cv2.CV_64F, ksize=1, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(window.depth_mm - 0.5 * smoothed_mm2 / window.pitch_mm**2 * bend)
 
 
 def find_object(

@@ -29,6 +29,7 @@ from gelpolight_core.measurement.fit import FitResult, WindowData
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measured import noise_at
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.in_place.change import SMOOTHING_NODES
 from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
 from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 
@@ -60,6 +61,11 @@ class ModeError:
         Variance of the map's blur by these nodes; 0 if it is not known.
     level_mm : float
         Standard deviation of heights by the drape beyond the solved region, which is left out.
+    smoothed_mm2 : float
+        Variance of the smoothing of the image that the map shows; it is undone for a ball.
+    depth_by_lateral : float
+        Relative error of heights by that of lengths across: 2 where balls in the image gave the
+        slopes, so that the diameter of a ball does not depend on the scale.
     """
 
     depth: float
@@ -68,6 +74,8 @@ class ModeError:
     node_mm: float = 0.0
     blur_mm2: float = 0.0
     level_mm: float = 0.0
+    smoothed_mm2: float = 0.0
+    depth_by_lateral: float = 0.0
 
 
 WIDTH_BY_NODES = 0.7
@@ -84,7 +92,9 @@ MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
             for effort, share in _PER_SLOPE.items()
         },
         **{
-            Mode(IN_PLACE, effort): ModeError(0.0, share, 0.0, 1.0)
+            Mode(IN_PLACE, effort): ModeError(
+                0.0, share, 0.0, 1.0, 0.0, 0.0, SMOOTHING_NODES**2, 2.0
+            )
             for effort, share in _PER_SLOPE.items()
         },
         **{Mode(PAPER, effort): ModeError(0.03, 0.0) for effort in _PER_SLOPE},
@@ -127,7 +137,7 @@ def noise_of_fit(
 
 
 def calibration_sd(
-    shape: str, values: Mapping[str, float], depth_scale_sd: float, lateral_scale_sd: float
+    shape: str, values: Mapping[str, float], depth: float, lateral: float, common: float = 0.0
 ) -> dict[str, float]:
     """Return the standard deviations of the fit's parameters by the calibration.
 
@@ -137,13 +147,18 @@ def calibration_sd(
         What was fitted.
     values : mapping
         The fit's parameters.
-    depth_scale_sd, lateral_scale_sd : float
+    depth, lateral : float
         Relative standard deviations of depths, on slopes that balls show, and of lengths across.
+    common : float, optional
+        `ModeError.depth_by_lateral`.
     """
-    share = depth_scale_sd
     if shape != "ball":
-        share *= max(_wall_slope(values) / BALL_SLOPE, 1.0)
-    return _systematic(shape, values, share, lateral_scale_sd)
+        depth *= max(_wall_slope(values) / BALL_SLOPE, 1.0)
+        return _systematic(shape, values, depth, lateral)
+    found = _systematic(shape, values, depth, lateral)
+    own = math.sqrt(max(depth**2 - (common * lateral) ** 2, 0.0))
+    found["diameter_mm"] = math.hypot(own, (2.0 - common) * lateral) * values["diameter_mm"]
+    return found
 
 
 def mode_sd(shape: str, fit: FitResult, window: WindowData, mode: ModeError) -> dict[str, float]:

@@ -11,6 +11,7 @@ import pytest
 
 from gelpolight_core import Measurement, measure, read_image
 from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import InPlace, Session, read_session
 
@@ -55,6 +56,30 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None
         errors.append(float(np.degrees(np.arccos(cosine)).mean()))
     # Labels of 1 to 2 px alone cost 1.5 degrees.
     assert np.mean(errors) < 2.8
+
+
+@pytest.mark.parametrize("name", ["mini-1", "wedge-1"])
+def test_diameters_of_presses_left_out_are_within_their_deviations(
+    shared_data: Path, name: str
+) -> None:
+    """The stated deviation was 2.5 times the scatter."""
+    session = real_session(shared_data, name)
+    files = session.files("balls")
+    excluded = frozenset(f"balls/{path.name}" for path in files[::2])
+    training = replace(session, decisions=replace(session.decisions, excluded=excluded))
+    reconstructor = Reconstructor(calibrate(training).calibration)
+    error, sd = [], []
+    for path in files[::2]:
+        try:
+            found = measure(reconstructor.depth(read_image(path), uncertainty=True), shape="ball")
+        except InputError:
+            continue  # cut by the border
+        if found.verdict == "ok":
+            error.append(found.diameter_mm - 2.0 * session.ball_radius_mm(path.name))
+            sd.append(found.sd["diameter_mm"])
+    assert len(error) >= 15
+    assert (np.abs(error) < 3.0 * np.array(sd)).all()
+    assert np.median(sd) < 2.0 * np.sqrt(np.mean(np.square(error)))
 
 
 def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data: Path) -> None:

@@ -102,7 +102,7 @@ def colour_change(
     same = np.array_equal(usable, base.plain)
     there = base.smooth if same else _smooth(base.background, usable)
     if gain is not None:
-        smooth = smooth / gain.astype(np.float32)
+        smooth = np.asarray(smooth / gain.astype(np.float32), np.float32)
     change = (smooth - there) / (there + np.float32(OFFSET))
     np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE, out=change)
     return ColourChange(change, usable, saturated)
