@@ -40,19 +40,25 @@ class Grain:
         What the membrane's texture adds at least to the one, and at most to the other.
     sd : float
         Scatter of the variance between neighbours from image to image, as a share.
+    edges : float
+        Largest share of the parts of an image with more variance between neighbours where a
+        compressed image's blocks meet than elsewhere.
     """
 
     ratio: float
     near: float
     far: float
     sd: float
+    edges: float
 
     def lost(self, seen: Array, step: float) -> float:
         """Return the variance that neighbours lack, over the most that chance explains.
 
+        Or by how much more neighbours differ where blocks meet, if that is more.
+
         Parameters
         ----------
-        seen : (blocks, 2)
+        seen : (blocks, 3)
             From :func:`block_grain`.
         step : float
             Between the numbers of the image, share of full scale.
@@ -64,17 +70,22 @@ class Grain:
         rounding = step**2 / 8.0
         noise = max(float(np.median(seen[:, 1])) - self.far - rounding, 0.0)
         alike = rounding * math.exp(-((math.pi / step) ** 2) * noise)
-        return lacking / (SIGMAS * math.hypot(sd, self.sd * expected) + alike)
+        by_blocks = (_edges(seen) - self.edges) / (SIGMAS * 0.5 / math.sqrt(len(seen)))
+        return max(by_blocks, lacking / (SIGMAS * math.hypot(sd, self.sd * expected) + alike))
 
     def _lacking(self, seen: Array) -> tuple[float, float, float]:
         """Return the expected variance of neighbours, what they lack, and its deviation."""
-        near, far = np.median(seen, axis=0).tolist()
+        near, far, _ = np.median(seen, axis=0).tolist()
         expected = self.near + self.ratio * max(far - self.far, 0.0)
         each = seen[:, 0] - self.ratio * seen[:, 1]
         # Half the distance of these quantiles is a standard deviation.
         low, high = np.quantile(each, (0.16, 0.84))
         sd = math.sqrt(0.5 * math.pi / len(each)) * 0.5 * float(high - low)
         return expected, expected - near, sd
+
+
+def _edges(seen: Array) -> float:
+    return float((seen[:, 2] > seen[:, 0]).mean())
 
 
 def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
@@ -103,27 +114,28 @@ def grain_of(images: Sequence[Map], corner: Index) -> Grain | None:
     offsets = [np.median(one[:, 0] - ratio * one[:, 1]) for one in seen]
     sd = float(np.std(offsets, ddof=1))
     unsure = SIGMAS * sd / math.sqrt(len(seen))
-    near, far = (usual - noise).tolist()
+    near, far, _ = (usual - noise).tolist()
     share = sd / max(float(usual[0]), np.finfo(float).tiny)
-    return Grain(ratio, max(near - unsure, 0.0), max(far + unsure, 0.0), share)
+    edges = max(_edges(one) for one in seen)
+    return Grain(ratio, max(near - unsure, 0.0), max(far + unsure, 0.0), share, edges)
 
 
 def block_corners(centres: Array, height: int, width: int) -> Index:
     """Return corners (blocks, 2) for :func:`block_grain` about centres (blocks, 2), row and column.
 
-    They are odd, because many cameras and files give two pixels the same colour. There are none in
-    an image that is hardly larger than a block.
+    The second pixel is the first one of a block of a compressed image. There are none in an image
+    that is hardly larger than a block.
     """
-    most = np.array([height, width]) - BLOCK - 1
-    wanted = np.clip(np.rint(centres) - FAR, 0, most).astype(np.int32) | 1
-    return np.ascontiguousarray(wanted if most.min() > 0 else wanted[:0])
+    most = (np.array([height, width]) - BLOCK - FAR + 1) // FAR
+    wanted = np.clip(np.rint(centres / FAR) - 2, 0, most).astype(np.int32) * FAR + FAR - 1
+    return np.ascontiguousarray(wanted if most.min() >= 0 else wanted[:0])
 
 
 def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
-    """Return the variance of a pixel (blocks, 2) in square parts of an image.
+    """Return the variance of a pixel (blocks, 3) in square parts of an image.
 
-    By differences between neighbours, and between pixels that are `FAR` apart. Smooth shading has
-    no part in them.
+    By differences between neighbours, between pixels that are `FAR` apart, and between neighbours
+    where four blocks of a compressed image meet. Smooth shading has no part in them.
 
     Parameters
     ----------
@@ -134,7 +146,7 @@ def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
     corner : (blocks, 2) int32
         Row and column of the first pixel of each part, which is `BLOCK` pixels wide.
     """
-    found = np.empty((len(corner), 2))
+    found = np.empty((len(corner), 3))
     _block_grain(raw, light, corner, found)
     return found
 
@@ -152,11 +164,16 @@ def _block_grain(raw, light, corner, found):  # type: ignore[no-untyped-def]  # 
     products = np.float32(4 * 3 * FAR * FAR // 2)
     for b in range(corner.shape[0]):
         r, c = corner[b, 0], corner[b, 1]
-        near, far = np.float32(0.0), np.float32(0.0)
+        near, far, edges = np.float32(0.0), np.float32(0.0), np.float32(0.0)
         for k in range(3):
             table = light[k]
             for i in range(0, FAR, 2):
                 for j in range(FAR):
-                    near += _square(raw, table, r + 2 * i, c + 2 * j, 1, k)
+                    # Both rows in the same block: its edges cancel.
+                    near += _square(raw, table, r + 2 * i + 2, c + 2 * j, 1, k)
                     far += _square(raw, table, r + i, c + j, FAR, k)
+            for i in range(0, BLOCK, FAR):
+                for j in range(0, BLOCK, FAR):
+                    edges += _square(raw, table, r + i, c + j, 1, k)
         found[b, 0], found[b, 1] = near / products, far / products
+        found[b, 2] = edges / np.float32(4 * 3 * 4)

@@ -183,6 +183,9 @@ def test_colours_of_a_real_sensor_in_another_order_are_refused(shared_data: Path
         frame = read_raw_image(path)[0]
         assert reconstructor.health(frame).keys == ()
         assert reconstructor.health(frame[..., ::-1]).keys == ("colour_order",)
+        _, data = cv2.imencode(".jpg", frame[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 75])
+        compressed = np.ascontiguousarray(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1])
+        assert "compressed" in reconstructor.health(compressed).keys
 
 
 def test_a_gel_that_drags_its_texture_is_calibrated(shared_data: Path, tmp_path: Path) -> None:

@@ -134,6 +134,14 @@ def test_exposure_gain_and_images_without_noise_have_lost_nothing(
         assert "compressed" not in check.check(image).keys
 
 
+def test_a_compressed_mean_of_frames_is_found_by_its_blocks(
+    known: KnownSensor, check: HealthCheck, press: Map
+) -> None:
+    averaged = np.rint(mean(known, press, 16)).astype(np.uint8)
+    assert "compressed" not in check.check(averaged).keys
+    assert "compressed" in check.check(jpeg(averaged, 85)).keys
+
+
 def test_a_camera_that_compresses_is_compared_with_its_own_images(
     known: KnownSensor, balls: list[Image], press: Map
 ) -> None:
