@@ -72,7 +72,7 @@ MOST = {
     "tests/.": 1448,
     "tests/app": 10668,
     "tests/batch": 408,
-    "tests/calibration": 1709,
+    "tests/calibration": 1719,
     "tests/command_line": 1032,
     "tests/data": 163,
     "tests/design": 89,

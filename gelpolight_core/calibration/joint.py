@@ -63,16 +63,14 @@ class Stated(NamedTuple):
     value, sd : float
         Factor on the length that fits best, with its standard deviation; for the coating 1 plus its
         exponent.
+    chi_square : float
+        What is left then; large residuals count less.
     """
 
     key: str
     value: float
     sd: float
-
-    @property
-    def sds(self) -> float:
-        """Difference from what is stated, in standard deviations."""
-        return abs(self.value - 1.0) / self.sd
+    chi_square: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -356,9 +354,10 @@ def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
         ).x
         slopes = jacobian(found)
         sd = float(np.sqrt(np.linalg.pinv(slopes.T @ slopes)[-1, -1]))
-        return Stated(key, float(found[-1]), sd)
+        left = float(2.0 * (np.sqrt(1.0 + residuals(found) ** 2) - 1.0).sum())
+        return Stated(key, float(found[-1]), sd, left)
 
-    return tuple(sorted(in_parallel(fitted, STATED), key=lambda one: -one.sds))
+    return tuple(sorted(in_parallel(fitted, STATED), key=lambda one: one.chi_square))
 
 
 def _described(problem: Problem, x: Array, limits: tuple[Array, Array]) -> _Solution:

@@ -288,7 +288,7 @@ def judge_stated(
         "radius": tr("the ball radii ({x:.3f} times the stated ones fit)"),
         "square": tr("the squares of the board on the top surface ({x:.3f} times the stated fit)"),
         "led_height": tr("the LED height ({height:.1f} mm fits)"),
-        "coating": tr("the coating: where stretched, it is darker or brighter"),
+        "coating": tr("the coating (stretched to twice its area, it has {light:.0%} of its light)"),
         "layers": tr(
             "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
             " {window:+.1f} mm of window fit)"
@@ -299,15 +299,16 @@ def judge_stated(
         for index in (sensor.elastomer_refractive_index, sensor.window_refractive_index)
     )
     found = [
-        texts[key].format(
-            x=value,
-            height=value * sensor.led_height_mm,
-            gel=(1.0 - value) * apparent_mm * gel,
-            window=(1.0 - value) * apparent_mm * window,
+        texts[one.key].format(
+            x=one.value,
+            height=one.value * sensor.led_height_mm,
+            gel=(1.0 - one.value) * apparent_mm * gel,
+            window=(1.0 - one.value) * apparent_mm * window,
+            light=2.0 ** (1.0 - one.value),
         )
-        for key, value, sd in stated
+        for one in stated
         # As likely as the first.
-        if ((value - 1.0) / sd) ** 2 >= best.sds**2 - 1.0
+        if one.chi_square <= best.chi_square + 1.0
     ]
     return (
         judge(

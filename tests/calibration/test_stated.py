@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_joint import BALLS, MIRROR, NO_MAP, SLAB, found_press, pixels_of, truth
 
-from gelpolight_core.calibration.joint import refine_jointly
+from gelpolight_core.calibration.joint import Stated, refine_jointly
 from gelpolight_core.calibration.refinement import judge_stated
 from gelpolight_core.causes import explained
 from gelpolight_core.finding import QualityTable, Verdict
@@ -17,6 +17,7 @@ from gelpolight_core.session.session import SensorData
 
 BRIGHT = 0.75 * MIRROR[:, :2]
 SENSOR = SensorData("A", 13.7, 14.0, 1.41, 0.0, 1.49, 26.0)
+STACK = LayerStack((25.0, 14.0), (1.0, 1.41))
 
 
 @pytest.mark.parametrize(
@@ -27,11 +28,13 @@ SENSOR = SensorData("A", 13.7, 14.0, 1.41, 0.0, 1.49, 26.0)
         ("layers", 1.03, "mm of elastomer or"),
         ("square", 1.04, "the squares of the board"),
         ("led_height", 0.7, "the LED height (19."),
-        ("coating", 1.0, "the coating"),
+        ("coating", 1.3, "has 8"),
     ],
 )
 def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> None:
-    known = truth(gloss=0.3, roughness=0.45, decay_mm=0.6, coating=0.3 * (key == "coating"))
+    known = truth(
+        gloss=0.3, roughness=0.45, decay_mm=0.6, coating=(stated - 1.0) * (key == "coating")
+    )
     random, leds = np.random.default_rng(0), MIRROR.copy()
     presses = [found_press(pose, random) for pose in BALLS]
     pixels = [pixels_of(pose, known, 0.003, random) for pose in BALLS]
@@ -46,9 +49,18 @@ def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> N
     if key == "led_height":
         leds += (stated - 1.0) * (leds - np.pad(BRIGHT, ((0, 0), (0, 1))))
     joint = refine_jointly(presses, pixels, leds, SLAB, NO_MAP, bright_mm=BRIGHT)
-    (figure,) = judge_stated(joint.stated, SENSOR, LayerStack((25.0, 14.0), (1.0, 1.41)))
+    (figure,) = judge_stated(joint.stated, SENSOR, STACK)
     cause, _ = explained({"joint": QualityTable((figure,))})
     if key:
         assert joint.stated[0].key == key
         assert named in cause
     assert (figure.verdict is Verdict.PASS) == (not key)
+
+
+def test_two_lengths_that_explain_the_presses_equally_well_are_both_named() -> None:
+    found = (("layers", 0.98, 100.0), ("led_height", 1.1, 100.5), ("radius", 1.05, 104.0))
+    stated = [Stated(key, value, 0.005, left) for key, value, left in found]
+    (figure,) = judge_stated(stated, SENSOR, STACK)
+    assert "of elastomer or" in figure.remedy
+    assert "the LED height (15.1 mm fits)" in figure.remedy
+    assert "radii" not in figure.remedy
