@@ -82,7 +82,7 @@ MOST = {
     "tests/factors": 76,
     "tests/golden": 214,
     "tests/image": 128,
-    "tests/in_place": 1156,
+    "tests/in_place": 1167,
     "tests/io": 228,
     "tests/light": 656,
     "tests/lights": 206,

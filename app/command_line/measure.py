@@ -95,6 +95,7 @@ def _measured(
     )
     findings = () if heightmap.health is None else heightmap.health.findings
     faults = {"faults": [as_dict(finding) for finding in findings]}
+    corrected = [finding.line for finding in findings if not finding.doubtful]
     if tools:
         results = [judged(tool.apply(heightmap), heightmap) for tool in tools]
         content = {
@@ -104,14 +105,12 @@ def _measured(
             "results": [result_as_dict(result) for result in results],
             **faults,
         }
-        return content, [line for result in results for line in tool_lines(result)]
+        return content, [*(line for result in results for line in tool_lines(result)), *corrected]
     seed = one_point(options.at, where="--at") if options.at else None
     measurement = judged(measure_heightmap(heightmap, shape=options.shape, seed_mm=seed), heightmap)
     values = measurement.as_json(truth)
-    lines = measurement_lines(values)
-    if options.shape == AUTO:
-        lines = [f"{tr('shape'):<12} {measurement.shape}", *lines]
-    return values | faults, lines
+    shape = [f"{tr('shape'):<12} {measurement.shape}"] if options.shape == AUTO else []
+    return values | faults, [*shape, *measurement_lines(values), *corrected]
 
 
 def _truths(options: argparse.Namespace) -> dict[str, Truth]:

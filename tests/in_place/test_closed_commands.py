@@ -7,6 +7,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from report_pdf import report_data
@@ -62,6 +63,18 @@ def test_images_are_reconstructed_measured_and_timed(
     command = ["benchmark", str(calibration), str(image), "--repeats", "2"]
     assert main([*command, "--json", str(timed)]) == 0
     assert json.loads(timed.read_text())["model"] == "in-place"
+
+
+def test_a_change_of_the_light_that_is_corrected_is_said(
+    calibration: Path, closed_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    image, darker = sorted((closed_folder / "balls").iterdir())[0], tmp_path / "darker.png"
+    pixels = cv2.imread(str(image), cv2.IMREAD_UNCHANGED)
+    assert cv2.imwrite(str(darker), np.rint(0.8 * pixels).astype(np.uint8))
+    assert main(["measure", str(calibration), str(darker), "--shape", "ball"]) == 0
+    output = capsys.readouterr().out
+    assert "verdict      ok" in output
+    assert "darker than at calibration" in output and "corrected for this" in output
 
 
 def test_a_new_gel_needs_a_background_only(
