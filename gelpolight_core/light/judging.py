@@ -38,8 +38,9 @@ LEAST_BLUR_PX = 1.0
 """A blur of 1.4 px costs 10 um."""
 LED_OFF, LEAST_LIT = -0.8, -0.5
 """Change of a channel below which its LED is off, and above which the others are on."""
-FAR_GAIN, FAR_OFFSET = 0.05, 0.005
-"""Above these, the error of the depth is a third of its value or more."""
+FAR_UNEVEN, FAR_OFFSET = 0.05, 0.005
+"""Above these, the error of the depth is a third of its value or more: such a change need not have
+the shapes that are fitted. A gain of any size is corrected to a few hundredths of a percent."""
 FAR_SHIFT_PX, FAR_BLUR_PX = 10.0, 6.0
 SATURATED_SHARE, SATURATED_CONTACT, MOSTLY_SATURATED = 0.01, 0.05, 0.3
 """Of the field, and of its part that has changed: a shiny membrane saturates in a contact, and
@@ -142,7 +143,7 @@ def uneven_finding(uneven: Uneven | None, press_sd: float) -> Finding | None:
         p=100.0 * abs(uneven.largest), how=tr("darker") if uneven.largest < 0.0 else tr("brighter")
     )
     remedy = tr("Clean the lens and check that nothing shades it; then {again}")
-    far = abs(uneven.largest) > FAR_GAIN
+    far = abs(uneven.largest) > FAR_UNEVEN
     largest = 100.0 * uneven.largest
     return _graded("uneven", text, remedy.format(again=BACKGROUND), far, largest, "%")
 
@@ -156,14 +157,13 @@ def _led_finding(gains: Array, sd: Array) -> Finding | None:
         return None
     if change < LED_OFF:
         return _led_off_finding(k, change)
-    far = abs(change - middle) > 2.0 * FAR_GAIN
     text = tr("the {name} LED is {p:.1f} % {how} than at calibration").format(
         name=channel_name(k),
         p=100.0 * abs(change),
         how=tr("weaker") if change < 0.0 else tr("brighter"),
     )
     remedy = tr("Let the LEDs warm up and check their current; then {again}")
-    return _graded("led_weak", text, remedy.format(again=BACKGROUND), far, 100.0 * change, "%")
+    return _graded("led_weak", text, remedy.format(again=BACKGROUND), False, 100.0 * change, "%")
 
 
 def led_off_findings(change: Array) -> list[Finding]:
@@ -191,8 +191,7 @@ def _exposure_finding(change: float) -> Finding:
     text = tr("the light is {p:.1f} % {how} than at calibration: exposure, gain or LEDs changed")
     text = text.format(p=100.0 * abs(change), how=tr("brighter") if change > 0.0 else tr("darker"))
     remedy = tr("Restore the camera settings of the calibration, or {again}")
-    far = abs(change) > FAR_GAIN
-    return _graded("exposure", text, remedy.format(again=BACKGROUND), far, 100.0 * change, "%")
+    return _graded("exposure", text, remedy.format(again=BACKGROUND), False, 100.0 * change, "%")
 
 
 def _room_finding(offset: float) -> Finding:
