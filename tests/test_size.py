@@ -77,7 +77,7 @@ MOST = {
     "tests/data": 163,
     "tests/design": 89,
     "tests/design_check": 62,
-    "tests/docs": 417,
+    "tests/docs": 418,
     "tests/export": 518,
     "tests/factors": 76,
     "tests/golden": 214,

@@ -41,6 +41,7 @@ IN_WORDS = {
     "0.9 * radius_mm": "0.9 ball radii",
     "0.15 * contact_mm": "0.15 contact radii",
     "0.4 * contact_mm": "0.4 contact radii",
+    "200.0 * best.sd": "2 standard deviations",
     "limit": "{PAPER_LIMITS[0]:g} % in the plane, {PAPER_LIMITS[1]:g} % in depth",
 }
 NOTES = {
