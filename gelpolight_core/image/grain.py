@@ -54,8 +54,6 @@ class Grain:
     def lost(self, seen: Array, step: float) -> float:
         """Return the variance that neighbours lack, over the most that chance explains.
 
-        Or by how much more neighbours differ where blocks meet, if that is more.
-
         Parameters
         ----------
         seen : (blocks, 3)
@@ -70,8 +68,19 @@ class Grain:
         rounding = step**2 / 8.0
         noise = max(float(np.median(seen[:, 1])) - self.far - rounding, 0.0)
         alike = rounding * math.exp(-((math.pi / step) ** 2) * noise)
-        by_blocks = (_edges(seen) - self.edges) / (SIGMAS * 0.5 / math.sqrt(len(seen)))
-        return max(by_blocks, lacking / (SIGMAS * math.hypot(sd, self.sd * expected) + alike))
+        return lacking / (SIGMAS * math.hypot(sd, self.sd * expected) + alike)
+
+    def in_blocks(self, seen: Array) -> float:
+        """Return how much more neighbours differ where blocks meet, over what chance explains.
+
+        Parameters
+        ----------
+        seen : (blocks, 3)
+            From :func:`block_grain`; pressed parts have no blocks, either.
+        """
+        if not len(seen):
+            return 0.0
+        return (_edges(seen) - self.edges) / (SIGMAS * 0.5 / math.sqrt(len(seen)))
 
     def _lacking(self, seen: Array) -> tuple[float, float, float]:
         """Return the expected variance of neighbours, what they lack, and its deviation."""

@@ -219,7 +219,7 @@ class HealthCheck:
             return self._all_pressed(pixels)
         if gain is not None:
             changes = [corrected(change) for change in changes]
-        compressed = compressed_finding(self._lost_detail(raw, light, common.untouched))
+        compressed = self._compressed(raw, light, common.untouched)
         # Lost detail looks like a movement and like blur.
         detail = compressed or moved
         blurred = None if detail else blur_finding(judged, samples.blur_strength)
@@ -246,13 +246,15 @@ class HealthCheck:
             light=gain,
         )
 
-    def _lost_detail(self, raw: NDArray[Any], light: Map, untouched: Mask) -> float:
-        """Return the detail that the image has lost; see :meth:`Grain.lost`."""
-        grain = self.calibration.grain
-        if grain is None or not self.samples.blocks.size:
-            return 0.0
-        seen = block_grain(raw, light, self.samples.blocks[untouched])
-        return grain.lost(seen, float((light[:, -1] - light[:, -2]).max()))
+    def _compressed(self, raw: NDArray[Any], light: Map, untouched: Mask) -> Finding | None:
+        """Return that the image has lost detail; of pressed parts only its blocks tell that."""
+        grain, blocks = self.calibration.grain, self.samples.blocks
+        if grain is None or not blocks.size:
+            return None
+        if not untouched.any():
+            return compressed_finding(grain.in_blocks(block_grain(raw, light, blocks)), far=True)
+        seen, step = block_grain(raw, light, blocks[untouched]), light[:, -1] - light[:, -2]
+        return compressed_finding(max(grain.in_blocks(seen), grain.lost(seen, float(step.max()))))
 
     def _is_pressed(self, common: CommonChange) -> bool:
         """Return whether a press of the whole field explains a frame better than its light."""
@@ -287,6 +289,9 @@ class HealthCheck:
             turned = self._common(np.ascontiguousarray(raw[..., order]), light[list(order)])
             if turned.share > SWAPPED_UNTOUCHED:
                 return health_of([swapped_finding(order)], untouched=share)
+        compressed = self._compressed(raw, light, np.zeros(self.samples.count.size, np.bool_))
+        if compressed is not None:
+            return health_of([compressed], untouched=share)
         seen_px = movement_px(self.samples, raw, light) if whole else None
         finding = stranger_finding() if seen_px is None else far_moved_finding(seen_px)
         return health_of([finding], untouched=share)

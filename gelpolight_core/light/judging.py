@@ -263,13 +263,15 @@ def all_pressed_finding() -> Finding:
     return _graded("all_pressed", text, remedy, False)
 
 
-def compressed_finding(lost: float) -> Finding | None:
+def compressed_finding(lost: float, *, far: bool = False) -> Finding | None:
     """Return that fine detail of the image is lost.
 
     Parameters
     ----------
     lost : float
         Of :meth:`~gelpolight_core.image.grain.Grain.lost`.
+    far : bool, optional
+        Whether nothing of the membrane is recognised.
     """
     if lost <= 1.0:
         return None
@@ -278,7 +280,7 @@ def compressed_finding(lost: float) -> Finding | None:
         "Use the camera's images as at calibration: PNG or TIFF, without noise reduction or "
         "other processing"
     )
-    return _graded("compressed", text, remedy, False, lost)
+    return _graded("compressed", text, remedy, far, lost)
 
 
 def saturated_finding(share: float, changed: float = 1.0) -> Finding | None:

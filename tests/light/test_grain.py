@@ -98,6 +98,14 @@ def test_lost_detail_is_named_first_and_leaves_the_depth_doubtful(
     assert "camera_moved" not in found.keys
 
 
+def test_an_image_of_which_compression_leaves_nothing_is_refused_as_compressed(
+    known: KnownSensor, check: HealthCheck, press: Map
+) -> None:
+    found = check.check(jpeg(known.noisy(press), 8)).meaningless
+    assert found is not None
+    assert found.key == "compressed"
+
+
 def mean(known: KnownSensor, frame: Map, frames: int) -> Map:
     """Return the mean of noisy images, 0..255."""
     noisy = [known.noisy(frame, seed=seed) for seed in range(frames)]
