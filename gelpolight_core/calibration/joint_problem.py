@@ -208,6 +208,6 @@ class Problem:
         for term in range(terms if self.free[self.balls_end :].any() else 0):
             of_light = self.balls_end + term + terms * np.arange(3)
             for _, rows, slope in slopes(of_light.tolist(), surfaces):
-                for k in range(3):
-                    result[rows, of_light[k]][k::3] = slope[k::3]
+                for channel, at in enumerate(of_light):
+                    result[rows, at][channel::3] = slope[channel::3]
         return result

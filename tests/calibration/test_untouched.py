@@ -25,14 +25,14 @@ from gelpolight_core.simulation.session import pressed_membrane
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
 SENSOR = VirtualSensor(SensorDesign().scaled(0.25), 0)
-Judged = Callable[[NDArray[np.floating]], list[Finding]]
+Judged = Callable[[NDArray[np.number]], list[Finding]]
 
 
 @pytest.fixture
 def judged(small_project: Project, tmp_path: Path) -> Judged:
     """Return a function that gives the findings about another background of the small session."""
 
-    def findings(background: NDArray[np.floating]) -> list[Finding]:
+    def findings(background: NDArray[np.number]) -> list[Finding]:
         folder = shutil.copytree(small_project.session.folder, tmp_path / "session")
         pixels = np.clip(np.rint(background[..., ::-1]), 0, 255)
         cv2.imwrite(str(folder / "background" / "background.png"), pixels)
