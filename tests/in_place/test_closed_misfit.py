@@ -74,10 +74,10 @@ def test_the_misfit_is_that_of_a_direct_computation(
         angle_deg, expected = direct(closed_run, frame, height_map)
         misfit = reconstructor.misfit(frame, height_map, largest=10_000)
         found = misfit[np.isfinite(misfit)]
-        assert found.size == expected.size
         angles[name], misfits[name] = np.mean(angle_deg), np.median(found)
         # Colours that are far from any surface's have no direct computation.
         if name == "press":
+            assert found.size == expected.size
             assert np.median(found) == pytest.approx(np.median(expected), rel=0.05)
     assert angles["press"] < 1.0 < 3.0 < min(angles["noise"], angles["inverted"])
     assert 0.0 < 10.0 * misfits["press"] < min(misfits["noise"], misfits["inverted"])
