@@ -288,7 +288,7 @@ class Reconstructor:
             calibration_id=self.calibration.identity,
             model=self.model,
             source=name,
-            findings=(*failed, *solved.findings, *health.findings),
+            findings=(*failed, *health.findings, *solved.findings),
             **({} if noise is None else {f.name: getattr(noise, f.name) for f in fields(noise)}),
             depth_scale_sd=solved.depth_scale_sd,
             lateral_scale_sd=solved.lateral_scale_sd,
