@@ -197,15 +197,19 @@ def rounds_notes(stopped: str) -> tuple[Finding, ...]:
     return (_note("rounds", texts[stopped], heights),) if stopped in texts else ()
 
 
-def unsolved_notes(share: float) -> tuple[Finding, ...]:
-    """Return the note on nodes that the light alone does not determine, if there are many."""
+def unsolved_notes(share: float, *, fits: bool) -> tuple[Finding, ...]:
+    """Return the note on nodes that the light alone does not determine, if there are many.
+
+    The depth is doubtful where the rest of the contact does not fit the surface either.
+    """
     if share <= UNSOLVED_SHARE:
         return ()
     text = tr(
         "{percent:.1f} % of the membrane is lit by less than two LEDs or faces "
         "away from the camera, as on steep walls: heights there may be too low"
     )
-    return (_note("steep_walls", text.format(percent=100.0 * share)),)
+    heights = Heights.STATED if fits else Heights.DOUBTFUL
+    return (_note("steep_walls", text.format(percent=100.0 * share), heights),)
 
 
 def small_image_notes(pitch_mm: float, decay_mm: float) -> tuple[Finding, ...]:

@@ -245,9 +245,9 @@ class NearLightSolver(OpenSolver):
             notes += [] if boundary.free is None else [free_boundary_note()]
             notes += [unanchored_note()] if boundary.level_sd_mm > 0.0 else []
             left = self._solver.left_over(solved)
-            notes += left.findings
             notes += rounds_notes(rounds.stopped)
-            notes += unsolved_notes(unsolved_share(solved))
+            notes += unsolved_notes(unsolved_share(solved), fits=not left.findings)
+            notes += left.findings
             notes += small_image_notes(
                 self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
             )
