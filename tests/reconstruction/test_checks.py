@@ -87,9 +87,11 @@ def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(
 ) -> None:
     frame = standard_press().frame
     assert not reconstruct.depth(frame).findings
+    for share in (0.9, 0.5):
+        darker = reconstruct.depth(frame * np.float32(share))
+        assert darker.health is not None and darker.health.keys == ("exposure",)
+        assert not darker.doubts
     for wrong, key in (
-        (frame * np.float32(0.9), "exposure"),
-        (frame * np.float32(0.5), "exposure"),
         (frame[..., ::-1], "colour_order"),
         (frame[::-1], "other_sensor"),
     ):
@@ -126,8 +128,8 @@ def test_known_bad_pixels_are_left_out_of_the_solve() -> None:
         mended = Reconstructor(known, effort=effort).depth(spoilt)
         worst = float(np.abs(mended.depth_mm - good.depth_mm).max())
         assert worst < 0.01
-        assert float(np.abs(seen.depth_mm - good.depth_mm).max()) > 3.0 * worst
         assert not mended.findings
+        assert seen.doubts
         assert seen.health is not None and "bad_line" in seen.health.keys
 
 
