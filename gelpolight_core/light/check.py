@@ -204,7 +204,7 @@ class HealthCheck:
         follow = whole and may_have_moved(judged)
         seen_px = movement_px(samples, raw, light) if follow else None
         moved = moved_finding(judged, seen_px)
-        changes = light_findings(judged, press_sd)
+        changes = light_findings(judged, press_sd, 1.0 / np.iinfo(raw.dtype).max)
         gain = light_gain(common, changes, press_sd)
         if usual is not None:
             gain = LightGain(1.0 + common.gain, scatter_of_cells(samples, common))

@@ -28,9 +28,10 @@ PRESS, PRESS_BY_INTERREFLECTION = 0.001, 0.0015
 """Standard deviation of the change of a channel that presses cause in the untouched membrane, and
 its part over the membrane's interreflection. 10 um of a press 1 mm deep are the cost of a change by
 0.5 %, and of one of all channels by 0.22 %."""
-LEAST_OFFSET, LEAST_LOSS = 0.0002, 0.0006
+LEAST_OFFSET, LEAST_LOSS, ROUNDING = 0.0002, 0.0006, 0.125
 """More and less room light than at calibration, share of full scale; 0.0003 costs 10 um. A shallow
-press over much of the field looks like a loss of up to 0.0005. """
+press over much of the field looks like a loss of up to 0.0005. Means of four pixels that are
+rounded to whole numbers, as in images of half the size, are too large by an eighth of a step."""
 CORRECTABLE = ("exposure", "led_weak", "uneven")
 LEAST_SHIFT_PX = 0.5
 """0.6 px cost 10 um."""
@@ -57,10 +58,11 @@ def may_have_moved(common: CommonChange) -> bool:
     return bool(large or common.values[BLUR] > 1.0)
 
 
-def light_findings(common: CommonChange, press_sd: float) -> list[Finding]:
+def light_findings(common: CommonChange, press_sd: float, step: float) -> list[Finding]:
     """Return changes of the LEDs, the exposure and the room's light.
 
-    `press_sd` is the standard deviation of what a press changes in a channel around it.
+    `press_sd` is the standard deviation of what a press changes in a channel around it, `step` the
+    share of full scale from one number of the image to the next.
     """
     found = []
     gains, gain_sd = common.values[:6:2], common.sd[:6:2]
@@ -78,7 +80,8 @@ def light_findings(common: CommonChange, press_sd: float) -> list[Finding]:
     worst = int(np.argmax(np.abs(offsets)))
     mean = float(offsets.mean())
     least, least_of_one = (
-        LEAST_OFFSET if offset > 0.0 else LEAST_LOSS for offset in (mean, offsets[worst])
+        max(LEAST_OFFSET if offset > 0.0 else LEAST_LOSS, ROUNDING * step)
+        for offset in (mean, offsets[worst])
     )
     common_size = least + SIGMAS * float(offset_sd.max()) / math.sqrt(3.0)
     own_size = 2.0 * least_of_one + SIGMAS * float(offset_sd[worst])

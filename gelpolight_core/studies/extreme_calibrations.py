@@ -21,7 +21,6 @@ from gelpolight_core.sensor_calibration import Calibration, FullModel
 from gelpolight_core.studies.known_sensor import KnownSensor
 from gelpolight_core.studies.stability import Case, Seen, group, seen_once
 from gelpolight_core.studies.trial import (
-    flagged,
     is_finite,
     judged,
     standard_press,
@@ -54,7 +53,7 @@ def calibration_cases() -> list[Case]:
         *group("calibrations", "0 over 1 mm: masked, and correct elsewhere", holes),
         *group("calibrations", "refused", unusable),
         *group("calibrations", "refused when the file is read", read),
-        *group("calibrations", "clipped, finite and flagged", {"light_beyond_curve": _beyond}),
+        *group("calibrations", "finite and named", {"light_beyond_curve": _beyond}),
     ]
 
 
@@ -115,7 +114,6 @@ def _beyond() -> Seen:
     found = Reconstructor(replace(calibration.changed(full=None, **low), model="paper")).depth(
         standard_press().frame
     )
-    share = float(flagged(found, Flag.EXTRAPOLATED).mean())
     deepest = float(np.abs(found.depth_mm).max())
-    summary = f"{100 * share:.0f} % of the nodes flagged; at most {deepest:.1f} mm"
-    return seen_once(is_finite(found) and share > 0.1, summary)
+    named = ", ".join(finding.key for finding in found.findings)
+    return seen_once(is_finite(found) and "exposure" in named, f"{named}; at most {deepest:.1f} mm")

@@ -85,4 +85,5 @@ def test_a_measurement_is_never_better_than_its_height_map(tmp_path: Path) -> No
             assert (abs(found.height_mm - 1.0) > 3.0 * found.sd["height_mm"]) is doubtful
             for result in (found, measure(read_height_map(path), shape="cylinder")):
                 assert (result.verdict == "doubtful") is doubtful
-                assert (result.reason in {found.text for found in height_map.findings}) is doubtful
+                known_reasons = [f.text for f in height_map.findings if f.text in result.reason]
+                assert bool(known_reasons) is doubtful
