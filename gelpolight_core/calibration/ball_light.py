@@ -59,7 +59,7 @@ def with_light_from_around(
     points = np.concatenate([view.points_mm, np.zeros((len(view.points_mm), 1))], axis=1)
     facets = points.reshape(*shape, 3)
     flat, returned = flat_light(
-        facets.reshape(*shape, 3),
+        facets,
         view.view,
         view.reflecting,
         leds_mm,

@@ -1,1 +1,1 @@
-"""Check whether an image is from this sensor and whether the sensor is unchanged."""
+"""What changed between the background of a calibration and a frame, and whether the rest fits."""

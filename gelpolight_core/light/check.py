@@ -45,7 +45,7 @@ from gelpolight_core.light.judging import (
     uneven_finding,
     with_shape,
 )
-from gelpolight_core.light.movement import FOLLOWED_PX, movement_px
+from gelpolight_core.light.movement import EXPLAINED_SHARE, FOLLOWED_PX, movement_px
 from gelpolight_core.light.pressed import is_pressed, press_effects
 from gelpolight_core.light.samples import (
     PARAMETERS,
@@ -68,7 +68,6 @@ BOUNDARY_CHANGE, LEAST_RIM = 0.02, 0.5
 """Alternatively, this share of the boundary must have at most this change of light: a contact
 covers the rest."""
 UNJUDGED = tuple(key for key in KEYS if key not in ("other_sensor", "colour_order", "dark"))
-SWAPPED_UNTOUCHED = 0.4
 DARK = 0.1
 """Share of the light at calibration below which an image is dark."""
 STRIPE_ROWS = 12
@@ -210,8 +209,8 @@ class HealthCheck:
             gain = LightGain(1.0 + common.gain, scatter_of_cells(samples, common))
         if uneven is not None and shaded is not None:
             changes.append(shaded)
-            follow = usual is not None or not shaded.meaningless
-            gain = with_shape(gain, common, uneven) if follow else None
+            known = usual is not None or not shaded.meaningless
+            gain = with_shape(gain, common, uneven) if known else None
         if moved is not None and moved.value > FOLLOWED_PX:
             # The pattern of the light has moved, too.
             changes, gain = [finding for finding in changes if finding.meaningless], None
@@ -236,8 +235,8 @@ class HealthCheck:
             None if specks else dirt_finding(samples, self._run_change, common, self._unmix),
             *pixels,
         ]
-        known = {"compressed": self.calibration.grain, "blurred": samples.blur_strength.size}
-        unknown = tuple(key for key, by in known.items() if not by)
+        shown_by = {"compressed": self.calibration.grain, "blurred": samples.blur_strength.size}
+        unknown = tuple(key for key, by in shown_by.items() if not by)
         return health_of(
             [f for f in found if f],
             unknown=unknown,
@@ -287,7 +286,7 @@ class HealthCheck:
             return health_of(off, untouched=share)
         for order in ORDERS:
             turned = self._common(np.ascontiguousarray(raw[..., order]), light[list(order)])
-            if turned.share > SWAPPED_UNTOUCHED:
+            if turned.share > EXPLAINED_SHARE:
                 return health_of([swapped_finding(order)], untouched=share)
         compressed = self._compressed(raw, light, np.zeros(self.samples.count.size, np.bool_))
         if compressed is not None:

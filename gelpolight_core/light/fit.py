@@ -21,15 +21,15 @@ Mask = NDArray[np.bool_]
 TOLERANCES = np.array([0.03, 0.01, 0.006, 0.006])
 """Largest deviation of a cell's light from the common change, for each round."""
 SIGMAS = 4.5
-STRONG = 0.012
-"""If a cell deviates by more, its neighbours are left out, too: the drape reaches them."""
 NEAR, FIRST = 0.012, 0.04
-"""Tested limits for the change of light of the untouched part."""
+"""Tested limits for the change of light of the untouched part. The neighbours of a cell that
+deviates by more than the first are left out, too: the drape reaches them."""
 LEAST_NEAR = 0.15
 """Least share of the field within these limits; otherwise the common change can have any size
 ..."""
 LEAST_START = 0.35
-"""... and this share of the field must follow it."""
+"""... and this share of the field must follow it. If a connected part of the first size looks as at
+calibration, the light has not changed, and the rest is pressed, for example by a shallow face."""
 PRECISION = np.array([0.5, 0.05, 0.5, 0.05, 0.5, 0.05, 4.0, 4.0, 8.0]) ** -2.0
 """Prior precision of the parameters."""
 PAIRS = 1500
@@ -39,9 +39,6 @@ ones."""
 ROUGHEST = 9.0
 """A cell has another texture if the variance of its samples is larger than usual by this factor."""
 LEAST_CELLS = 4
-LEAST_AS_BEFORE = 0.15
-"""If a connected share of the field of this size looks as at calibration, the light has not changed
-and the rest of the field is pressed, for example by a shallow face."""
 AS_BEFORE_OFF = 0.4
 """Its light can have changed by this share of the assumed change."""
 WITHOUT_OFFSETS = np.array([0, 2, 4, 6, 7, 8])
@@ -215,7 +212,7 @@ def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:
     around = np.abs(light[samples.beside].mean(axis=1)).max(axis=1)
     part = np.asarray(around < AS_BEFORE_OFF * size)
     _outer_part(samples.beside, part)
-    return part if part.mean() > LEAST_AS_BEFORE else None
+    return part if part.mean() > LEAST_NEAR else None
 
 
 def _gross(samples: Samples, change: Array, usable: Mask) -> Array:
@@ -334,7 +331,7 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             for k in range(3):
                 limit = tolerance + SIGMAS * widen / np.sqrt(normal[c, 2 * k, 2 * k])
                 kept[c] &= abs(left[c, k]) < limit
-                strong[c] |= abs(left[c, k]) > limit + max(STRONG, tolerance)
+                strong[c] |= abs(left[c, k]) > limit + max(NEAR, tolerance)
         for c in range(cells):
             if strong[c]:
                 kept[c] = False

@@ -28,7 +28,7 @@ LATTICES: tuple[Lattice, ...] = ((64, 8), (4, 2), (1, 1))
 FOLLOWED_PX = 1.5
 """Largest movement that the fit can follow."""
 EXPLAINED_SHARE = 0.4
-"""Share of the field that must look as at calibration after the shift."""
+"""Share of the field that must look as at calibration after a shift, or in another colour order."""
 
 
 def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float, float] | None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.light.judging import SIGMAS
 from gelpolight_core.lights.positions import (
     CONDITION_LIMIT,
     direction_condition,
@@ -46,8 +47,6 @@ at 0.7 8 %."""
 MOST_LOST = 0.02
 """Share of a depth that the nodes may take without a word: half of the height error from which on a
 calibration fails."""
-SURE = 3.0
-"""Standard deviations beyond which an error is not noise."""
 MOST_HIDDEN_MM = 0.1
 """Sensors of 320 x 240 pixels and 50 dB show 25 um; a depth of 0 from a worse one needs a note."""
 LEAST_USABLE = 0.02
@@ -239,7 +238,7 @@ def too_coarse_notes(
         Distance between the solved nodes.
     """
     depth_mm, lost_mm = top
-    if lost_mm <= max(MOST_LOST * depth_mm, SURE * noise_mm):
+    if lost_mm <= max(MOST_LOST * depth_mm, SIGMAS * noise_mm):
         return ()
     text = tr(
         "the deepest point is finer than nodes of {p:.2f} mm resolve: its depth may be {um:.0f} um "
