@@ -12,7 +12,7 @@ from app.live.overlay import Overlay
 from app.live.session import LiveSession
 from app.sources.source import Frame
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.session.movement import MOVING_SHARE, moving_share
+from gelpolight_core.image.in_time import Stillness
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class LiveDetection(QObject):
 
     def __init__(self, live: LiveSession) -> None:
         super().__init__(live)
-        self._live, self._movement = live, StillnessDetector()
+        self._live, self._movement = live, Stillness()
         live.switched.connect(self._movement.restart)
 
     def set_detector(self, detect: Callable[[Rgb], Detection] | None) -> None:
@@ -88,42 +88,3 @@ class LiveDetection(QObject):
     def forget_movement(self) -> None:
         """Reset the movement check: only movements from now on count."""
         self._movement.moved = False
-
-
-# After it is released, an object shakes for a few tenths of a second.
-STILL_S = 0.5
-# Measured in time, because the detection may run at 2 or at 30 frames per second; but one pair of
-# frames is never enough.
-STILL_FRAMES = 3
-
-
-class StillnessDetector:
-    """Compares consecutive frames and reports when nothing has moved for a while.
-
-    Attributes
-    ----------
-    moved : bool
-        Whether something has moved between two frames since this was set to False.
-    """
-
-    def __init__(self) -> None:
-        self.moved = False
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin again with another camera."""
-        self._before: Rgb | None = None
-        self._quiet, self._since_s = 0, 0.0
-
-    def update(self, rgb: Rgb, time_s: float) -> bool:
-        """Add a frame and its time; return whether all the last frames were alike."""
-        before, self._before = self._before, rgb
-        alike = before is not None and before.shape == rgb.shape and before.dtype == rgb.dtype
-        if before is not None and alike:
-            alike = moving_share(before, rgb) <= MOVING_SHARE
-            self.moved = self.moved or not alike
-        if not alike:
-            self._quiet, self._since_s = 0, time_s
-            return False
-        self._quiet += 1
-        return self._quiet >= STILL_FRAMES and time_s - self._since_s >= STILL_S

@@ -17,6 +17,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.image.in_time import SIGMAS
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 Map = NDArray[np.float32]
@@ -24,8 +26,6 @@ Map = NDArray[np.float32]
 FAR = 8
 """Distance of distant pixels: side of the blocks of a compressed image."""
 BLOCK = 2 * FAR
-SIGMAS = 4.0
-"""Exceeded by chance in one of 30,000 images."""
 
 
 @dataclass(frozen=True, slots=True)

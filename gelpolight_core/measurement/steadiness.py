@@ -9,23 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.session.movement import BLOCK_PX, MOVING_SHARE, changed_blocks, moving_share
+from gelpolight_core.image.in_time import (
+    BLOCK_PX,
+    CONTACT_CHANGE,
+    PRESSED_SHARE,
+    STILL_SHARE,
+    changed_blocks,
+    changed_share,
+)
 from gelpolight_core.translation import tr
 
 Frame = NDArray[Any]
-
-CONTACT_CHANGE = 0.06
-"""The walls of a press change the light by tens of percent, warming LEDs by one or two."""
-PRESSED_SHARE = 0.004
-"""A cylinder of 3 mm and 0.5 mm height changes a hundredth of an image 30 mm wide."""
-LIFTED_SHARE = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Contact:
     @property
     def lifted(self) -> bool:
         """Whether the membrane is bare again."""
-        return self.share < LIFTED_SHARE
+        return self.share < STILL_SHARE
 
 
 def find_contact(bare: Frame, now: Frame) -> Contact:
@@ -62,7 +62,7 @@ def find_contact(bare: Frame, now: Frame) -> Contact:
     bare, now : (rows, columns, 3) uint8 or uint16
         The bare membrane, and the frame, of one size and depth.
     """
-    changed = changed_blocks(bare, now, flicker=CONTACT_CHANGE)
+    changed = changed_blocks(bare, now, tolerance=CONTACT_CHANGE)
     rows, columns = np.nonzero(changed)
     if rows.size == 0:
         return Contact(0.0, (math.nan, math.nan))
@@ -104,10 +104,9 @@ def judge_press(
     if not contact.pressed:
         remedy = tr("Press the object in until its base touches")
         return _fault("not_pressed", tr("Nothing is pressed"), remedy=remedy)
-    # Also the first and the last frame: between consecutive frames, slow creep is not visible.
-    pairs = [*pairwise(frames), (frames[0], frames[-1])]
-    moving = max(moving_share(*pair) for pair in pairs)
-    if moving > MOVING_SHARE:
+    # From the first: between consecutive frames, slow creep is not visible.
+    moving = max(changed_share(frames[0], frame) for frame in frames[1:])
+    if moving > STILL_SHARE:
         percent = 100.0 * moving
         text = tr("It moved: {share:.1f} % of the image changed").format(share=percent)
         return _fault("moved", text, percent, "%", remedy=tr("Hold it still"))

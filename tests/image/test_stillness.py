@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.live.live_detection import MOVING_SHARE, StillnessDetector, moving_share
+from gelpolight_core.image.in_time import STILL_SHARE, Stillness, changed_share
 
 ROWS, COLUMNS = 240, 320
 DEPTHS = [np.uint8, np.uint16]
@@ -33,27 +33,37 @@ def shot(light: np.ndarray, seed: int, *, noise: float, dtype: type = np.uint8) 
 @given(st.sampled_from([0.002, 0.01, 0.04]), st.sampled_from(DEPTHS), st.integers(0, 1000))
 def test_noise_is_not_movement(noise: float, dtype: type, seed: int) -> None:
     frames = [shot(scene(), seed + i, noise=noise, dtype=dtype) for i in (0, 1)]
-    assert moving_share(*frames) <= MOVING_SHARE
+    assert changed_share(*frames) <= STILL_SHARE
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
 @pytest.mark.parametrize("noise", [0.002, 0.01])
 def test_a_dent_shifted_by_three_pixels_is_movement(noise: float, dtype: type) -> None:
     frames = [shot(scene(3.0 * i), i, noise=noise, dtype=dtype) for i in (0, 1)]
-    assert moving_share(*frames) > MOVING_SHARE
+    assert changed_share(*frames) > STILL_SHARE
 
 
 def test_one_percent_of_lamp_flicker_is_not_movement() -> None:
     frames = [shot(scene() * gain, i, noise=0.005) for i, gain in enumerate((1.0, 1.01))]
-    assert moving_share(*frames) <= MOVING_SHARE
+    assert changed_share(*frames) <= STILL_SHARE
 
 
-@pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 4), (10.0, 6), (30.0, 16)])
+@pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 3), (8.0, 6), (32.0, 18)])
 def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz: float, frames: int) -> None:
-    watch = StillnessDetector()
+    watch = Stillness()
     for position in (0.0, 20.0):  # the time starts again after a movement
         reported = [
             watch.update(shot(scene(position), i, noise=0.005), position + i / rate_hz)
             for i in range(frames)
         ]
         assert reported == [False] * (frames - 1) + [True]
+
+
+def test_a_movement_is_remembered_until_it_is_used() -> None:
+    watch = Stillness()
+    moved = []
+    for n in range(20):
+        watch.update(shot(scene(20.0 if n >= 10 else 0.0), n, noise=0.005), n / 8.0)
+        moved.append(watch.moved)
+        watch.moved = watch.moved and n < 14
+    assert moved == [False] * 10 + [True] * 5 + [False] * 5
