@@ -45,7 +45,7 @@ from gelpolight_core.light.judging import (
     uneven_finding,
     with_shape,
 )
-from gelpolight_core.light.movement import EXPLAINED_SHARE, FOLLOWED_PX, movement_px
+from gelpolight_core.light.movement import FOLLOWED_PX, movement_px
 from gelpolight_core.light.pressed import is_pressed, press_effects
 from gelpolight_core.light.samples import (
     PARAMETERS,
@@ -286,7 +286,7 @@ class HealthCheck:
             return health_of(off, untouched=share)
         for order in ORDERS:
             turned = self._common(np.ascontiguousarray(raw[..., order]), light[list(order)])
-            if turned.share > EXPLAINED_SHARE:
+            if turned.share > LEAST_START:
                 return health_of([swapped_finding(order)], untouched=share)
         compressed = self._compressed(raw, light, np.zeros(self.samples.count.size, np.bool_))
         if compressed is not None:

@@ -26,7 +26,6 @@ GENTLE = 1
 """The class in which single nodes are judged: on steeper ones the width of a pixel counts, too."""
 LEAST_NODES = 12
 """Nodes of a class; with fewer it says nothing."""
-ROBUST = 1.4826
 TOGETHER = 4.0
 """Neighbours along a row with one error, by resampling and denoising."""
 OFTEN = 0.8
@@ -129,7 +128,7 @@ def contact_light(
         if at.sum() < LEAST_NODES:
             continue
         middle = np.median(rest[at])
-        scatter = ROBUST * float(np.median(np.abs(rest[at] - middle)))
+        scatter = float(np.median(np.abs(rest[at] - middle))) / NormalDist().inv_cdf(0.75)
         at &= np.abs(rest - middle) <= SIGMAS * scatter
         share, number = float((whole[at] ** 2).mean()), np.count_nonzero(at)
         if share > 0.0:

@@ -38,7 +38,6 @@ CORRELATED = 1.6
 ones."""
 ROUGHEST = 9.0
 """A cell has another texture if the variance of its samples is larger than usual by this factor."""
-LEAST_CELLS = 4
 AS_BEFORE_OFF = 0.4
 """Its light can have changed by this share of the assumed change."""
 WITHOUT_OFFSETS = np.array([0, 2, 4, 6, 7, 8])
@@ -95,7 +94,7 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     if kept.mean() < LEAST_NEAR:
         kept = usable & (first < FIRST)
     small = kept.mean() >= LEAST_NEAR
-    if not small and usable.sum() >= LEAST_CELLS:
+    if not small and usable.any():
         values = _gross(samples, change, usable)
         left = np.empty((usable.size, 3))
         _remaining(samples.normal, change, values, left)
@@ -296,16 +295,15 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     cells, size = kept.size, PARAMETERS
     scatter, strong = np.empty(cells), np.empty(cells, np.bool_)
     for step in range(tolerances.size):
-        matrix, right, number = np.diag(precision), np.zeros(size), 0
+        if not kept.any():
+            break
+        matrix, right = np.diag(precision), np.zeros(size)
         for c in range(cells):
             if kept[c]:
-                number += 1
                 for i in range(size):
                     right[i] += change[c, i]
                     for j in range(size):
                         matrix[i, j] += normal[c, i, j]
-        if number < LEAST_CELLS:
-            break
         inverse = np.linalg.inv(matrix)
         values[:] = inverse @ right
         for c in range(cells):

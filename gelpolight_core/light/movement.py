@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.light.fit import CommonChange, common_change
+from gelpolight_core.light.fit import LEAST_START, common_change
 from gelpolight_core.light.samples import (
     PARAMETERS,
     SHIFT_U,
@@ -27,8 +27,6 @@ LATTICES: tuple[Lattice, ...] = ((64, 8), (4, 2), (1, 1))
 """Reach and step in px: within 4 px the membrane still looks like itself."""
 FOLLOWED_PX = 1.5
 """Largest movement that the fit can follow."""
-EXPLAINED_SHARE = 0.4
-"""Share of the field that must look as at calibration after a shift, or in another colour order."""
 
 
 def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float, float] | None:
@@ -69,11 +67,8 @@ def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float,
         u, v = min(((u + i, v + j) for i in steps for j in steps), key=lambda at: off(*at))
     off(u, v)
     found = common_change(samples, change, square, full)
-    return _whole_shift(u, v, found) if found.share > EXPLAINED_SHARE else None
-
-
-def _whole_shift(u: int, v: int, found: CommonChange) -> tuple[float, float]:
-    """Return a shift together with what the fit still finds."""
+    if found.share <= LEAST_START:
+        return None
     rest = found.values[[SHIFT_U, SHIFT_V]]
     if np.hypot(*rest) > FOLLOWED_PX:
         rest = np.zeros(2)

@@ -45,8 +45,6 @@ LEAST_NOISE = 0.4 / 255.0
 """Rounding to 8 bits alone is noise of 0.3 steps."""
 ROUGH = 0.02
 """Error of interpolation as a share of the change of light from pixel to pixel."""
-EFFECTS = 5
-"""Number of effects on a channel: gain, offset, shift along u and v, blur."""
 PARAMETERS = 9
 """Gain and offset of each channel; shift along u, along v; blur."""
 SHIFT_U, SHIFT_V, BLUR = 6, 7, 8
@@ -64,8 +62,9 @@ class Samples:
         How far it is from there, in rows and columns.
     expected : (N, 3) float32
         Linear light of the untouched membrane.
-    effects : (N, 3, EFFECTS) float32
-        Change of the light by each effect at strength 1, over the variance of the light.
+    effects : (N, 3, 5) float32
+        Change of the light by gain, offset, shift along u and v, and blur of strength 1, over its
+        variance.
     weight : (N, 3) float32
         1 over the variance.
     normal : (cells, PARAMETERS, PARAMETERS) float64
