@@ -16,7 +16,6 @@ from app.calibrate.setup_values import new_session
 from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext
-from app.context.source_button import SourceButton
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.question import ask
@@ -51,8 +50,6 @@ class CalibratePage(QWidget):
         self.form = SetupForm()
         for view in (self.start, self.question, self.form):
             self._stack.addWidget(view)
-        none = tr("No camera: import images")
-        self.form.offer_cameras(SourceButton(context=context, page="setup", none=none))
         self.form.accepted.connect(self._begin)
         self.setup_camera = SetupCamera(self.form, context=context)
         self.start.new.clicked.connect(self.begin)

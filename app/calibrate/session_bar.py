@@ -1,4 +1,4 @@
-"""The bar above the wizard: leave, undo, docks, and the source of the images."""
+"""The bar above the wizard: leave, undo, and docks."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QUndoView
 
 from app.calibrate.model import WizardModel
-from app.context.context import AppContext
-from app.context.source_button import SourceButton
 from app.widgets.actions import make_action
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
@@ -34,8 +32,6 @@ class SessionBar(QToolBar):
         The wizard; its actions work while it is visible.
     model : WizardModel
         Model of the wizard.
-    context : AppContext
-        Context with the sources.
     docks : tuple of QDockWidget
         Docks to show and hide.
     """
@@ -45,7 +41,6 @@ class SessionBar(QToolBar):
         window: QMainWindow,
         *,
         model: WizardModel,
-        context: AppContext,
         docks: tuple[QDockWidget, ...],
     ) -> None:
         super().__init__(tr("Session"), window)
@@ -74,9 +69,6 @@ class SessionBar(QToolBar):
             button = self.widgetForAction(action)
             named(button, f"{action.objectName()}.button", action.text())
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.addSeparator()
-        none = tr("No camera: import images")
-        self.addWidget(SourceButton(context=context, page="calibrate", none=none))
         session = model.project.session
         caption = PlainLabel(f"  {session.serial}  ·  {session.folder.name}  ")
         caption.setToolTip(plain_tip(str(session.folder)))

@@ -191,10 +191,6 @@ class SetupForm(QScrollArea):
         self.show_camera(tr("No camera is selected."), "", settable=False)
         return box
 
-    def offer_cameras(self, button: QWidget) -> None:
-        """Add the camera selection to the form, for pages without a bar that has one."""
-        self._camera_row.insertWidget(1, button)
-
     def show_camera(self, text: str, role: str, *, settable: bool) -> None:
         """Show how the camera is set; enable the settings button if it can be set."""
         self.camera.setText(text)

@@ -102,7 +102,7 @@ class Wizard(QMainWindow):
         for dock in docks:
             self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
             dock.hide()
-        bar = SessionBar(self, model=self.model, context=self.context, docks=docks)
+        bar = SessionBar(self, model=self.model, docks=docks)
         bar.leave.triggered.connect(self.left)
         self.addToolBar(bar)
 
@@ -184,6 +184,7 @@ class Wizard(QMainWindow):
         self.session_camera.refer()
         self.live.enter(True)
         self.outside.watch(True)
+        self._show_task()
         self._focus_on_what_comes_next()
 
     def leave(self) -> None:
@@ -191,6 +192,7 @@ class Wizard(QMainWindow):
         self.moving_on.stop()
         self.live.enter(False)
         self.outside.watch(False)
+        self.context.status.update(task="")
 
     def close_session(self) -> None:
         """Stop all work; all captures and decisions are on disk."""
@@ -229,7 +231,17 @@ class Wizard(QMainWindow):
         self.open.enter()
         self._compute_what_never_was()
         self.moving_on.enter(self.open)
+        self._show_task()
         self.refresh()
+
+    def _show_task(self) -> None:
+        """Show in the state bar which sensor is calibrated, and which step is open."""
+        if self.live.page_shown:
+            n, count = self.presenters.index(self.open) + 1, len(self.presenters)
+            self.context.status.update(
+                sensor=self.model.project.session.serial,
+                task=tr("Calibrating: {n} of {count}").format(n=n, count=count),
+            )
         _add(self.centre, self.open.centre)
         self.centre.setCurrentWidget(self.open.centre)
         self.side.setCurrentWidget(self.open.side)

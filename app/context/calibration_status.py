@@ -15,13 +15,16 @@ from gelpolight_core.translation import tr
 
 
 def show_in_use(context: AppContext) -> None:
-    """Show the calibration in use in the status bar, and warn on every page if it failed."""
+    """Show the calibration in use in the state bar, and warn on every page if it failed."""
     path = context.workspace.in_use
     if path is None:
-        context.status.update(calibration=None, calibration_note="", calibration_role="")
+        context.status.update(sensor="", calibration=None, calibration_note="", calibration_role="")
         return
     used = read_entry(path, in_use=True)
     note, role = used.state
+    if role == "pass" and used.validation is not None:
+        note = f"{note} {used.validation.largest_percent:.1f} %"
+    day = used.name if used.created is None else f"{used.created.astimezone():%Y-%m-%d}"
     advice = not_validated() if role == "warn" else ""
     if used.summary is not None and (fault := used.summary.fault):
         advice = tr(
@@ -29,7 +32,8 @@ def show_in_use(context: AppContext) -> None:
             "calibration on the Sensors page."
         ).format(fault=fault.text)
     context.status.update(
-        calibration=used.name,
+        sensor=used.serial,
+        calibration=tr("Calibration of {day}").format(day=day),
         calibration_note=note,
         calibration_role=role,
         calibration_advice=advice,

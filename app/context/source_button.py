@@ -13,6 +13,7 @@ from app.context.recordings_dialog import RecordingsDialog
 from app.services.file_dialogs import ask_folder, ask_open
 from app.sources.source import SourceInfo
 from app.widgets.label import plain_tip
+from app.widgets.meaning import show_ground
 from app.widgets.naming import named
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
@@ -25,38 +26,33 @@ class SourceButton(QToolButton):
     ----------
     context : AppContext
         Holds the source that all pages share.
-    page : str
-        First part of the object name.
-    none : str
-        Text of the choice without a camera.
     """
 
-    def __init__(
-        self, *, context: AppContext, page: str, none: str, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._context = context
-        named(self, f"{page}.source", tr("Camera"), tr("Source of the live image"))
+        named(self, "state.camera", tr("Camera"), tr("Source of the live image"))
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self)
-        menu.setObjectName(f"{page}.source.menu")
-        self._page, self._found = page, list[QAction]()
+        menu.setObjectName("state.camera.menu")
+        self._found = list[QAction]()
         self._cameras_end = menu.addSeparator()
         for name, text, choose in (
             ("virtual", tr("Virtual sensor"), context.source.choose_virtual_sensor),
             ("folder", tr("Folder of images…"), self.choose_folder),
             ("recording", tr("Recording…"), self.show_recordings),
-            ("none", none, lambda: context.source.choose(None)),
+            ("none", tr("No camera"), lambda: context.source.choose(None)),
         ):
             action = menu.addAction(text, choose)
-            action.setObjectName(f"{page}.source.{name}")
+            action.setObjectName(f"state.camera.{name}")
         menu.addSeparator()
         self._settings = menu.addAction(tr("Camera settings…"), self.show_settings)
-        self._settings.setObjectName(f"{page}.source.settings")
+        self._settings.setObjectName("state.camera.settings")
         menu.aboutToShow.connect(self.list_cameras)
         self.setMenu(menu)
         context.source.changed.connect(self._show)
+        context.status.changed.connect(self._show)
         self._show()
 
     def list_cameras(self) -> None:
@@ -70,7 +66,7 @@ class SourceButton(QToolButton):
             QAction(tr("No camera connected"), menu)
         ]
         for number, action in enumerate(self._found):
-            action.setObjectName(f"{self._page}.source.camera.{number}")
+            action.setObjectName(f"state.camera.{number}")
             action.setEnabled(bool(infos))
             if infos:
                 info = infos[number]
@@ -121,9 +117,10 @@ class SourceButton(QToolButton):
         self._context.source.choose_recording(file)
 
     def _show(self) -> None:
-        info = self._context.source.info
-        name = tr("none") if info is None else info.name
-        self.setText(tr("Camera: {name}").format(name=name))
+        info, status = self._context.source.info, self._context.status.value
+        parts = (tr("No camera") if info is None else info.name, status.camera_note)
+        self.setText(", ".join(filter(None, parts)))
+        show_ground(self, "warn" if status.camera_note else "")
         self._settings.setEnabled(info is not None and info.kind == "camera")
 
 

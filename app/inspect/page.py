@@ -22,7 +22,6 @@ from app.inspect.stream import DepthStream
 from app.inspect.views import Views
 from app.live.advice import advise
 from app.live.banner import Banner
-from app.live.calibration_choice import CalibrationBox
 from app.live.depth import LiveDepth
 from app.live.frame_results import Shown
 from app.live.replay_bar import ReplayBar
@@ -54,9 +53,8 @@ class InspectPage(QWidget):
         self.context = context
         self.jobs = Jobs("inspect", self)
         self.views = Views(self.jobs, context=context)
-        self.box = CalibrationBox()
         self.live = LiveSession(context=context, name="inspect", parent=self)
-        self.depth = LiveDepth(self.live, self.jobs, self.box, context=context)
+        self.depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.zero = ZeroControl(self.live, self.jobs, context=context)
         self.modes = ModeChoice(self.jobs, self, context=context)
         idle = tr(
@@ -109,7 +107,6 @@ class InspectPage(QWidget):
         self.views.bar.widgetForAction(self.recorder.action).setToolButtonStyle(
             Qt.ToolButtonStyle.ToolButtonTextBesideIcon
         )
-        self.views.add_to_bar(self.box)
         self.views.add_to_bar(self.modes.box)
         self.replay = ReplayBar()
         self.processed = ProcessedLine()

@@ -62,7 +62,7 @@ class SectionPanel(QWidget):
         scroll = scroll_area(self._figures)
         side = vbox(self.choice, self.form, save, (scroll, 1), margins=0, spacing=2)
         for widget in (self.choice, self.form, save, scroll):
-            widget.setFixedWidth(170)
+            widget.setFixedWidth(164)
         hbox((self._plot, 1), side, of=self, margins=(2, 2, 2, 4), spacing=2)
 
     def _make_plot(self) -> None:

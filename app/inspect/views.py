@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
-from app.context.source_button import SourceButton
 from app.inspect.processing_panel import DisplayPanel, ProcessingPanel
 from app.inspect.quality_panel import NormalsPanel, QualityPanel
 from app.inspect.section_line import REGION_INK, LevelPoints, RegionBox, SectionLines
@@ -97,7 +96,6 @@ class Views(QMainWindow):
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setMenu(self._menu)
         bar.addSeparator()
-        bar.addWidget(SourceButton(context=self._context, page="inspect", none=tr("No camera")))
         bar.addWidget(button)
         self.addToolBar(bar)
         return bar
@@ -155,7 +153,7 @@ class Views(QMainWindow):
         docks["look"].raise_()
         self.resizeDocks(
             [docks["surface"], docks["height"], docks["look"]],
-            [560, 400, 260],
+            [660, 340, 240],
             Qt.Orientation.Horizontal,
         )
         self.resizeDocks([docks["surface"], docks["section"]], [460, 200], Qt.Orientation.Vertical)

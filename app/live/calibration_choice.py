@@ -7,16 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QComboBox
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
 
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.live.advice import Known
 from app.services.jobs import Job, Jobs
-from app.widgets.inputs import ComboBox
-from app.widgets.label import plain_tip
-from app.widgets.naming import named
 from app.workspace.entries import Entry
 from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.translation import tr
@@ -28,37 +25,6 @@ if TYPE_CHECKING:
 WARM_FROM = 0.2
 
 
-class CalibrationBox(ComboBox):
-    """The calibrations of the library. Selecting one puts it into use.
-
-    Parameters
-    ----------
-    page : str, optional
-        First part of the object name.
-    """
-
-    def __init__(self, *, page: str = "inspect") -> None:
-        super().__init__()
-        named(self, f"{page}.calibration", tr("Calibration in use"))
-        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.setMinimumContentsLength(22)
-
-    def show_entries(self, entries: tuple[Entry, ...]) -> None:
-        """Show the calibrations that can be read."""
-        with QSignalBlocker(self):
-            self.clear()
-            self.addItem(tr("No calibration"), None)
-            for entry in entries:
-                if entry.summary is not None:
-                    size = "x".join(map(str, entry.summary.image_size))
-                    self.addItem(entry.name, str(entry.path))
-                    tip = plain_tip(f"{entry.serial}, {entry.summary.identity}, {size}")
-                    self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
-                    if entry.in_use:
-                        self.setCurrentIndex(self.count() - 1)
-        self.view().setMinimumWidth(max(self.view().sizeHintForColumn(0), self.width()))
-
-
 class CalibrationChoice(QObject):
     """Reads the calibration in use in the background.
 
@@ -66,8 +32,8 @@ class CalibrationChoice(QObject):
     ----------
     jobs : Jobs
         Runs the reading.
-    box : CalibrationBox
-        Shows the library.
+    owner : QWidget
+        The page.
     context : AppContext
         Holds the workspace.
 
@@ -80,21 +46,24 @@ class CalibrationChoice(QObject):
 
     loaded = Signal(object, object)
 
-    def __init__(self, jobs: Jobs, box: CalibrationBox, *, context: AppContext) -> None:
-        super().__init__(box)
-        self._jobs, self._box, self._context = jobs, box, context
+    def __init__(self, jobs: Jobs, owner: QWidget, *, context: AppContext) -> None:
+        super().__init__(owner)
+        self._jobs, self._owner, self._context = jobs, owner, context
         self._state: tuple[object, ...] = ()
         self._reading: Job | None = None
         self.entries: tuple[Entry, ...] = ()
-        box.activated.connect(self._on_chosen)
-        context.requests.calibrations_changed.connect(self.refresh)
+        context.requests.calibrations_changed.connect(self._on_changed)
+
+    def _on_changed(self) -> None:
+        if self._reading is not None and self._reading.over:  # stopped or failed
+            self._state = ()
+        self.refresh()
 
     def refresh(self) -> None:
         """Update from the library, and read the calibration in use if it changed."""
         self.entries = ()
         with self._context.toasts.errors():
             self.entries = self._context.workspace.entries()
-        self._box.show_entries(self.entries)
         used = next((e for e in self.entries if e.in_use and e.summary is not None), None)
         state = () if used is None or used.summary is None else (used.path, used.summary.identity)
         if state == self._state:
@@ -110,11 +79,6 @@ class CalibrationChoice(QObject):
         """Whether the calibration in use is being read. False after an error."""
         return self._reading is not None and not self._reading.over
 
-    @property
-    def _reading_failed(self) -> bool:
-        """Whether the last reading was stopped or failed. A successful one is released."""
-        return self._reading is not None and self._reading.over
-
     def refer_cameras(self, live: Reconstructor | None) -> None:
         """Require the camera settings that a calibration was made with."""
         texts = {} if live is None else live.calibration.provenance.camera_settings
@@ -127,7 +91,7 @@ class CalibrationChoice(QObject):
         """
         fitting = [e for e, known in self.candidates() if known.fits(serial, size)]
         for entry in sorted(fitting, key=lambda entry: not entry.validated)[:1]:
-            self._use(entry.path)
+            put_into_use(entry.path, self._owner, context=self._context)
 
     def candidates(self) -> list[tuple[Entry, Known]]:
         """Return the calibrations that did not fail and are not those of another camera."""
@@ -139,16 +103,6 @@ class CalibrationChoice(QObject):
             and not entry.failed
             and not is_other(entry.summary.camera, info)
         ]
-
-    def _on_chosen(self, index: int) -> None:
-        path = self._box.itemData(index)
-        self._use(None if path is None else Path(path))
-
-    def _use(self, path: Path | None) -> None:
-        if self._reading_failed:
-            self._state = ()  # a repeated request reads it again
-        put_into_use(path, self._box, context=self._context)
-        self._box.show_entries(self.entries)  # until a question is answered, the one before
 
     def _read(self, path: Path) -> None:
         def work(progress: Callable[[float], None]) -> object:

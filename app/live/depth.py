@@ -6,10 +6,11 @@ import time
 from collections import Counter, deque
 
 from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.live.advice import Known, LiveState, Size
-from app.live.calibration_choice import CalibrationBox, CalibrationChoice
+from app.live.calibration_choice import CalibrationChoice
 from app.live.first_calibration import begin_first_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
 from app.live.session import LiveSession
@@ -38,8 +39,8 @@ class LiveDepth(QObject):
         The images, and the owner of this object.
     jobs : Jobs
         Runs slow work.
-    box : CalibrationBox
-        Shows the calibrations.
+    owner : QWidget
+        The page.
     context : AppContext
         Shared by all pages.
 
@@ -71,11 +72,11 @@ class LiveDepth(QObject):
     changed = Signal()
 
     def __init__(
-        self, live: LiveSession, jobs: Jobs, box: CalibrationBox, *, context: AppContext
+        self, live: LiveSession, jobs: Jobs, owner: QWidget, *, context: AppContext
     ) -> None:
         super().__init__(live)
         self.live, self._jobs, self._context = live, jobs, context
-        self.calibrations = CalibrationChoice(jobs, box, context=context)
+        self.calibrations = CalibrationChoice(jobs, owner, context=context)
         self.last: Shown | None = None
         self._maker = Maker(None)
         self._chosen: tuple[Reconstructor | None, Reconstructor | None] = None, None

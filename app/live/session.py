@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -17,23 +16,6 @@ from app.sources.recording import RecordingSource
 from app.sources.source import Frame
 from app.sources.stream import Stream
 from gelpolight_core.translation import tr
-
-# Shorter times mean that only the camera image is shown.
-LEAST_MS = 0.5
-
-
-class _Inbox:
-    """The mailbox of the processing thread. It counts the frames that were skipped."""
-
-    def __init__(self) -> None:
-        self.box: Mailbox[Frame] = Mailbox()
-        self._lock = threading.Lock()
-        self.skipped = 0
-
-    def put(self, frame: Frame) -> None:
-        if self.box.put(frame):
-            with self._lock:
-                self.skipped += 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +73,11 @@ class LiveSession(QObject):
         self._paused = self._resting = False
         self._lost = ""
         self._capture: _Capture | None = None
-        self._inbox = _Inbox()
+        self._inbox: Mailbox[Frame] = Mailbox()
         self._outbox: Mailbox[Outcome[Any] | Failure] = Mailbox()
         self._function: Callable[[Frame], Any] = lambda _frame: None
         self._processor: Processor[Any] = Processor(
-            self._inbox.box, self._function, self._outbox, name=name
+            self._inbox, self._function, self._outbox, name=name
         )
         self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=8)
         self._tick.timeout.connect(self._poll)
@@ -124,7 +106,6 @@ class LiveSession(QObject):
         self._close()
         info = self._context.source.info
         if info is not None and self._page_shown and self._wanted:
-            self._inbox.skipped = 0
             self.stream = Stream(info.open())
             if not self._paused:
                 self.stream.add_tap(self._inbox.put)
@@ -158,12 +139,9 @@ class LiveSession(QObject):
             self.stream = None
             # Only the session that had the source open may change the status.
             self._context.status.update(
-                camera=self._context.source.idle_name,
-                rate_hz=None,
-                dropped=None,
-                processing_ms=None,
+                camera=self._context.source.idle_name, rate_hz=None, lost=None
             )
-        self._inbox.box.take()
+        self._inbox.take()
         self._outbox.take()
         self._set_lost("")
         if capture is not None:
@@ -182,11 +160,6 @@ class LiveSession(QObject):
     def paused(self) -> bool:
         """Whether new frames are ignored."""
         return self._paused
-
-    @property
-    def processing_ms(self) -> float:
-        """Typical time of the function in ms."""
-        return self._processor.median_ms
 
     @property
     def source(self) -> object:
@@ -214,7 +187,7 @@ class LiveSession(QObject):
         """Process a frame again while the images are paused, and drop results in progress."""
         if self._paused:
             self._processor.replace(self._function)
-            self._inbox.box.put(frame)
+            self._inbox.put(frame)
 
     def pause(self, on: bool) -> None:
         """Ignore new frames, or continue."""
@@ -223,7 +196,7 @@ class LiveSession(QObject):
         self._paused = on
         if self.stream is not None:
             (self.stream.remove_tap if on else self.stream.add_tap)(self._inbox.put)
-        self._inbox.box.take()
+        self._inbox.take()
 
     def rest(self, on: bool) -> None:
         """Stop processing while another thread uses what the function needs."""
@@ -290,8 +263,7 @@ class LiveSession(QObject):
         figures = self.stream.figures()
         self._context.status.update(
             rate_hz=figures.rate_hz,
-            dropped=figures.dropped + self._inbox.skipped,
-            processing_ms=self.processing_ms if self.processing_ms >= LEAST_MS else None,
+            lost=figures.dropped,
         )
         self._set_lost(figures.lost or "")
 

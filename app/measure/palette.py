@@ -32,7 +32,7 @@ class Palette(QWidget):
         super().__init__()
         named(self, "measure.palette", tr("Measuring tools"))
         self.buttons: dict[str, QToolButton] = {}
-        column = vbox(of=self, margins=(4, 6, 4, 6), spacing=3)
+        column = vbox(of=self, margins=(4, 4, 4, 4), spacing=0)
         for number, (_, group) in enumerate(groupby(kinds(), key=lambda kind: kind.group)):
             column.addSpacing(8 if number else 0)
             for kind in group:

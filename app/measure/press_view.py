@@ -98,7 +98,6 @@ class PressView(PressViewFrame):
         """Show the source through the calibration in use."""
         self._want()
         self.depth.enter()
-        self.show_validated()
         self._refresh()
 
     def leave(self) -> None:
@@ -305,7 +304,6 @@ class PressView(PressViewFrame):
         self.details.use(None if best is None else best.calibration)
         self.work.use(best)
         self._say_what_comes()
-        self.show_validated()
         self.depth.choose(live, best)
         self._refresh()
 

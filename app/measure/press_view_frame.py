@@ -17,9 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
-from app.context.source_button import SourceButton
 from app.live.banner import Banner
-from app.live.calibration_choice import CalibrationBox
 from app.live.depth import LiveDepth
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
@@ -29,9 +27,7 @@ from app.measure.tool_map import ToolMap
 from app.measure.work import Work
 from app.services.jobs import Jobs
 from app.widgets.actions import make_action
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.io.user import user_name
 from gelpolight_core.translation import tr
@@ -66,9 +62,8 @@ class PressViewFrame(QMainWindow):
         self.setWindowFlags(Qt.WindowType.Widget)
         self.context = context
         self.work = Work(self)
-        self.box = CalibrationBox(page="measure")
         self.live = LiveSession(context=context, name="measure live", parent=self)
-        self.depth = LiveDepth(self.live, jobs, self.box, context=context)
+        self.depth = LiveDepth(self.live, jobs, self, context=context)
         idle = tr("Place a tool, or detect the object. Press Space to return to the camera.")
         self.banner = Banner(jobs, idle=idle)
         self.map = ToolMap(self.work)
@@ -76,9 +71,6 @@ class PressViewFrame(QMainWindow):
         self.replay = ReplayBar("measure")
         self.panel = SidePanel()
         self.panel.operator.setText(user_name())
-        self.validated = named(
-            PlainLabel(), "measure.validated", tr("Validation state of the calibration")
-        )
         self.auto = named(
             QCheckBox(tr("Freeze when steady"), checked=True),
             "measure.auto",
@@ -129,11 +121,9 @@ class PressViewFrame(QMainWindow):
         for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
             action.setEnabled(False)
             can.connect(action.setEnabled)
-        self.source = SourceButton(context=self.context, page="measure", none=tr("No camera"))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         groups = (
-            (self.source, open_action),
-            (self.box, self.validated),
+            (open_action,),
             (self.freeze_action, self.auto),
             (undo, redo),
             (self._views_button(),),
@@ -190,13 +180,6 @@ class PressViewFrame(QMainWindow):
     def _toggle_details(self, part: QWidget) -> None:
         there = self.details.isVisible() and self.details.currentWidget() is part
         self.details.open_at(part, not there)
-
-    def show_validated(self) -> None:
-        """Show whether the calibration in use was validated on an object of known size."""
-        entry = next((e for e in self.depth.calibrations.entries if e.in_use), None)
-        text, role = ("", "muted") if entry is None else entry.state
-        self.validated.setText(f"  {text}  ")
-        show_meaning(self.validated, role)
 
     def follow_bench(self) -> None:
         """Show the bench next to the map if the virtual sensor is the camera."""

@@ -12,14 +12,13 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from app.context.context import AppContext
-from app.context.source_button import SourceButton
 from app.measure.protocol_press import PressingView
 from app.measure.protocol_result import ResultView
 from app.measure.protocol_setup import ProtocolSetup
 from app.measure.protocol_work import Equipped, ProtocolWork, equip
 from app.services.jobs import Job, Jobs
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
@@ -61,12 +60,10 @@ class ProtocolView(QWidget):
         self._jobs = Jobs("protocol set-up", self)
         self._jobs.refused.connect(self._on_refused)
         self.heading = named(PlainLabel(), "protocol.heading", tr("Current run"))
-        source = SourceButton(context=context, page="protocol", none=tr("No camera"))
         self.setup = ProtocolSetup(on_begin=self.begin, on_run=self.open_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self.setup)
-        bar = hbox((self.heading, 1), source, margins=(12, 6, 12, 6))
-        vbox(bar, (self._stack, 1), of=self, margins=0, spacing=0)
+        vbox(self.heading, (self._stack, 1), of=self, margins=0, spacing=0)
         context.requests.calibrations_changed.connect(self._refresh)
 
     # Called by the parent page

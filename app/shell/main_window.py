@@ -1,4 +1,4 @@
-"""The main window: navigation on the left, pages, status bar."""
+"""The main window: state on top, navigation on the left, pages."""
 
 from __future__ import annotations
 
@@ -33,7 +33,6 @@ from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import PageEntry, all_pages
 from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
-from app.services.status import FailedLine, StatusLine
 from app.shell.about import AboutDialog
 from app.shell.documentation import find_documentation
 from app.shell.loader import Loader, LoadingView
@@ -43,6 +42,7 @@ from app.shell.menus import Menus
 from app.shell.notifications import NotificationsButton
 from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet
+from app.shell.state_bar import FailedLine, StateBar
 from app.theme import theme
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
@@ -65,7 +65,7 @@ FIRST_SIZE = QSize(1280, 800)
 # Every control of every page can be reached from this size on.
 SMALLEST = QSize(1024, 700)
 # Raised when toolbars change, so that an old saved layout is not applied to a newer window.
-LAYOUT_VERSION = 1
+LAYOUT_VERSION = 2
 # Delay from a page change to the release of unused memory, and the interval from then on.
 TIDY_MS, TIDY_AGAIN_MS = 3_000, 60_000
 
@@ -101,11 +101,11 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(centre)
         self._loading = LoadingView()
         self._stack.addWidget(self._loading)
+        notifications = NotificationsButton(context.toasts, self.show_log, self)
+        self.state_bar = StateBar(notifications, context=context)
+        self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.state_bar)
         self.page_actions = self._build_navigation()
         self.menus = Menus(self)
-        self.setStatusBar(StatusLine(context.status))
-        self._notifications = NotificationsButton(context.toasts, self.show_log, self)
-        self.statusBar().addPermanentWidget(self._notifications)
         context.toasts.attach(self, self.show_log, over=self._stack)
         requests = context.requests
         requests.page.connect(self.show_page)
@@ -127,7 +127,7 @@ class MainWindow(QMainWindow):
     def _build_navigation(self) -> dict[str, QAction]:
         bar = named(QToolBar(tr("Navigation"), self, movable=False), "navigation", tr("Navigation"))
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        bar.setIconSize(QSize(28, 28))
+        bar.setIconSize(QSize(24, 24))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
         group = QActionGroup(self)
         actions = {}
@@ -156,7 +156,7 @@ class MainWindow(QMainWindow):
             room = self.screen().availableSize()
             self.resize(FIRST_SIZE.boundedTo(room * 0.9))
             if self.size() != FIRST_SIZE:
-                # The frame would extend beyond the edge of the screen and hide the status bar.
+                # The frame would extend beyond the edge of the screen and hide its last line.
                 self.setWindowState(Qt.WindowState.WindowMaximized)
         self.restoreState(state, LAYOUT_VERSION)
 

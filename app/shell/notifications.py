@@ -1,4 +1,4 @@
-"""The messages of this run: a button in the status bar that counts the new ones, and their list."""
+"""The messages of this run: a button in the state bar that counts the new ones, and their list."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ class NotificationsButton(QToolButton):
         named(self, "main.notifications", tr("Notifications"), tr("Messages of this run"))
         self.setAutoRaise(True)
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.setIconSize(QSize(18, 18))
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._toasts, self._show_log = toasts, show_log
         self._new: list[Finding] = []
@@ -44,13 +45,13 @@ class NotificationsButton(QToolButton):
         self._show()
 
     def show_list(self) -> NotificationList:
-        """Show the list of messages above the button. All of them count as read."""
+        """Show the list of messages below the button. All of them count as read."""
         self._new.clear()
         self._show()
         panel = NotificationList(self._toasts, self._show_log, self)
         panel.resize(QSize(480, 360).boundedTo(self.window().size()))
-        corner = self.mapToGlobal(QPoint(self.width(), 0))
-        panel.move(corner - QPoint(panel.width(), panel.height() + 4))
+        corner = self.mapToGlobal(QPoint(self.width(), self.height() + 4))
+        panel.move(corner - QPoint(panel.width(), 0))
         panel.show()
         panel.list.setFocus()
         return panel

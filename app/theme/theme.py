@@ -12,61 +12,122 @@ from PySide6.QtGui import QColor, QGuiApplication, QPalette
 from PySide6.QtWidgets import QApplication
 
 ICONS = Path(__file__).resolve().parents[2] / "resources" / "icons"
-CHECK = ICONS / "check.svg"
-# In a grey that can be seen on light and on dark.
-MORE = ICONS / "more-bar.svg"
+# Signs that a style sheet draws, in a grey that can be seen on light and on dark.
+SIGNS = ("check", "more-bar", "arrow-down", "arrow-up")
+TEXT_PT = 9.75  # 13 px at 96 dots per inch
 
 # name: (light, dark). Every text colour has at least 4.5:1 on window, base and alternate base.
 COLOURS = {
-    "window": ("#f3f4f6", "#212429"),
-    "base": ("#ffffff", "#191b1f"),
-    "alternate": ("#eceef1", "#23262b"),
-    "button": ("#e6e8ec", "#30353b"),
+    "window": ("#f5f6f8", "#1b1e24"),
+    "base": ("#ffffff", "#15171c"),
+    "alternate": ("#eceef2", "#1f232a"),
+    "button": ("#e6e9ee", "#262b33"),
+    "hover": ("#d9dee5", "#313740"),
     "text": ("#1b2026", "#e7e9ec"),
-    "muted": ("#565f69", "#a6aeb8"),
+    "muted": ("#565f69", "#9da5af"),
     "disabled": ("#868e97", "#767e87"),
-    "line": ("#c9ced4", "#3d434b"),
-    "light": ("#ffffff", "#3d434b"),
-    "highlight": ("#0b5cad", "#1f62a8"),
+    "line": ("#d5dae0", "#2d323b"),
+    "light": ("#ffffff", "#2d323b"),
+    "highlight": ("#1a63c5", "#2a6fd0"),
     "highlighted": ("#ffffff", "#ffffff"),
-    "accent": ("#0b5cad", "#74b5f7"),
-    "pass": ("#17652f", "#74d18f"),
+    "accent": ("#1259b8", "#78b4f8"),
+    "pass": ("#17652f", "#5fce84"),
     "warn": ("#7f4d00", "#f2b75f"),
     "fail": ("#ad1f18", "#ff938a"),
     "stale": ("#5f4596", "#bfa9e8"),
-    "tip": ("#fffbe8", "#33383f"),
+    "tip": ("#fffbe8", "#2d323b"),
+    "pass ground": ("#dff3e5", "#14301d"),
+    "warn ground": ("#fcefd8", "#392a10"),
+    "fail ground": ("#fbe1df", "#43191a"),
 }
 
 # Colours that mark the meaning of a text.
 MEANINGS = ("pass", "warn", "fail", "stale", "accent", "muted")
+GROUNDS = ("pass", "warn", "fail")
 
 STYLE = """
-QToolTip {{ color: {text}; background: {tip}; border: 1px solid {line}; padding: 3px; }}
-QStatusBar {{ border-top: 1px solid {line}; }}
-QStatusBar::item {{ border: none; }}
-QStatusBar QLabel {{ padding: 1px 8px; }}
-QToolBar#navigation {{ background: {alternate}; border: none; border-right: 1px solid {line};
-    padding: 6px; spacing: 4px; }}
-QToolBar#navigation QToolButton {{ border: 2px solid transparent; border-radius: 6px;
-    padding: 8px 4px; min-width: 76px; background: transparent; }}
+QToolTip {{ color: {text}; background: {tip}; border: 1px solid {line}; padding: 4px; }}
+QMenuBar {{ background: {window}; }}
+QToolBar {{ background: {window}; border: none; padding: 4px 8px; spacing: 8px; }}
+QToolBar#state {{ border-bottom: 1px solid {line}; padding: 7px 16px; }}
+QToolBar#state QToolButton, QLabel#chip {{ background: {button}; border: 1px solid transparent;
+    border-radius: 14px; padding: 5px 12px; }}
+QToolBar#state QToolButton:hover {{ background: {hover}; }}
+QToolBar#state QToolButton:focus {{ border-color: {accent}; }}
+QToolBar#state QToolButton[popupMode="2"] {{ padding-right: 24px; }}
+QToolBar#navigation {{ background: {window}; border: none; border-right: 1px solid {line};
+    padding: 8px; spacing: 4px; }}
+QToolBar#navigation QToolButton {{ border: 1px solid transparent; border-radius: 8px;
+    padding: 8px 2px; min-width: 70px; background: transparent; color: {muted}; }}
 QToolBar#navigation QToolButton:hover {{ background: {button}; }}
-QToolBar#navigation QToolButton:checked {{ background: {base}; border-color: {line};
+QToolBar#navigation QToolButton:checked {{ background: {hover}; color: {text};
     font-weight: 600; }}
 QToolBar#navigation QToolButton:focus {{ border-color: {accent}; }}
-QToolButton {{ border: 1px solid {line}; border-radius: 4px; padding: 4px 5px;
+QPushButton {{ border: 1px solid transparent; border-radius: 6px; padding: 6px 10px;
+    background: {button}; color: {text}; }}
+QPushButton:hover {{ background: {hover}; }}
+QPushButton:pressed, QPushButton:checked {{ background: {line}; }}
+QPushButton:focus {{ border-color: {accent}; }}
+QPushButton:default, QPushButton[primary="true"] {{ background: {highlight};
+    color: {highlighted}; font-weight: 600; }}
+QPushButton:default:focus, QPushButton[primary="true"]:focus {{ border-color: {text}; }}
+QPushButton:disabled {{ background: {alternate}; color: {disabled}; }}
+QToolButton {{ border: 1px solid transparent; border-radius: 6px; padding: 4px 6px;
     background: {button}; }}
-QToolBar QToolButton, QToolButton[autoRaise="true"] {{ background: transparent;
-    border-color: transparent; }}
-QToolButton:hover {{ background: {alternate}; border-color: {line}; }}
-QToolButton:pressed, QToolButton:checked {{ background: {line}; }}
+QToolBar QToolButton, QToolButton[autoRaise="true"] {{ background: transparent; }}
+QToolButton:hover {{ background: {hover}; }}
+QToolButton:pressed {{ background: {line}; }}
+QToolButton:checked {{ background: {highlight}; color: {highlighted}; }}
 QToolButton:disabled {{ color: {disabled}; }}
-QToolButton#qt_toolbar_ext_button {{ padding: 0; border: 1px solid {line};
-    background: {button}; qproperty-icon: url("{more}"); }}
-QToolButton:focus {{ border: 2px solid {accent}; padding: 3px 4px; }}
-QToolButton[popupMode="2"] {{ padding-right: 18px; }}
-QToolButton[popupMode="2"]:focus {{ padding-right: 17px; }}
-QToolButton::menu-indicator {{ subcontrol-origin: padding; subcontrol-position: center right;
-    right: 4px; }}
+QToolButton#qt_toolbar_ext_button {{ padding: 0; background: {button};
+    qproperty-icon: url("{more-bar}"); }}
+QToolButton:focus {{ border-color: {accent}; }}
+QToolButton[popupMode="2"] {{ padding-right: 22px; }}
+QToolButton::menu-indicator {{ image: url("{arrow-down}"); width: 10px; height: 10px;
+    subcontrol-origin: padding; subcontrol-position: center right; right: 8px; }}
+QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {base}; color: {text};
+    border: 1px solid {line}; border-radius: 6px; padding: 3px 4px;
+    selection-background-color: {highlight}; selection-color: {highlighted}; }}
+QLineEdit:focus, QAbstractSpinBox:focus, QComboBox:focus, QPlainTextEdit:focus {{
+    border-color: {accent}; }}
+QLineEdit:disabled, QAbstractSpinBox:disabled, QComboBox:disabled {{ background: {window};
+    color: {disabled}; }}
+QAbstractSpinBox {{ padding-right: 18px; }}
+QAbstractSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
+QAbstractSpinBox::up-button, QAbstractSpinBox::down-button {{ border: none; width: 18px;
+    background: transparent; }}
+QAbstractSpinBox::up-arrow {{ image: url("{arrow-up}"); width: 9px; height: 9px; }}
+QAbstractSpinBox::down-arrow {{ image: url("{arrow-down}"); width: 9px; height: 9px; }}
+QComboBox::drop-down {{ border: none; width: 22px; }}
+QComboBox::down-arrow {{ image: url("{arrow-down}"); width: 10px; height: 10px; }}
+QComboBox QAbstractItemView {{ background: {base}; border: 1px solid {line};
+    selection-background-color: {highlight}; selection-color: {highlighted}; }}
+QGroupBox {{ border: none; margin-top: 22px; padding: 0; }}
+QGroupBox::title {{ subcontrol-origin: margin; subcontrol-position: top left; color: {muted}; }}
+QFrame#card {{ background: {alternate}; border: 1px solid {line}; border-radius: 8px; }}
+QTabWidget::pane {{ border: none; }}
+QTabBar::tab {{ background: transparent; border: none; color: {muted}; padding: 8px 14px;
+    border-bottom: 2px solid transparent; }}
+QTabBar::tab:selected {{ color: {text}; border-bottom-color: {highlight}; }}
+QTabBar::tab:hover {{ color: {text}; }}
+QTabBar::tab:focus {{ border-bottom-color: {accent}; }}
+QAbstractItemView {{ background: {base}; border: 1px solid {line}; border-radius: 6px;
+    gridline-color: {line}; }}
+QHeaderView::section {{ background: {window}; color: {muted}; border: none;
+    border-bottom: 1px solid {line}; padding: 6px 8px; }}
+QSplitter::handle {{ background: {line}; }}
+QSplitter::handle:horizontal {{ width: 1px; margin: 0 2px; }}
+QSplitter::handle:vertical {{ height: 1px; margin: 2px 0; }}
+QScrollBar {{ background: transparent; border: none; }}
+QScrollBar:vertical {{ width: 10px; }}
+QScrollBar:horizontal {{ height: 10px; }}
+QScrollBar::handle {{ background: {hover}; border-radius: 4px; min-height: 24px; min-width: 24px;
+    margin: 1px; }}
+QScrollBar::handle:hover {{ background: {muted}; }}
+QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
+QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
+QProgressBar {{ background: {button}; border: none; border-radius: 4px; text-align: center; }}
+QProgressBar::chunk {{ background: {highlight}; border-radius: 4px; }}
 QCheckBox::indicator, QGroupBox::indicator, QAbstractItemView::indicator {{
     width: 14px; height: 14px; border: 1px solid {muted}; border-radius: 3px; background: {base}; }}
 QCheckBox::indicator:hover, QCheckBox::indicator:focus, QGroupBox::indicator:hover {{
@@ -131,10 +192,16 @@ def palette_for(dark: bool) -> QPalette:
 
 def style_sheet(dark: bool) -> str:
     """Return style rules that a palette cannot give Fusion, such as the frame of a check box."""
-    colours = {name: pair[dark] for name, pair in COLOURS.items()}
-    meanings = [f'QLabel[meaning="{name}"] {{ color: {colours[name]}; }}' for name in MEANINGS]
-    rules = STYLE.format(**colours, check=CHECK.as_posix(), more=MORE.as_posix())
-    return "\n".join([rules, *meanings])
+    values = {name: pair[dark] for name, pair in COLOURS.items()}
+    rules = [STYLE.format(**values, **{sign: (ICONS / f"{sign}.svg").as_posix() for sign in SIGNS})]
+    for name in MEANINGS:
+        rules.append(f'QLabel[meaning="{name}"] {{ color: {values[name]}; }}')
+    for name in GROUNDS:
+        rules.append(
+            f'QWidget[ground="{name}"] {{ background: {values[name + " ground"]};'
+            f" color: {values[name]}; }}"
+        )
+    return "\n".join(rules)
 
 
 def apply(application: QApplication, choice: str) -> None:
@@ -147,6 +214,9 @@ def apply(application: QApplication, choice: str) -> None:
         if application.style().name() != "fusion":
             application.setStyle("Fusion")
         application.setPalette(palette_for(dark))
+        font = application.font()
+        font.setPointSizeF(TEXT_PT)
+        application.setFont(font)
         application.setStyleSheet(style_sheet(dark))
 
 

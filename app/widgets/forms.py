@@ -58,6 +58,7 @@ class Form(QWidget, Generic[V]):
         self._when: dict[str, When] = {}
         self.rows = QFormLayout(self)
         self.rows.setContentsMargins(0, 0, 0, 0)
+        self.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         self.rows.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for f in fields(value):  # type: ignore[arg-type]
             if "label" in f.metadata:

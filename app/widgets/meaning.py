@@ -18,8 +18,18 @@ def show_meaning(widget: QWidget, meaning: str) -> None:
     meaning : str
         One of :data:`app.theme.theme.MEANINGS`. Empty: the colour of normal text.
     """
-    if widget.property(PROPERTY) != meaning:
-        widget.setProperty(PROPERTY, meaning)
+    set_property(widget, PROPERTY, meaning)
+
+
+def show_ground(widget: QWidget, meaning: str) -> None:
+    """Set text and background of a widget to pass, warn or fail. Empty: as usual."""
+    set_property(widget, "ground", meaning)
+
+
+def set_property(widget: QWidget, name: str, value: object) -> None:
+    """Set a property that the style sheet selects by, and apply it."""
+    if widget.property(name) != value:
+        widget.setProperty(name, value)
         style = widget.style()
         style.unpolish(widget)
         style.polish(widget)

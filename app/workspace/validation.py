@@ -50,6 +50,11 @@ class Validation:
         """Whether there is at least one length and all are within their limits."""
         return bool(self.comparisons) and all(c.passed for c in self.comparisons)
 
+    @property
+    def largest_percent(self) -> float:
+        """The largest error of a length, without its sign."""
+        return max(abs(c.error_percent or 0.0) for c in self.comparisons)
+
     def as_json(self) -> dict[str, Any]:
         """Return the validation as plain values."""
         keys = ("quantity", "measured_mm", "true_mm", "limit_percent")

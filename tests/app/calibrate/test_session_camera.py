@@ -151,8 +151,8 @@ def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
     technician.page.begin()
     technician.click("question.open")
     form = technician.page.form
-    button = technician.see("setup.source")
-    assert isinstance(button, SourceButton)
+    button = SourceButton(context=context)
+    qtbot.addWidget(button)
     assert not form.camera_settings.isEnabled()
     button.use_camera(context.cameras.infos()[0])
     assert C310.name in form.camera.text()

@@ -68,20 +68,20 @@ def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
 ) -> None:
     twin = Device("046d:081b@SN2", C310.name, C310.model, "/dev/video2")
     context.cameras.driver = FakeDriver(fake, FakeCamera(device=twin))
-    button = SourceButton(context=context, page="calibrate", none="No camera")
+    button = SourceButton(context=context)
     qtbot.addWidget(button)
     button.list_cameras()
-    texts = [button.findChild(QAction, f"calibrate.source.camera.{n}").text() for n in (0, 1)]
+    texts = [button.findChild(QAction, f"state.camera.{n}").text() for n in (0, 1)]
     assert texts == [f"{C310.name} (/dev/video0)", f"{C310.name} (/dev/video2)"]
-    assert not button.findChild(QAction, "calibrate.source.settings").isEnabled()
-    button.findChild(QAction, "calibrate.source.camera.1").trigger()
+    assert not button.findChild(QAction, "state.camera.settings").isEnabled()
+    button.findChild(QAction, "state.camera.1").trigger()
     assert context.source.info is not None
     assert context.source.info.detail == twin.identity
-    assert button.findChild(QAction, "calibrate.source.settings").isEnabled()
+    assert button.findChild(QAction, "state.camera.settings").isEnabled()
     fake.plugged = False
     context.cameras.driver = FakeDriver(fake)
     button.list_cameras()
-    (none,) = [action for action in button.menu().actions() if ".camera." in action.objectName()]
+    (none,) = [action for action in button.menu().actions() if action.objectName() == "state.camera.0"]
     assert (none.text(), none.isEnabled()) == ("No camera connected", False)
 
 
@@ -127,10 +127,10 @@ def test_settings_of_one_camera_are_not_those_of_another_of_its_model(
 def test_the_dialog_opens_once_and_releases_the_camera(
     context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
 ) -> None:
-    button = SourceButton(context=context, page="inspect", none="No camera", parent=host)
+    button = SourceButton(context=context, parent=host)
     button.list_cameras()
-    button.findChild(QAction, "inspect.source.camera.0").trigger()
-    button.findChild(QAction, "inspect.source.settings").trigger()
+    button.findChild(QAction, "state.camera.0").trigger()
+    button.findChild(QAction, "state.camera.settings").trigger()
     button.show_settings()
     (dialog,) = host.findChildren(CameraDialog)
     qtbot.waitUntil(lambda: dialog.panel.lock.isEnabled(), timeout=WAIT_MS)

@@ -19,7 +19,7 @@ def test_a_recording_can_replace_the_camera(
     context: AppContext, qtbot: QtBot, tmp_path: Path, monkeypatch: MonkeyPatch
 ) -> None:
     write_recording(tmp_path / "coin.gplrec")
-    button = SourceButton(context=context, page="calibrate", none="No camera")
+    button = SourceButton(context=context)
     qtbot.addWidget(button)
     chosen = (str(tmp_path / "coin.gplrec"), "")
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: chosen)
@@ -46,7 +46,7 @@ def test_the_recordings_of_the_workspace_are_listed_with_their_first_image(
     broken = context.workspace.recording_path("S-2")
     broken.write_bytes(b"no recording")
     os.utime(broken, (1e9, 1e9))
-    button = SourceButton(context=context, page="calibrate", none="No camera")
+    button = SourceButton(context=context)
     qtbot.addWidget(button)
     dialog = button.show_recordings()
     assert [dialog.list.item(row).text()[:3] for row in range(2)] == ["S-1", "S-2"]

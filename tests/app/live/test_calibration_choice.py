@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import scene
-from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
-from app.live.calibration_choice import CalibrationBox, CalibrationChoice
+from app.live.calibration_choice import CalibrationChoice
 from app.services.jobs import Job
 from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
@@ -29,20 +28,20 @@ class Waiting:
 
 def _library_of_one(
     context: AppContext, calibration: Calibration, qtbot: QtBot
-) -> tuple[Path, CalibrationChoice, Waiting, CalibrationBox]:
+) -> tuple[Path, CalibrationChoice, Waiting]:
     """Return the path of the only calibration, its CalibrationChoice, and the objects it uses."""
     path = context.workspace.calibration_path("virtual-1", "small")
     write_calibration(calibration, path)
-    box, jobs = CalibrationBox(), Waiting()
-    qtbot.addWidget(box)
-    return path, CalibrationChoice(jobs, box, context=context), jobs, box  # type: ignore[arg-type]
+    owner, jobs = QWidget(), Waiting()
+    qtbot.addWidget(owner)
+    return path, CalibrationChoice(jobs, owner, context=context), jobs  # type: ignore[arg-type]
 
 
 def test_a_calibration_is_read_again_after_a_stopped_reading(
     context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     """Otherwise only another calibration would help."""
-    path, choice, jobs, box = _library_of_one(context, small_calibration, qtbot)
+    path, choice, jobs = _library_of_one(context, small_calibration, qtbot)
     choice.refresh()
     choice.use_what_fits("", None)
     first = jobs.job
@@ -56,7 +55,7 @@ def test_a_calibration_is_read_again_after_a_stopped_reading(
     second = jobs.job
     second.over = True
     second.done((path, None, None))
-    box.activated.emit(box.currentIndex())
+    choice.use_what_fits("", None)
     assert jobs.job is second
 
 
@@ -64,7 +63,7 @@ def test_a_replaced_file_is_read_again(
     context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     """For example by a second zero while the first file is still being read."""
-    path, choice, jobs, _ = _library_of_one(context, small_calibration, qtbot)
+    path, choice, jobs = _library_of_one(context, small_calibration, qtbot)
     choice.refresh()
     choice.use_what_fits("", None)
     choice.refresh()
@@ -84,9 +83,9 @@ def test_a_replaced_file_is_read_again(
 def test_matching_is_the_newest_validated_one_and_never_one_that_failed(
     context: AppContext, qtbot: QtBot
 ) -> None:
-    box, workspace = CalibrationBox(), context.workspace
-    qtbot.addWidget(box)
-    choice = CalibrationChoice(Waiting(), box, context=context)  # type: ignore[arg-type]
+    owner, workspace = QWidget(), context.workspace
+    qtbot.addWidget(owner)
+    choice = CalibrationChoice(Waiting(), owner, context=context)  # type: ignore[arg-type]
     plain = scene.calibration()
 
     def kept(day: int, calibration: Calibration) -> Path:
@@ -109,20 +108,3 @@ def test_matching_is_the_newest_validated_one_and_never_one_that_failed(
     choice.refresh()
     choice.use_what_fits("T-1", None)
     assert workspace.in_use == days[2]
-
-
-def test_a_calibration_is_listed_by_its_name_with_its_sensor_in_the_tooltip(qtbot: QtBot) -> None:
-    class Entry:
-        path, name, serial = Path("/lab/x.gplcal"), "x", "<b>A"
-        in_use = True
-
-        class summary:
-            identity, image_size = "A-12ab", (8, 6)
-
-    entry: Any = Entry()
-    box = CalibrationBox()
-    qtbot.addWidget(box)
-    box.show_entries((entry,))
-    assert box.currentText() == "x"
-    tip = box.itemData(1, Qt.ItemDataRole.ToolTipRole)
-    assert "&lt;b&gt;A" in tip and "A-12ab" in tip and "8x6" in tip

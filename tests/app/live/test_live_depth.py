@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_camera import C310, FakeCamera, FakeDriver
+from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.live.advice import action_of, advise
-from app.live.calibration_choice import CalibrationBox
 from app.live.depth import LiveDepth
 from app.live.session import LiveSession
 from app.services.jobs import Jobs
@@ -28,9 +28,9 @@ DIM = Finding("exposure", "the light is darker", remedy="Restore it", verdict=Ve
 
 @pytest.fixture
 def depth(context: AppContext, qtbot: QtBot) -> Iterator[LiveDepth]:
-    live, box = LiveSession(context=context, name="test"), CalibrationBox()
-    qtbot.addWidget(box)
-    made = LiveDepth(live, Jobs("test", live), box, context=context)
+    live, owner = LiveSession(context=context, name="test"), QWidget()
+    qtbot.addWidget(owner)
+    made = LiveDepth(live, Jobs("test", live), owner, context=context)
     yield made
     made.finish()
 

@@ -1,0 +1,90 @@
+"""The button that shows the calibration in use and lets the user select another one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QMenu, QToolButton
+
+from app.context.calibration_status import put_into_use
+from app.context.context import AppContext
+from app.theme.icons import icon
+from app.widgets.label import plain_tip
+from app.widgets.meaning import show_ground
+from app.widgets.naming import named
+from app.workspace.entries import Entry
+from gelpolight_core.translation import tr
+
+SIGNS = {"pass": "validated", "warn": "warn", "fail": "fail"}
+
+
+class CalibrationButton(QToolButton):
+    """Shows the calibration in use with its verdict. Its menu offers those of the library.
+
+    Parameters
+    ----------
+    context : AppContext
+        Holds the library and the status.
+    """
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        self._context = context
+        named(self, "state.calibration", tr("Calibration in use"))
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self)
+        menu.setObjectName("state.calibration.menu")
+        menu.setToolTipsVisible(True)
+        menu.aboutToShow.connect(self.list_calibrations)
+        self.setMenu(menu)
+        context.status.changed.connect(self._show)
+        self._show()
+
+    def list_calibrations(self) -> None:
+        """Offer the calibrations that can be read, newest first, those of this sensor on top."""
+        menu = self.menu()
+        menu.clear()
+        entries: tuple[Entry, ...] = ()
+        with self._context.toasts.errors():
+            entries = self._context.workspace.entries()
+        readable = [entry for entry in entries if entry.summary is not None]
+        sensor = self._context.status.value.sensor
+        serials = dict.fromkeys(entry.serial for entry in readable)
+        for serial in sorted(serials, key=lambda one: one != sensor):
+            menu.addSection(tr("Sensor {serial}").format(serial=serial))
+            for entry in readable:
+                if entry.serial == serial:
+                    self._add(entry)
+        menu.addSeparator()
+        none = menu.addAction(tr("No calibration"), lambda: self.use(None))
+        none.setObjectName("state.calibration.none")
+        page = self._context.requests.page
+        library = menu.addAction(tr("All sensors and calibrations"), lambda: page.emit("sensors"))
+        library.setObjectName("state.calibration.library")
+
+    def _add(self, entry: Entry) -> None:
+        assert entry.summary is not None
+        word, role = entry.state
+        text = f"{entry.name}  ({word})".replace("&", "&&")
+        action = self.menu().addAction(icon(SIGNS[role], role), text)
+        action.setObjectName(f"state.calibration.{entry.name}")
+        size = "x".join(map(str, entry.summary.image_size))
+        action.setToolTip(plain_tip(f"{entry.serial}, {entry.summary.identity}, {size}"))
+        action.setCheckable(True)
+        action.setChecked(entry.in_use)
+        action.triggered.connect(lambda _=False: self.use(entry.path))
+
+    def use(self, path: Path | None) -> None:
+        """Put a calibration into use, or none."""
+        put_into_use(path, self, context=self._context)
+
+    def _show(self) -> None:
+        status = self._context.status.value
+        text = status.calibration or tr("No calibration in use")
+        if status.calibration and status.calibration_note:
+            text = f"{text}, {status.calibration_note}"
+        self.setText(status.task or text)
+        show_ground(self, "warn" if status.task else status.calibration_role)
+        self.setToolTip(plain_tip(status.calibration_advice))

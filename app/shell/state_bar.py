@@ -1,0 +1,96 @@
+"""The bar on top of every page: sensor, camera, calibration, frames per second, messages."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QSizePolicy, QToolBar, QWidget
+
+from app.context.calibration_button import CalibrationButton
+from app.context.context import AppContext
+from app.context.source_button import SourceButton
+from app.services.status import StatusModel
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+TITLE_FROM = 1180
+"""Width in pixels from which on there is space for the name of the program."""
+
+
+class StateBar(QToolBar):
+    """Shows what all pages work with, and lets the user change the camera and the calibration.
+
+    Parameters
+    ----------
+    context : AppContext
+        Holds the status.
+    notifications : QWidget
+        The button at the right end.
+    """
+
+    def __init__(self, notifications: QWidget, *, context: AppContext) -> None:
+        super().__init__(tr("State"))
+        named(self, "state", tr("State"))
+        self.setMovable(False)
+        self.setIconSize(QSize(18, 18))
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        self._status = context.status
+        title = PlainLabel(tr("GelPoLight Studio"))
+        make_bold(title)
+        self._title = self.addWidget(title)
+        self._sensor = named(PlainLabel(), "chip", tr("Sensor"))
+        self._sensor_shown = self.addWidget(self._sensor)
+        self.camera = SourceButton(context=context)
+        self.addWidget(self.camera)
+        self.calibration = CalibrationButton(context=context)
+        self.addWidget(self.calibration)
+        space = QWidget()
+        space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self.addWidget(space)
+        self._rate = named(PlainLabel(), "state.rate", tr("Frames per second from the camera"))
+        show_meaning(self._rate, "muted")
+        self.addWidget(self._rate)
+        self.addWidget(notifications)
+        self._status.changed.connect(self._show)
+        self._show()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave the name of the program out where there is no space for it."""
+        super().resizeEvent(event)
+        self._title.setVisible(self.width() >= TITLE_FROM)
+
+    def _show(self) -> None:
+        status = self._status.value
+        self._sensor.setText(tr("Sensor {serial}").format(serial=status.sensor))
+        self._sensor_shown.setVisible(bool(status.sensor))
+        self._rate.setText(rate_text(status.rate_hz, status.lost))
+        # Reserves the width of the longest text, so that its neighbours do not move.
+        self._rate.setMinimumWidth(max(self._rate.minimumWidth(), self._rate.sizeHint().width()))
+
+
+def rate_text(rate_hz: float | None, lost: int | None) -> str:
+    """Return the frames per second and the number of lost frames. Empty if there is no camera."""
+    if rate_hz is None:
+        return ""
+    return tr("{hz:.0f} frames/s, {n} lost").format(hz=rate_hz, n=lost or 0)
+
+
+class FailedLine(PlainLabel):
+    """Warns above every page while the calibration in use is one that failed."""
+
+    def __init__(self, model: StatusModel) -> None:
+        super().__init__(wrap=True)
+        self._model = model
+        named(self, "main.failed", tr("Warning about the calibration in use"))
+        self.setProperty("ground", "fail")
+        self.setContentsMargins(16, 8, 16, 8)
+        make_bold(self)
+        model.changed.connect(self._show)
+        self._show()
+
+    def _show(self) -> None:
+        status = self._model.value
+        self.setVisible(status.calibration_role == "fail")
+        self.setText(status.calibration_advice)

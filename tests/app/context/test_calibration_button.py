@@ -1,0 +1,44 @@
+"""The button that shows the calibration in use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import scene
+from PySide6.QtGui import QAction
+from pytestqt.qtbot import QtBot
+
+from app.context.calibration_button import CalibrationButton
+from app.context.calibration_status import show_in_use
+from app.context.context import AppContext
+
+
+def test_the_calibrations_of_the_library_are_offered_and_one_is_used(
+    context: AppContext, qtbot: QtBot
+) -> None:
+    path = context.workspace.keep_calibration(scene.calibration(), "made")
+    context.requests.calibrations_changed.connect(lambda: show_in_use(context))
+    button = CalibrationButton(context=context)
+    qtbot.addWidget(button)
+    button.list_calibrations()
+    action = button.findChild(QAction, f"state.calibration.{path.stem}")
+    assert not action.isChecked()
+    action.trigger()
+    assert context.workspace.in_use == path
+    assert button.property("ground") == "warn", "it is not validated"
+    button.list_calibrations()
+    assert button.findChild(QAction, f"state.calibration.{path.stem}").isChecked()
+    button.findChild(QAction, "state.calibration.none").trigger()
+    assert context.workspace.in_use is None and not button.property("ground")
+
+
+def test_while_a_sensor_is_calibrated_the_button_shows_the_step(
+    context: AppContext, qtbot: QtBot, tmp_path: Path
+) -> None:
+    button = CalibrationButton(context=context)
+    qtbot.addWidget(button)
+    before = button.text()
+    context.status.update(task="Calibrating: 7 of 9")
+    assert button.text() == "Calibrating: 7 of 9"
+    context.status.update(task="")
+    assert button.text() == before
