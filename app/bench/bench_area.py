@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QScrollArea
+from PySide6.QtWidgets import QWidget
 
 from app.context.context import SourceChoice
+from app.widgets.layout import vbox
 
 
-class BenchArea(QScrollArea):
+class BenchArea(QWidget):
     """Holds the bench panel. It is empty until the virtual sensor is selected.
 
     Parameters
@@ -20,19 +20,15 @@ class BenchArea(QScrollArea):
     def __init__(self, source: SourceChoice) -> None:
         super().__init__()
         self._source = source
-        self.setWidgetResizable(True)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._column = vbox(of=self, margins=0)
 
     def follow(self) -> bool:
         """Show the bench of the selected source. Return whether there is one."""
         info, bench = self._source.info, self._source.bench
         if info is None or info.kind != "virtual" or bench is None:
             return False
-        if self.widget() is None:
+        if not self._column.count():
             from app.bench.bench_panel import BenchPanel  # only needed by the demo
 
-            panel = BenchPanel(bench=bench)
-            self.setWidget(panel)
-            width = max(panel.minimumWidth(), panel.minimumSizeHint().width())
-            self.setMinimumWidth(width + self.verticalScrollBar().sizeHint().width() + 2)
+            self._column.addWidget(BenchPanel(bench=bench))
         return True

@@ -87,8 +87,8 @@ class BenchPanel(QWidget):
         heading = PlainLabel(tr("On the sensor"))
         heading.setBuddy(self._item)
         groups = self._image_group(), self._fault_group()
-        vbox(heading, self._item, self._form, self._hint, *groups, None, of=self, margins=8)
-        self.setMinimumWidth(260)
+        vbox(heading, self._item, self._form, self._hint, *groups, None, of=self, margins=0)
+        self.setMinimumWidth(236)
         self._bench_changed.connect(self._show_bench)
         # Methods, not lambdas, so that nothing keeps the panel alive once Qt has deleted it.
         forget = bench.watch(self._bench_changed.emit)

@@ -8,6 +8,7 @@ from app.bench.bench_area import BenchArea
 from app.calibrate.step_data import Step
 from app.context.context import SourceChoice
 from app.sources.bench import Scene
+from app.widgets.layout import scroll_area
 from app.widgets.naming import named
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -29,7 +30,7 @@ class BenchDock(QDockWidget):
         named(self, "calibrate.bench", tr("Virtual bench"))
         self._source = source
         self._area = BenchArea(source)
-        self.setWidget(self._area)
+        self.setWidget(scroll_area(self._area))
         self._tried = 0
         self._grab_offset: tuple[float, float] | None = None
         self.hide()

@@ -33,15 +33,14 @@ class ModeBox(ComboBox):
             "inspect.mode",
             tr("Accuracy and speed"),
             tr(
-                "Choose accuracy or speed. Each name is followed by the errors of height "
-                "and size,\nmeasured on a simulated sensor with a matt membrane, and by the "
-                "time of a frame on\nthis machine once it has been used. The error of your "
-                "own sensor is stated on the\npage Sensors. A frozen image always has the full "
-                "accuracy of its model."
+                "Choose accuracy or speed. In brackets: images per second on this machine, once\n"
+                "the mode has been used, and the error of heights and sizes on a simulated matt\n"
+                "sensor. The error of your own sensor is on the page Sensors. A frozen image\n"
+                "always has the full accuracy of its model."
             ),
         )
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self.setMinimumContentsLength(32)
+        self.setMinimumContentsLength(20)
         self.setEnabled(False)
 
     def show_modes(self, modes: tuple[Mode, ...], chosen: Mode | None) -> None:
@@ -165,13 +164,10 @@ class ModeChoice(QObject):
 
 
 def mode_text(mode: Mode, milliseconds: float | None) -> str:
-    """Return the label of a mode with its errors, and its time if that is known."""
-    found = FOUND.get(mode)
-    if found is None:  # the calibration's quality table states them
-        return mode.label if milliseconds is None else f"{mode.label}   {milliseconds:.0f} ms"
-    height, size = found.height_percent, found.size_percent
-    decimals = 2 if max(height, size) < 1.0 else 1
-    parts = [mode.label, f"{height:.{decimals}f} / {size:.{decimals}f} %"]
-    if milliseconds is not None:
-        parts.append(tr("{ms:.0f} ms").format(ms=milliseconds))
-    return "   ".join(parts)
+    """Return what a mode means: its name, the images per second, and the error of a height."""
+    found, parts = FOUND.get(mode), []
+    if milliseconds:
+        parts.append(tr("{n:.0f}/s").format(n=1e3 / milliseconds))
+    if found is not None:  # else the calibration's quality table states it
+        parts.append(tr("±{p:.1f} %").format(p=max(found.height_percent, found.size_percent)))
+    return f"{mode.label} ({', '.join(parts)})" if parts else mode.label

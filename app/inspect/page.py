@@ -29,10 +29,12 @@ from app.live.session import LiveSession
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.view2d.map_point import PixelMap, read_at
-from app.widgets.actions import make_action
+from app.widgets.actions import action_button, make_action
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
+from app.widgets.units import in_unit
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
 
@@ -52,17 +54,21 @@ class InspectPage(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.context = context
         self.jobs = Jobs("inspect", self)
-        self.views = Views(self.jobs, context=context)
         self.live = LiveSession(context=context, name="inspect", parent=self)
         self.depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.zero = ZeroControl(self.live, self.jobs, context=context)
         self.modes = ModeChoice(self.jobs, self, context=context)
-        idle = tr(
-            "Press an object into the membrane. Press Space to freeze the image at full detail."
-        )
+        idle = tr("Press an object into the membrane. Press Space to freeze it at full detail.")
         self.banner = Banner(self.jobs, idle=idle)
-        self._readout = named(PlainLabel(), "inspect.readout", tr("Values under the cursor"))
-        self._rate = named(PlainLabel(), "inspect.rate", tr("Frame rate and processing time"))
+        self._value = named(PlainLabel(), "inspect.depth", tr("Depth under the cursor"))
+        make_bold(self._value, size=1.7)
+        self._readout = named(
+            PlainLabel(wrap=True), "inspect.readout", tr("Values under the cursor")
+        )
+        self._readout.setMinimumHeight(2 * self._readout.fontMetrics().lineSpacing())
+        show_meaning(self._readout, "muted")
+        self._rate = named(PlainLabel(wrap=True), "inspect.rate", tr("Rate and processing time"))
+        show_meaning(self._rate, "muted")
         self._cursor = (math.nan, math.nan)
         self._pixel_map: PixelMap | None = None
         self._shown: Shown | None = None
@@ -72,12 +78,9 @@ class InspectPage(QWidget):
         self.views.restore()
 
     def _lay_out(self) -> None:
-        foot = QWidget()
-        hbox((self._readout, 1), self._rate, of=foot, margins=(8, 2, 8, 2))
-        column = vbox(of=self, margins=0, spacing=0)
         self.pause_action = make_action(
-            self, "inspect.pause", tr("Pause"), lambda: self.pause(not self.live.paused),
-            keys=("Space",), icon_name="pause", tip=tr("Freeze the image at full detail"),
+            self, "inspect.pause", tr("Freeze"), lambda: self.pause(not self.live.paused),
+            keys=("Space",), tip=tr("Freeze the image at full detail"),
         )  # fmt: skip
         self.pause_action.setCheckable(True)
         # Other pages use the space bar for something else.
@@ -88,33 +91,25 @@ class InspectPage(QWidget):
         )  # fmt: skip
         self.recorder = RecordControl(self.depth, self, context=self.context)
         self.stream = DepthStream(self.depth, self, context=self.context)
-        self.file_actions = FileActions(self.depth, self.views, self, context=self.context)
         self.export = ExportControl(self.depth, self.jobs, self, context=self.context)
+        self.views = Views(
+            self.jobs,
+            (vbox(self._value, self._readout, spacing=2), vbox(self.modes.box, self._rate)),
+            (
+                hbox(action_button(zero_action), action_button(self.export.action), spacing=8),
+                action_button(self.recorder.action),
+                action_button(self.pause_action, primary=True),
+            ),
+            context=self.context,
+        )
+        self.file_actions = FileActions(self.depth, self.views, self, context=self.context)
         surface_menu = self.views.surface.menu
         surface_menu.mesh_wanted.connect(self.export.ask)
         surface_menu.offer_mesh()
-        self.views.bar.insertActions(
-            self.views.bar.actions()[0],
-            [
-                self.pause_action,
-                self.recorder.action,
-                zero_action,
-                self.export.action,
-                self.file_actions.image_action,
-            ],
-        )
-        # Its text is the state of the recording.
-        self.views.bar.widgetForAction(self.recorder.action).setToolButtonStyle(
-            Qt.ToolButtonStyle.ToolButtonTextBesideIcon
-        )
-        self.views.add_to_bar(self.modes.box)
         self.replay = ReplayBar()
         self.processed = ProcessedLine()
-        column.addWidget(self.banner)
-        column.addWidget(self.processed)
-        column.addWidget(self.views, 1)
-        column.addWidget(self.replay)
-        column.addWidget(foot)
+        parts = self.banner, self.processed, (self.views, 1), self.replay
+        vbox(*parts, of=self, margins=0, spacing=0)
 
     def _connect(self) -> None:
         self.views.wanted_changed.connect(self._want)
@@ -188,6 +183,7 @@ class InspectPage(QWidget):
     def pause(self, on: bool) -> None:
         """Freeze the image, or continue."""
         self.pause_action.setChecked(on)
+        self.pause_action.setText(tr("Continue") if on else tr("Freeze"))
         self.live.pause(on)
         self._want()
 
@@ -238,18 +234,15 @@ class InspectPage(QWidget):
         self.modes.follow(self.depth.last)
         self.views.surface.refresh_pins()
         texts = self._recorded, self.stream.text, self.depth.rate_text()
-        self._rate.setText("    ".join(filter(None, texts)))
+        self._rate.setText("\n".join(filter(None, texts)))
         self._rate.setToolTip(plain_tip(self.depth.trace_text()))
         heightmap = None if self._shown is None else self._shown.heightmap
-        text = tr("Point at a view to read the depth there.")
-        if heightmap is None:
-            text = ""
-        elif math.isfinite(self._cursor[0]):
+        reading = None
+        if heightmap is not None and math.isfinite(self._cursor[0]):
             reading = read_at(heightmap, *self._cursor)
-            text = text if reading is None else reading.text()
-            if self._shown is not None and self._shown.processed and reading is not None:
-                text = tr("Processed: {values}").format(values=text)
-        self._readout.setText(text)
+        self._value.setText(" " if reading is None else in_unit(reading.depth_mm))
+        text = "" if heightmap is None else tr("Point at a view to read the depth there.")
+        self._readout.setText(text if reading is None else reading.detail())
 
     # Advice
 

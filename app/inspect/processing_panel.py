@@ -67,7 +67,7 @@ class ProcessingPanel(QWidget):
             accessible=tr("Reset the processing"),
             tip=tr("Show the height map as reconstructed"),
         )
-        vbox(self.form, self._state, self._reset, None, of=self)
+        vbox(self.form, self._state, self._reset, of=self, margins=0)
         self.show_reference(None)
 
     def processing(self, rectangle: Rectangle, points_mm: Points) -> Processing:
@@ -160,7 +160,7 @@ class DisplayPanel(QWidget):
         self._range = 0.0, 1.0
         self._form = Form(Display(), "inspect.display")
         self._form.changed.connect(self._on_changed)
-        vbox(self._form, None, of=self)
+        vbox(self._form, of=self, margins=0)
 
     @property
     def display(self) -> Display:

@@ -59,11 +59,12 @@ class SectionPanel(QWidget):
         )
         self._figures = named(MarkupLabel(wrap=True), "inspect.section.figures", tr("Measurements"))
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
-        scroll = scroll_area(self._figures)
-        side = vbox(self.choice, self.form, save, (scroll, 1), margins=0, spacing=2)
-        for widget in (self.choice, self.form, save, scroll):
-            widget.setFixedWidth(164)
-        hbox((self._plot, 1), side, of=self, margins=(2, 2, 2, 4), spacing=2)
+        figures, settings = scroll_area(self._figures), QWidget()
+        vbox(self.choice, self.form, save, None, of=settings, margins=0, spacing=4)
+        scrolled = scroll_area(settings)
+        figures.setFixedWidth(150)
+        scrolled.setFixedWidth(210)
+        hbox((self._plot, 1), figures, scrolled, of=self, margins=(8, 4, 8, 4), spacing=8)
 
     def _make_plot(self) -> None:
         self._plot = ProfilePlot("inspect.section.plot")

@@ -1,18 +1,13 @@
-"""All views of the page as docks that can be moved, tabbed and hidden. The layout is saved."""
+"""All views of the page around one stage, the section below it, and the inspector beside it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
-from PySide6.QtCore import QByteArray, Qt, Signal
-from PySide6.QtWidgets import (
-    QDockWidget,
-    QMainWindow,
-    QMenu,
-    QToolBar,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QButtonGroup, QToolButton, QWidget
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
@@ -26,23 +21,69 @@ from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Jobs
 from app.view2d.cuts import Cut, Section
-from app.view2d.display import QUANTITIES, Display, display_as_text, display_from_text
+from app.view2d.display import Display, display_as_text, display_from_text
 from app.view2d.map_view import MapView, extent_of
 from app.view2d.profile_plot import line_colour
 from app.view2d.quantities import Reference
-from app.view3d.panel import SurfacePanel, view_names
+from app.view3d.menu import DIRECTIONS
+from app.view3d.panel import SurfacePanel
 from app.view3d.surface import SurfaceLine
 from app.widgets.actions import make_action
+from app.widgets.fields import choice, is_possible, switch
+from app.widgets.fold import Fold
+from app.widgets.layout import hbox, side_panel, splitter, vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-# Raised when views are added, so that an old layout is not applied to them.
-LAYOUT_VERSION = 3
-AREAS = Qt.DockWidgetArea
+STAGES = {
+    "surface": (tr("3D"), ("surface",)),
+    "height": (tr("Map"), ("height",)),
+    "camera": (tr("Camera"), ("camera",)),
+    "normals": (tr("Normals"), ("normals",)),
+    "quality": (tr("Quality"), ("quality",)),
+    "two": (tr("3D + map"), ("surface", "height")),
+    "four": (tr("All"), ("surface", "height", "camera", "quality")),
+}
+"""What fills the stage: the text of the button, and the views. Alt and the number chooses it."""
+SECTION_PX = 230
 
 
-class Views(QMainWindow):
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What is visible: one of STAGES, the section, and whether the stage has all of the page."""
+
+    stage: str = choice("two", "", {key: text for key, (text, _) in STAGES.items()})
+    section: bool = switch(False, "", "")
+    maximised: bool = False
+
+    @property
+    def views(self) -> frozenset[str]:
+        """Keys of the visible views."""
+        below = {"section"} if self.section and not self.maximised else set()
+        return frozenset(STAGES[self.stage][1]) | below
+
+
+def layout_from_text(text: str) -> Layout:
+    """Return a kept layout. The default if the text is damaged."""
+    try:
+        kept = dict(json.loads(text))
+    except (ValueError, TypeError):
+        return Layout()
+    parts = (f for f in fields(Layout) if f.metadata and is_possible(f, kept.get(f.name)))
+    return Layout(**{f.name: kept[f.name] for f in parts})
+
+
+class Views(QWidget):
     """Holds the views and reports what they need.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        Load the 3D view.
+    top, below : tuple
+        Parts of the inspector: above the display settings, and at its lower end.
+    context : AppContext
+        Shared by all pages.
 
     Signals
     -------
@@ -58,11 +99,11 @@ class Views(QMainWindow):
     pointed = Signal(float, float)
     image_pointed = Signal(float, float)
 
-    def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
+    def __init__(
+        self, jobs: Jobs, top: tuple[Any, ...], below: tuple[Any, ...], *, context: AppContext
+    ) -> None:
         super().__init__()
         named(self, "inspect.views", tr("Views"))
-        self.setWindowFlags(Qt.WindowType.Widget)
-        self.setDockNestingEnabled(True)
         self._context = context
         self.surface = SurfacePanel(
             jobs,
@@ -80,85 +121,85 @@ class Views(QMainWindow):
         self.processing = ProcessingPanel()
         self.level_points = LevelPoints(self.height.map)
         self._bench = BenchArea(context.source)
-        self.docks: dict[str, QDockWidget] = {}
-        self._visible: dict[str, bool] = {}
+        self.bench = Fold("inspect.bench", tr("Virtual bench"), self._bench)
+        self.layout_shown = Layout()
         self._has_depth = False
-        self.bar = self._make_bar()
-        self._make_docks()
+        self._lay_out(top, below)
         self._connect()
 
-    def _make_bar(self) -> QToolBar:
-        bar = named(QToolBar(tr("Inspect"), movable=False), "inspect.bar", tr("Inspect"))
-        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self._menu = QMenu(self)
-        button = named(QToolButton(), "inspect.views.menu", tr("Views"), tr("Show or hide a view"))
-        button.setText(tr("Views"))
-        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        button.setMenu(self._menu)
-        bar.addSeparator()
-        bar.addWidget(button)
-        self.addToolBar(bar)
+    def _lay_out(self, top: tuple[Any, ...], below: tuple[Any, ...]) -> None:
+        upper = (self.surface, 3), (self.height, 2)
+        lower = (self.camera, 1), (self.normals, 1), (self.quality, 1)
+        self._rows = [
+            splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400, 400))
+            for parts in (upper, lower)
+        ]
+        self._stage = splitter(
+            Qt.Orientation.Vertical, *((row, 3) for row in self._rows), (self.section, 2)
+        )
+        self._stage.setSizes([3 * SECTION_PX, 2 * SECTION_PX, SECTION_PX])
+        processing = Fold("inspect.processing.fold", tr("Processing"), self.processing)
+        parts = (*top, self.display, processing, self.bench)
+        self.inspector = named(side_panel(parts, below), "inspect.inspector", tr("Inspector"))
+        column = vbox(self._make_switch(), (self._stage, 1), margins=0, spacing=0)
+        row = hbox(of=self, margins=0, spacing=0)
+        row.addLayout(column, 1)
+        row.addWidget(self.inspector)
+
+    def _make_switch(self) -> QWidget:
+        """Return the row of buttons that choose what fills the stage."""
+        self._switch = QButtonGroup(self)
+        bar = named(QWidget(), "inspect.switch", tr("Views"))
+        row = hbox(of=bar, margins=(12, 6, 12, 6), spacing=4)
+        for number, (key, (text, _views)) in enumerate(STAGES.items(), start=1):
+            row.addWidget(self._button(key, text, f"Alt+{number}"))
+        row.addStretch(1)
+        row.addWidget(self.surface.tools)
+        for key, text, keys in (
+            ("section", tr("Section"), "Alt+0"),
+            ("maximised", tr("Maximise"), "F"),
+        ):
+            row.addWidget(self._button(key, text, keys))
+        self.surface.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         return bar
 
-    def add_to_bar(self, widget: QWidget) -> None:
-        """Add a control next to the camera button."""
-        self.bar.insertWidget(self.bar.actions()[-1], widget)
+    def _button(self, key: str, text: str, keys: str) -> QToolButton:
+        action = make_action(
+            self, f"inspect.show_{key}", text, lambda: self._choose(key), keys=(keys,)
+        )
+        action.setCheckable(True)
+        button = named(QToolButton(), f"inspect.switch.{key}", text)
+        button.setDefaultAction(action)
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._switch.addButton(button)
+        self._switch.setExclusive(False)
+        return button
 
-    def _make_docks(self) -> None:
-        table = (
-            ("surface", tr("3D"), self.surface, "Alt+1"),
-            ("height", tr("Height map"), self.height, "Alt+2"),
-            ("camera", tr("Camera"), self.camera, "Alt+3"),
-            ("normals", tr("Normals"), self.normals, "Alt+4"),
-            ("quality", tr("Quality"), self.quality, "Alt+5"),
-            ("section", tr("Cross-section"), self.section, "Alt+6"),
-            ("look", tr("Display"), self.display, "Alt+7"),
-            ("bench", tr("Virtual bench"), self._bench, "Alt+8"),
-            ("processing", tr("Processing"), self.processing, "Alt+9"),
-        )
-        for name, title, widget, keys in table:
-            dock = named(QDockWidget(title, self), f"inspect.dock.{name}", title)
-            dock.setWidget(widget)
-            self.docks[name] = dock
-            self._visible[name] = False
-            dock.visibilityChanged.connect(lambda on, name=name: self._on_visible(name, on))
-            action = dock.toggleViewAction()
-            action.setObjectName(f"inspect.show_{name}")
-            action.setShortcut(keys)
-            self.addAction(action)
-            self._menu.addAction(action)
-        self._menu.addSeparator()
-        self._menu.addAction(
-            make_action(self, "inspect.layout", tr("Reset the layout"), self.arrange)
-        )
+    def _choose(self, key: str) -> None:
+        now = self.layout_shown
+        if key in STAGES:
+            self.arrange(replace(now, stage=key))
+        else:
+            self.arrange(replace(now, **{key: not getattr(now, key)}))
 
-    def arrange(self) -> None:
-        """Restore the default layout."""
-        docks = self.docks
-        for dock in docks.values():
-            self.removeDockWidget(dock)
-        left = AREAS.LeftDockWidgetArea
-        self.addDockWidget(left, docks["surface"])
-        self.splitDockWidget(docks["surface"], docks["height"], Qt.Orientation.Horizontal)
-        self.splitDockWidget(docks["height"], docks["look"], Qt.Orientation.Horizontal)
-        self.splitDockWidget(docks["height"], docks["camera"], Qt.Orientation.Vertical)
-        self.tabifyDockWidget(docks["camera"], docks["normals"])
-        self.tabifyDockWidget(docks["normals"], docks["quality"])
-        self.splitDockWidget(docks["surface"], docks["section"], Qt.Orientation.Vertical)
-        self.splitDockWidget(docks["look"], docks["bench"], Qt.Orientation.Vertical)
-        self.tabifyDockWidget(docks["look"], docks["processing"])
-        for dock in docks.values():
-            dock.show()
-        docks["camera"].raise_()
-        docks["look"].raise_()
-        self.resizeDocks(
-            [docks["surface"], docks["height"], docks["look"]],
-            [660, 340, 240],
-            Qt.Orientation.Horizontal,
-        )
-        self.resizeDocks([docks["surface"], docks["section"]], [460, 200], Qt.Orientation.Vertical)
-        self.resizeDocks([docks["look"], docks["bench"]], [240, 600], Qt.Orientation.Vertical)
-        self.follow_source()
+    def arrange(self, layout: Layout) -> None:
+        """Show these views."""
+        before, self.layout_shown = self.layout_shown.views, layout
+        on = {layout.stage: True, "section": layout.section, "maximised": layout.maximised}
+        for button in self._switch.buttons():
+            key = button.objectName().rpartition(".")[2]
+            button.defaultAction().setChecked(on.get(key, False))
+        for key in ("surface", "height", "camera", "normals", "quality", "section"):
+            getattr(self, key).setVisible(key in layout.views)
+        for row in self._rows:
+            row.setVisible(any(row.widget(n).isVisibleTo(row) for n in range(row.count())))
+        self.surface.tools.setVisible("surface" in layout.views)
+        self.inspector.setVisible(not layout.maximised)
+        maps = {"height": self.height, "normals": self.normals, "quality": self.quality}
+        for key in layout.views & maps.keys() - before:
+            if self._has_depth and not maps[key].map.has_image:
+                maps[key].map.say(tr("Please wait."))
+        self._on_section()
 
     def _connect(self) -> None:
         for view in (self.height.map, self.normals.map, self.quality.map, self.surface):
@@ -166,7 +207,6 @@ class Views(QMainWindow):
         self.camera.pointed.connect(self.image_pointed)
         self.camera.clicked.connect(self._on_image_clicked)
         self.display.changed.connect(self._on_display)
-        self.surface.menu.colour_chosen.connect(self.display.colour_by)
         self.height.range_dragged.connect(self.display.lock_range)
         self.height.range_released.connect(self.display.unlock_range)
         self.quality.chosen.connect(self.wanted_changed)
@@ -180,7 +220,7 @@ class Views(QMainWindow):
             part.moved.connect(self._lay_lines)
             part.moved.connect(self.wanted_changed)
         self.section.changed.connect(self._on_section)
-        for name, (text, keys) in view_names().items():
+        for name, (text, keys) in DIRECTIONS.items():
             make_action(
                 self, f"inspect.view_{name}", tr("3D: {name}").format(name=text),
                 lambda name=name: self.surface.view_from(name), keys=(keys,),
@@ -190,18 +230,21 @@ class Views(QMainWindow):
             keys=("K",),
         )  # fmt: skip
 
+    def _shows(self, name: str) -> bool:
+        return name in self.layout_shown.views
+
     # Called by the page
 
     def wanted(self) -> Wanted:
         """Return what to compute from the frames: only what is shown."""
-        shown = self._visible
+        shown = self._shows
         return Wanted(
-            surface=shown["surface"],
-            height=shown["height"],
-            normals=self.normals.what if shown["normals"] else "",
-            camera=shown["camera"],
-            quality=self.quality.what if shown["quality"] else "",
-            section=self._section() if shown["section"] else None,
+            surface=shown("surface"),
+            height=shown("height"),
+            normals=self.normals.what if shown("normals") else "",
+            camera=shown("camera"),
+            quality=self.quality.what if shown("quality") else "",
+            section=self._section() if shown("section") else None,
             region=self.region.rectangle if self._measures_region() else None,
             display=self.display.display,
             reference=self.reference,
@@ -218,7 +261,7 @@ class Views(QMainWindow):
         )
 
     def _measures_region(self) -> bool:
-        return self._visible["section"] and self.section.form.value.region
+        return self._shows("section") and self.section.form.value.region
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show a frame in every visible view."""
@@ -227,39 +270,29 @@ class Views(QMainWindow):
             self.camera.show_rgb(shown.camera, size=(columns, rows))
         if shown.heightmap is None:
             return
-        self._name_processed(bool(shown.processed))
         self.processing.show_still(still)
         if not self._has_depth:
             self._has_depth = True
             self.level_points.spread(extent_of(shown.heightmap))
             self._on_section()
         if shown.surface is not None:
-            self.surface.show_surface(shown.surface)
+            self.surface.show_surface(shown.surface, still=still)
         self.height.show_frame(shown, self.display.display.colours, still=still)
         self.display.show_range(*shown.range_mm)
         self.normals.show_frame(shown)
-        if self._visible["quality"]:
+        if self._shows("quality"):
             self.quality.show_frame(shown, still=still)
         if shown.cut is not None:
             self.section.show_cut(shown.cut)
 
-    def _name_processed(self, processed: bool) -> None:
-        """Say in the titles of the views that the height map is processed."""
-        titles = {"surface": tr("3D"), "height": tr("Height map"), "section": tr("Cross-section")}
-        for name, title in titles.items():
-            text = tr("{view} (processed)").format(view=title) if processed else title
-            if self.docks[name].windowTitle() != text:
-                self.docks[name].setWindowTitle(text)
-
     def prepare(self) -> None:
         """Load what the visible views need, before the first depth arrives."""
-        if self._visible["surface"]:
+        if self._shows("surface"):
             self.surface.load()
 
     def forget(self) -> None:
         """Clear the depth: the calibration or source changed, or there is none."""
         words = tr("No depth yet.")
-        self._name_processed(False)
         self._has_depth = False
         self._on_section()
         self.surface.show_surface(None)
@@ -290,13 +323,10 @@ class Views(QMainWindow):
         self.camera.overlay.set_overlay(Overlay(markers=markers), (max(width, 1), max(height, 1)))
 
     def follow_source(self) -> None:
-        """Show the bench next to the views if the virtual sensor is the camera."""
-        virtual, dock = self._bench.follow(), self.docks["bench"]
-        dock.toggleViewAction().setVisible(virtual)
-        dock.setVisible(virtual)
+        """Offer the bench if the virtual sensor is the camera."""
+        self.bench.setVisible(self._bench.follow())
         if self._context.source.info is None:
             self.camera.show_rgb(None)
-            self.camera.say(tr("No camera. Select a source."))
         else:
             self.camera.say(tr("Waiting for the first image of the camera."))
 
@@ -304,17 +334,17 @@ class Views(QMainWindow):
 
     def restore(self) -> None:
         """Restore the saved layout and display settings."""
-        self.display.show_display(display_from_text(self._context.settings.display("look")))
+        settings = self._context.settings
+        self.display.show_display(display_from_text(settings.display("look")))
         self._on_display()
-        if not self.restoreState(self._context.settings.layout("inspect"), LAYOUT_VERSION):
-            self.arrange()
+        self.arrange(layout_from_text(settings.display("inspect_layout")))
         self.follow_source()
 
     def keep(self) -> None:
         """Save the layout and display settings."""
-        state: QByteArray = self.saveState(LAYOUT_VERSION)
-        self._context.settings.keep_layout("inspect", state)
-        self._context.settings.keep_display("look", display_as_text(self.display.display))
+        settings = self._context.settings
+        settings.keep_display("inspect_layout", json.dumps(asdict(self.layout_shown)))
+        settings.keep_display("look", display_as_text(self.display.display))
 
     def finish(self) -> None:
         """Release the resources of the views."""
@@ -322,18 +352,8 @@ class Views(QMainWindow):
 
     # Slots
 
-    def _on_visible(self, name: str, on: bool) -> None:
-        self._visible[name] = on
-        maps = {"height": self.height, "normals": self.normals, "quality": self.quality}
-        if on and self._has_depth and name in maps and not maps[name].map.has_image:
-            maps[name].map.say(tr("Please wait."))
-        if name == "section":
-            self._on_section()
-        else:
-            self.wanted_changed.emit()
-
     def _on_section(self) -> None:
-        self.lines.show(self._visible["section"] and self._has_depth)
+        self.lines.show(self._shows("section") and self._has_depth)
         self.lines.set_width(self.section.form.value.width_mm)
         self.section.choice.show_lines(self.lines)
         region = self._measures_region() or self.processing.form.value.uses_rectangle
@@ -345,7 +365,7 @@ class Views(QMainWindow):
     def _lay_lines(self) -> None:
         """Show the section lines on the surface."""
         lines = []
-        if self._visible["section"]:
+        if self._shows("section"):
             lines += [
                 SurfaceLine((line.start_mm, line.end_mm), line_colour(line.number))
                 for line in self.lines
@@ -358,7 +378,6 @@ class Views(QMainWindow):
     def _on_display(self) -> None:
         display: Display = self.display.display
         self.surface.set_exaggeration(display.exaggeration)
-        self.surface.menu.set_colours(QUANTITIES, display.colour_by)
         self.wanted_changed.emit()
 
     def _on_image_clicked(self, u: float, v: float) -> None:

@@ -21,7 +21,6 @@ from app.workspace.gel_care import presses_text, read_presses, write_presses
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.watch import HealthWatch
-from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace_tally import TraceTally
 from gelpolight_core.translation import tr
@@ -199,12 +198,6 @@ class LiveDepth(QObject):
         times, heightmap = self._shown_s, self.last.heightmap
         hz = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
         texts = [tr("{hz:.0f} shown/s, {ms:.0f} ms").format(hz=hz, ms=self.last.total_ms)]
-        if heightmap.trace is None:
-            texts.append(heightmap.model)
-        else:
-            mode = Mode(heightmap.model, heightmap.trace.effort)
-            steps = tr("{mode}, steps: {n}")
-            texts.append(steps.format(mode=mode.label, n=len(heightmap.trace.done)))
         if heightmap.visible_depth_mm is not None:
             um = 1e3 * heightmap.visible_depth_mm
             texts.append(tr("visible depth {um:.0f} um").format(um=um))

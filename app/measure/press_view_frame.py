@@ -27,7 +27,7 @@ from app.measure.tool_map import ToolMap
 from app.measure.work import Work
 from app.services.jobs import Jobs
 from app.widgets.actions import make_action
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from gelpolight_core.io.user import user_name
 from gelpolight_core.translation import tr
@@ -94,7 +94,7 @@ class PressViewFrame(QMainWindow):
         named(self._bench, "measure.bench", tr("Virtual bench"))
         self.addDockWidget(Qt.DockWidgetArea.LeftDockWidgetArea, self._bench)
         self._bench_area = BenchArea(self.context.source)
-        self._bench.setWidget(self._bench_area)
+        self._bench.setWidget(scroll_area(self._bench_area))
         self._bench.hide()
 
     def _build_bar(self) -> None:

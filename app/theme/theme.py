@@ -53,7 +53,9 @@ QToolBar#state {{ border-bottom: 1px solid {line}; padding: 7px 16px; }}
 QToolBar#state QToolButton, QLabel#chip {{ background: {button}; border: 1px solid transparent;
     border-radius: 14px; padding: 5px 12px; }}
 QToolBar#state QToolButton:hover {{ background: {hover}; }}
-QToolBar#state QToolButton:focus {{ border-color: {accent}; }}
+QToolBar#state QToolButton[fold="true"] {{ text-align: left; padding: 4px 0; color: {text};
+    background: transparent; }}
+QToolButton:focus {{ border-color: {accent}; }}
 QToolBar#state QToolButton[popupMode="2"] {{ padding-right: 24px; }}
 QToolBar#navigation {{ background: {window}; border: none; border-right: 1px solid {line};
     padding: 8px; spacing: 4px; }}
@@ -62,7 +64,9 @@ QToolBar#navigation QToolButton {{ border: 1px solid transparent; border-radius:
 QToolBar#navigation QToolButton:hover {{ background: {button}; }}
 QToolBar#navigation QToolButton:checked {{ background: {hover}; color: {text};
     font-weight: 600; }}
-QToolBar#navigation QToolButton:focus {{ border-color: {accent}; }}
+QToolBar#navigation QToolButton[fold="true"] {{ text-align: left; padding: 4px 0; color: {text};
+    background: transparent; }}
+QToolButton:focus {{ border-color: {accent}; }}
 QPushButton {{ border: 1px solid transparent; border-radius: 6px; padding: 6px 10px;
     background: {button}; color: {text}; }}
 QPushButton:hover {{ background: {hover}; }}
@@ -81,6 +85,8 @@ QToolButton:checked {{ background: {highlight}; color: {highlighted}; }}
 QToolButton:disabled {{ color: {disabled}; }}
 QToolButton#qt_toolbar_ext_button {{ padding: 0; background: {button};
     qproperty-icon: url("{more-bar}"); }}
+QToolButton[fold="true"] {{ text-align: left; padding: 4px 0; color: {text};
+    background: transparent; }}
 QToolButton:focus {{ border-color: {accent}; }}
 QToolButton[popupMode="2"] {{ padding-right: 22px; }}
 QToolButton::menu-indicator {{ image: url("{arrow-down}"); width: 10px; height: 10px;

@@ -85,7 +85,7 @@ class Display:
     """
 
     colours: str = choice("viridis", tr("Colours"), COLOUR_MAPS)
-    colour_by: str = choice("depth", tr("3D shows"), QUANTITIES)
+    colour_by: str = choice("depth", tr("Colour by"), QUANTITIES)
     locked: bool = switch(
         False, tr("Range"), tr("Lock"),
         tr("Keep the colour range. If unlocked, it follows the deepest press"), "K",
@@ -100,7 +100,7 @@ class Display:
         0.0, tr("Contours"), 0.0, LIMITS_MM[1], tr(" mm"), 2, step=0.05, none=tr("none")
     )
     relief: bool = switch(True, "", tr("Shade the height map"))
-    exaggeration: float = number(1.0, tr("Stretch"), 1.0, 8.0, decimals=1, slider=True)
+    exaggeration: float = number(3.0, tr("Stretch"), 1.0, 8.0, decimals=1, slider=True)
     azimuth_deg: float = number(315.0, tr("Light"), 0.0, 359.0, slider=True)
     elevation_deg: float = number(45.0, tr("Elevation"), 15.0, 85.0, slider=True)
 

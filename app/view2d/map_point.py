@@ -40,19 +40,14 @@ class Reading:
     depth_sd_mm: float
     flags: int
 
-    def text(self) -> str:
-        """Return the values as one line of text."""
-        parts = [
-            tr("x {x:.2f} mm").format(x=self.x_mm),
-            tr("y {y:.2f} mm").format(y=self.y_mm),
-            tr("depth {d}").format(d=in_unit(self.depth_mm)),
-            tr("slope {s:.1f}°").format(s=self.slope_deg),
-        ]
+    def detail(self) -> str:
+        """Return what belongs to the depth: deviation, position, slope, flags."""
+        where = tr("at x {x:.2f}, y {y:.2f} mm; slope {s:.1f}°")
+        parts = [where.format(x=self.x_mm, y=self.y_mm, s=self.slope_deg)]
         if math.isfinite(self.depth_sd_mm):
-            parts.append(tr("± {u:.1f} um (1 sd)").format(u=1e3 * self.depth_sd_mm))
-        words = [word for flag, word in flag_words().items() if self.flags & flag.value]
-        parts.append(", ".join(words) if words else tr("no flags"))
-        return "    ".join(parts)
+            parts.insert(0, tr("± {d} (1 sd)").format(d=in_unit(self.depth_sd_mm)))
+        parts.extend(word for flag, word in flag_words().items() if self.flags & flag.value)
+        return "\n".join(parts)
 
 
 def read_at(heightmap: HeightMap, x_mm: float, y_mm: float) -> Reading | None:

@@ -27,6 +27,8 @@ from gelpolight_core.translation import tr
 
 KEY_DEG = 6.0
 KEY_ZOOM = 1.15
+SHADOW_MM = 1.5
+"""Hollows of about this size are shaded in a frozen image: the size of a deep press."""
 
 
 @contextmanager
@@ -78,6 +80,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self.drawings = 0
         self._pressed: QPointF | None = None
         self._fitted = True
+        self._still = self._polished = False
         self._finished = False
         # VTK draws only inside a paint event. At any other time its request becomes a paint event.
         self.iren.interactor.EnableRenderOff()
@@ -94,14 +97,19 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self._plane: object | None = None
         self._settle = QTimer(self, singleShot=True, interval=250)
         self._settle.timeout.connect(self._refine)
+        self.enable_anti_aliasing("fxaa")
         self._follow_theme()
 
     # Called by the panel
 
-    def show_surface(self, surface: Surface) -> None:
-        """Show the surface of a frame."""
+    def show_surface(self, surface: Surface, *, still: bool = False) -> None:
+        """Show the surface of a frame. One that stays is drawn with soft shadows."""
         self._settle.stop()
+        self._polish(False)
         self.scene.show_surface(surface)
+        self._still = still
+        if still:
+            self._settle.start()
         self.update()
 
     def view_from(self, view: str) -> None:
@@ -195,6 +203,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
     def _on_hand(self, *_: object) -> None:
         self._fitted = False
         self._settle.stop()
+        self._polish(False)
         self.scene.coarsen()
 
     def _on_hand_off(self, *_: object) -> None:
@@ -202,7 +211,16 @@ class Interactor(QtInteractor):  # type: ignore[misc]
 
     def _refine(self) -> None:
         self.scene.refine()
+        self._polish(self._still)
         self.update()
+
+    def _polish(self, on: bool) -> None:
+        """Draw shadows in hollows, which takes too long for live images."""
+        if on and not self._polished:
+            self.enable_ssao(radius=SHADOW_MM, bias=0.05, kernel_size=64)
+        elif self._polished and not on:
+            self.disable_ssao()
+        self._polished = on
 
     def _on_plane(self, normal: object, origin: object) -> None:
         self.scene.clip_by((np.asarray(normal, float), np.asarray(origin, float)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QInputDialog, QMenu
 
 from app.services.settings import Settings
@@ -18,6 +19,13 @@ if TYPE_CHECKING:
     from app.view3d.panel import SurfacePanel
 
 VIEWPOINTS = "viewpoints"
+DIRECTIONS = {
+    "isometric": (tr("Isometric"), "Ctrl+Shift+O"),
+    "top": (tr("Top"), "Ctrl+Shift+T"),
+    "front": (tr("Front"), "Ctrl+Shift+F"),
+    "side": (tr("Side"), "Ctrl+Shift+S"),
+}
+"""The label of each view direction, and its key."""
 
 
 STYLES = {f.name: f.metadata["text"] for f in fields(Style) if f.metadata}
@@ -36,15 +44,12 @@ class ViewMenu(QMenu):
 
     Signals
     -------
-    colour_chosen(str)
-        Another quantity was selected for the colours.
     reference_wanted(str)
         ``hold``, ``load`` or ``clear`` the reference of the difference.
     copy_wanted(), image_wanted(), movie_wanted(), mesh_wanted()
         Copy the image, or save an image, a movie, or the mesh.
     """
 
-    colour_chosen = Signal(str)
     reference_wanted = Signal(str)
     copy_wanted = Signal()
     image_wanted = Signal()
@@ -55,14 +60,16 @@ class ViewMenu(QMenu):
         super().__init__(panel)
         self.setObjectName("view3d.options")
         self._panel, self._settings = panel, settings
+        directions = self.addMenu(tr("View from"))
+        for name, (text, keys) in DIRECTIONS.items():
+            look = partial(panel.view_from, name)
+            self._add(name, f"{text}\t{keys}", lambda _on, look=look: look(), directions)
         for name, text in STYLES.items():
             action = self._add(f"style_{name}", text, lambda on, name=name: self._set(name, on))
             action.setCheckable(True)
         self.clip_action = self._add("clip", tr("Clip by a plane"), self._clip)
         self.clip_action.setCheckable(True)
         self.addSeparator()
-        self._colours = self.addMenu(tr("Colour by"))
-        self._group = QActionGroup(self)
         self._reference = self.addMenu(tr("Reference for differences"))
         for name, text in (
             ("hold", tr("Use the current frame")),
@@ -85,12 +92,13 @@ class ViewMenu(QMenu):
         ):
             self._add(name, text, lambda _on, signal=signal: signal.emit())
         self._action("mesh").setVisible(False)
+        self._reference.menuAction().setVisible(False)
         self.aboutToShow.connect(self._follow)
-        self.set_colours({}, "")
 
     def offer_mesh(self) -> None:
-        """Offer the export of the mesh. The page handles ``mesh_wanted``."""
+        """Offer differences and the export of the mesh, which the page handles."""
         self._action("mesh").setVisible(True)
+        self._reference.menuAction().setVisible(True)
 
     def _add(
         self, name: str, text: str, slot: Callable[[bool], object], menu: QMenu | None = None
@@ -99,22 +107,6 @@ class ViewMenu(QMenu):
         action.setObjectName(f"view3d.{name}")
         action.triggered.connect(slot)
         return action
-
-    def set_colours(self, names: dict[str, str], chosen: str) -> None:
-        """Offer these quantities for the colours."""
-        self._colours.clear()
-        for action in self._group.actions():
-            self._group.removeAction(action)
-        for key, text in names.items():
-            action = self._add(
-                f"colour_{key}", text, lambda _on, key=key: self.colour_chosen.emit(key),
-                self._colours,
-            )  # fmt: skip
-            action.setCheckable(True)
-            action.setChecked(key == chosen)
-            self._group.addAction(action)
-        self._colours.menuAction().setVisible(bool(names))
-        self._reference.menuAction().setVisible("difference" in names)
 
     def _follow(self) -> None:
         """Update the check marks, and enable what can be used now."""

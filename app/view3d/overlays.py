@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+import math
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from pyvista.plotting import BasePlotter
-from vtkmodules.vtkCommonCore import vtkStringArray
 
 from app.view3d.picking import PIN_NAMES, along
 from app.view3d.sheet import Sheet
-from app.view3d.style import Ink, Style, ticks
+from app.view3d.style import Ink, Style
 from app.view3d.surface import ColourScale, Surface, SurfaceLine
 from app.widgets.units import length_text, round_length_mm
 from gelpolight_core.translation import tr
@@ -23,6 +22,8 @@ CURSOR = "white"
 PIN = "#ffb02e"
 CUT = "#ff5ac8"
 SOLID = "#5fd0ff"
+LIFT = 0.001
+"""Lines lie above the surface by this share of its width, so that shadows do not cover them."""
 
 
 def points_on(surface: Surface, points_mm: Array) -> Array:
@@ -40,6 +41,7 @@ def lines_mesh(surface: Surface, lines: tuple[SurfaceLine, ...]) -> pv.PolyData 
     firsts = np.cumsum([0, *(len(points) for points, _ in parts)])
     cells = [np.insert(np.arange(a, b), 0, b - a) for a, b in itertools.pairwise(firsts)]
     points = np.concatenate([points for points, _ in parts]).astype(np.float32)
+    points[:, 2] += LIFT * np.ptp(surface.x_mm)
     mesh = pv.PolyData(points, lines=np.concatenate(cells))
     mesh.cell_data["rgb"] = np.array([pv.Color(c).int_rgb for _, c in parts], np.uint8)
     return mesh
@@ -120,53 +122,71 @@ def draw_solid(plotter: Plotter, solid: pv.PolyData | None, exaggeration: float)
 
 Box = tuple[float, float, float, float, float, float]
 Plotter = BasePlotter
-TICKS = 8  # with at most ten, VTK places labels where we want them
 FONT = 11
 
 
-@dataclass(frozen=True, slots=True)
-class Axes:
-    """Ticks of the axes box in mm, sensor frame, and the box in the scene's frame."""
-
-    x_mm: tuple[float, ...]
-    y_mm: tuple[float, ...]
-    depth_mm: tuple[float, ...]
-    box: Box
-
-
-def axes_of(surface: Surface, exaggeration: float) -> Axes:
-    """Return axes with round ticks that contain a surface. They follow its range, not its depth."""
-    x = ticks(float(surface.x_mm.min()), float(surface.x_mm.max()), TICKS)
-    y = ticks(float(surface.y_mm[0]), float(surface.y_mm[-1]), TICKS)
+def box_of(surface: Surface, exaggeration: float) -> Box:
+    """Return the box of a surface in the scene's frame. It follows its range, not its depth."""
+    left, right = float(surface.x_mm.min()), float(surface.x_mm.max())
+    near, far = -float(surface.y_mm[-1]), -float(surface.y_mm[0])
     low, high = surface.range_mm
-    # A low box has space for few depth ticks.
-    height = exaggeration * (high - min(low, 0.0)) / (x[-1] - x[0])
-    most = 2 if height < 0.15 and low >= 0.0 else 3 if height < 0.3 else TICKS
-    depth = ticks(min(low, 0.0), high, most)
-    box = (x[0], x[-1], -y[-1], -y[0], exaggeration * depth[0], exaggeration * depth[-1])
-    return Axes(x, y, depth, box)
+    return left, right, near, far, exaggeration * min(low, 0.0), exaggeration * high
 
 
-def draw_axes(plotter: Plotter, axes: Axes, style: Style, ink: Ink) -> None:
-    """Draw the axes box with true values: the sensor's y, and depth without exaggeration."""
-    plotter.remove_bounds_axes()
+def round_values(low: float, high: float, most: int) -> Array:
+    """Return round values with equal steps inside a range, about `most` of them."""
+    step = round_length_mm((high - low) / most)
+    first, last = math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
+    return np.asarray(step * np.arange(first, last + 1))
+
+
+def draw_axes(plotter: Plotter, box: Box, style: Style, ink: Ink) -> None:
+    """Draw axes with true values: the sensor's y, and depth without exaggeration.
+
+    Labels are upright, and one that would cover another one is left out.
+    """
+    for name in ("axes", "axes-labels"):
+        plotter.remove_actor(name, render=False)
     if not style.axes:
         return
-    actor = plotter.show_bounds(
-        bounds=axes.box, grid="back", location="outer", xtitle=tr("x [mm]"), ytitle=tr("y [mm]"),
-        ztitle=tr("depth [mm]"), font_size=FONT, bold=False, color=ink.text, ticks="outside",
-        padding=0.0, render=False,
+    ends, points, texts = axes_marks(box, style.exaggeration)
+    plotter.add_mesh(
+        pv.line_segments_from_points(ends), color=ink.text, lighting=False,
+        line_width=1, name="axes", reset_camera=False, render=False,
     )  # fmt: skip
-    # VTK chooses its own round values and cannot count down. With a given number of intervals it
-    # puts ticks where we want them; the labels show the values.
-    rising = (axes.x_mm, axes.y_mm[::-1], axes.depth_mm)
-    for number, (name, values) in enumerate(zip("XYZ", rising, strict=True)):
-        getattr(actor, f"Set{name}AxisRange")(0.0, float(len(values) - 1))
-        getattr(actor, f"Get{name}AxesGridlinesProperty")().SetColor(pv.Color(ink.grid).float_rgb)
-        labels = vtkStringArray()
-        for value in values:
-            labels.InsertNextValue(f"{value:.4g}")
-        actor.SetAxisLabels(number, labels)
+    plotter.add_point_labels(
+        points, texts, name="axes-labels", shape=None, show_points=False,
+        font_size=FONT + 1, text_color=ink.text, bold=False, justification_horizontal="center",
+        justification_vertical="center", reset_camera=False, render=False,
+    )  # fmt: skip
+
+
+def axes_marks(box: Box, exaggeration: float) -> tuple[Array, Array, list[str]]:
+    """Return the lines of the axes with their ticks, and the places and texts of the labels."""
+    left, right, near, far, low, high = box
+    x, y = round_values(left, right, 6), round_values(near, far, 6)
+    depth = round_values(low / exaggeration, high / exaggeration, 2)
+    tick = 0.015 * (right - left)
+    # Start and end of each axis, direction of its ticks, places and values of these, title.
+    axes = (
+        ((left, near, 0.0), (right, near, 0.0), (0.0, -tick, 0.0), x, x, tr("x (mm)")),
+        ((left, near, 0.0), (left, far, 0.0), (-tick, 0.0, 0.0), y, -y, tr("y (mm)")),
+        ((right, near, low), (right, near, high), (tick, 0.0, 0.0),
+         exaggeration * depth, depth, tr("depth (mm)")),
+    )  # fmt: skip
+    ends, points, texts = list[Array](), list[Array](), list[str]()
+    for number, (first, last, out, places, values, title) in enumerate(axes):
+        start, end, away = np.array(first), np.array(last), np.array(out)
+        ends += [start, end]
+        points.append(0.5 * (start + end) + 6.0 * away)
+        texts.append(title)
+        for place, value in zip(places, values, strict=True):
+            at = start.copy()
+            at[number] = place
+            ends += [at, at + away]
+            points.append(at + 3.0 * away)
+            texts.append(f"{value + 0.0:.4g}")
+    return np.array(ends), np.array(points), texts
 
 
 def draw_scale(
@@ -190,7 +210,7 @@ def draw_scale(
     title = scale.title.replace(" [", "\n[")  # the unit on a line of its own, for narrow views
     bar = plotter.add_scalar_bar(
         title, mapper=mapper, vertical=True, n_labels=0 if scale.names else 5,
-        fmt="{:.4g}", color=ink.text, position_x=0.015, position_y=0.42, width=0.17, height=0.54,
+        fmt="{:.4g}", color=ink.text, position_x=0.015, position_y=0.55, width=0.14, height=0.42,
         title_font_size=FONT + 1, label_font_size=FONT + 1, unconstrained_font_size=True,
         render=False,
     )  # fmt: skip

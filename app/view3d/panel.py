@@ -14,7 +14,6 @@ from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QStackedWidget,
-    QToolBar,
     QToolButton,
     QWidget,
 )
@@ -41,16 +40,6 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 MODULE = "app.view3d.interactor"  # imports pyvista, which takes a second, when 3D is first shown
 HINT_SEEN = "view3d_hint"
-
-
-def view_names() -> dict[str, tuple[str, str]]:
-    """Return the label of each view direction, and its key."""
-    return {
-        "isometric": (tr("Isometric"), "Ctrl+Shift+O"),
-        "top": (tr("Top"), "Ctrl+Shift+T"),
-        "front": (tr("Front"), "Ctrl+Shift+F"),
-        "side": (tr("Side"), "Ctrl+Shift+S"),
-    }
 
 
 class FlatMap(Protocol):
@@ -85,6 +74,8 @@ class SurfacePanel(QWidget):
         Why there is no 3D. Empty if there is.
     menu : ViewMenu
         Opened by the button and by a right click.
+    tools : QWidget
+        The buttons above the view. A page may put them elsewhere.
 
     Signals
     -------
@@ -119,23 +110,17 @@ class SurfacePanel(QWidget):
         self._stack.addWidget(self._words)
         self._why = named(PlainLabel(wrap=True), "view3d.reason", tr("Why 3D is not available"))
         self._why.hide()
-        # A toolbar, because it has an arrow where it is too narrow for all buttons.
-        bar = named(QToolBar(), "view3d.bar", tr("View directions"))
-        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        for name, (text, keys) in view_names().items():
-            bar.addWidget(self._button(name, text, text, keys))
-        bar.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
-        row = hbox((bar, 1), margins=(4, 2, 4, 2), spacing=2)
+        self.tools = named(QWidget(), "view3d.bar", tr("View directions"))
+        row = hbox(of=self.tools, margins=0, spacing=0)
+        row.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
         button = named(QToolButton(), "view3d.menu", tr("3D menu"), tr("Options of the 3D view"))
-        button.setText(tr("3D options"))
+        button.setText(tr("Options"))
         button.setAutoRaise(True)
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setMenu(self.menu)
         row.addWidget(button)
-        self._tools = QWidget()
-        self._tools.setLayout(row)
         self._hint = self._make_hint()
-        vbox(self._tools, self._why, (self._stack, 1), self._hint, of=self, margins=0, spacing=0)
+        vbox(self.tools, self._why, (self._stack, 1), self._hint, of=self, margins=0, spacing=0)
 
     def _button(self, name: str, text: str, tip: str, key: str = "") -> QToolButton:
         button = named(QToolButton(), f"view3d.{name}", text, tip, key)
@@ -168,14 +153,14 @@ class SurfacePanel(QWidget):
         if self.view is not None:
             self.view.view_from(name)
 
-    def show_surface(self, surface: Surface | None) -> None:
-        """Show the surface of a frame. None: there is none."""
+    def show_surface(self, surface: Surface | None, *, still: bool = False) -> None:
+        """Show the surface of a frame, live or `still`. None: there is none."""
         self._last = surface
         if surface is None:
             self._stack.setCurrentWidget(self._words)
             self.set_pins(())
         elif self.view is not None:
-            self.view.show_surface(surface)
+            self.view.show_surface(surface, still=still)
             self._stack.setCurrentWidget(self._frame)
         elif self._flat is not None:
             self._flat.set_image(surface.texture, surface.extent_mm)
@@ -299,7 +284,7 @@ class SurfacePanel(QWidget):
             tr("Shown as a shaded map, because 3D is not available. {reason}").format(reason=reason)
         )
         self._why.show()
-        self._tools.hide()
+        self.tools.setEnabled(False)
         self._flat = self._make_flat()
         self._flat.pointed.connect(self.pointed)
         self._stack.addWidget(self._flat)

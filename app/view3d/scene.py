@@ -6,8 +6,6 @@ depth times the exaggeration. From the top, the surface lies as in the camera's 
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
@@ -19,7 +17,7 @@ from app.view3d.overlays import (
     Box,
     Overlay,
     Plotter,
-    axes_of,
+    box_of,
     cut_edge,
     draw_axes,
     draw_note,
@@ -35,8 +33,8 @@ from app.view3d.sheet import SheetActor
 from app.view3d.style import VIEWS, Ink, Style, Viewpoint
 from app.view3d.surface import LIVE_NODES, Surface, SurfaceLine
 
-# Margins for the labels of the axes: left and right, above and below.
-MARGIN_PX = np.array([90.0, 50.0])
+# Around the surface, left and right, above and below: the labels of the axes reach into it.
+MARGIN_PX = np.array([48.0, 48.0])
 
 Array = NDArray[np.float64]
 Clip = tuple[Array, Array]
@@ -127,9 +125,8 @@ class Scene:
         shown = (surface.extent_mm, surface.range_mm, colours, style, self._ink)
         if shown == self._explained:
             return
-        axes = axes_of(surface, style.exaggeration)
-        self._explained, self.box = shown, axes.box
-        draw_axes(self._plotter, axes, style, self._ink)
+        self._explained, self.box = shown, box_of(surface, style.exaggeration)
+        draw_axes(self._plotter, self.box, style, self._ink)
         draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
         draw_note(self._plotter, style, self._ink)
         draw_scale_bar(self._plotter, self.box, style, self._ink)
@@ -195,21 +192,48 @@ class Scene:
         self.fit()
 
     def fit(self) -> None:
-        """Show the whole surface with its axes from the current camera direction."""
-        if not self.box:
+        """Show the whole surface from the current camera direction, as large as possible."""
+        surface = self.surface
+        if surface is None:
             return
+        ends = surface.x_mm[:, [0, -1]].ravel()
+        rims = np.column_stack([ends, -np.repeat(surface.y_mm, 2)])
+        points = np.vstack([np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]])
+        points = np.insert(points, 3, 1.0, axis=1)
+        self._plotter.renderer.reset_camera(render=False, bounds=self.box)
+        size = np.maximum(self._plotter.window_size, 1)  # 0 before the first paint
+        filled = np.clip(1.0 - 2.0 * MARGIN_PX / size, 0.4, 0.95)
+        # VTK fits a sphere around the box. The rim of the surface fits closer; as moving and
+        # zooming change the perspective, twice.
+        for _ in range(2):
+            low, high = self._seen(points)
+            self._pan(0.5 * (low + high))
+            low, high = self._seen(points)
+            self.zoom(float(min(filled / (0.5 * (high - low)))))
+
+    def _seen(self, points: Array) -> tuple[Array, Array]:
+        """Return where points (N, 4) of the scene begin and end in the window, -1 to 1."""
         renderer, camera = self._plotter.renderer, self._plotter.camera
-        renderer.reset_camera(render=False, bounds=self.box)
-        # VTK fits a sphere around the box. Fitting the box itself shows it larger.
-        corners = np.array(list(product(self.box[:2], self.box[2:4], self.box[4:])))
         matrix = pv.array_from_vtkmatrix(
             camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
         )
-        seen = np.insert(corners, 3, 1.0, axis=1) @ matrix.T
-        reach = np.abs(seen[:, :2] / seen[:, 3:]).max(axis=0)
-        size = np.maximum(self._plotter.window_size, 1)  # 0 before the first paint
-        filled = np.clip(1.0 - 2.0 * MARGIN_PX / size, 0.4, 0.9)
-        self.zoom(float(min(filled / reach)))
+        seen = points @ matrix.T
+        shares = seen[:, :2] / seen[:, 3:]
+        return shares.min(axis=0), shares.max(axis=0)
+
+    def _pan(self, by: Array) -> None:
+        """Move the camera sideways, so that this place of the window, -1 to 1, is in the middle."""
+        camera = self._plotter.camera
+        half = camera.distance * np.tan(np.radians(0.5 * camera.view_angle))
+        if camera.parallel_projection:
+            half = camera.parallel_scale
+        along = np.array(camera.direction)
+        right = np.cross(along, camera.up)
+        right /= np.linalg.norm(right)
+        aspect = self._plotter.renderer.GetTiledAspectRatio()
+        move = half * (by[0] * aspect * right + by[1] * np.cross(right, along))
+        camera.position = np.array(camera.position) + move
+        camera.focal_point = np.array(camera.focal_point) + move
 
     def zoom(self, factor: float) -> None:
         """Zoom by a factor."""

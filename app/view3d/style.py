@@ -98,32 +98,3 @@ def _viewpoint(kept: dict[str, object]) -> Viewpoint:
     if any(len(v) != 3 or not all(map(math.isfinite, v)) for v in vectors) or not scale > 0.0:
         raise ValueError("not a viewpoint")
     return Viewpoint(*vectors, bool(kept["parallel"]), scale)  # type: ignore[arg-type]
-
-
-_FACTORS = (0.1, 0.2, 0.25, 0.4, 0.5, 1.0, 2.0, 2.5, 4.0, 5.0, 10.0, 20.0)
-
-
-def ticks(low: float, high: float, most: int) -> tuple[float, ...]:
-    """Return round values with equal steps, from at most `low` to at least `high`.
-
-    Parameters
-    ----------
-    low, high : float
-        Range to cover. `high` is greater than `low`.
-    most : int
-        Maximum number of values, 3 or more; 2 if `low` is 0.
-
-    Returns
-    -------
-    values : tuple of float
-        The values that extend least beyond the range, and of these as many as allowed.
-    """
-    power = 10.0 ** math.floor(math.log10(high - low))
-    found = []
-    for step in (power * factor for factor in _FACTORS):
-        first, last = math.floor(low / step + 1e-6), math.ceil(high / step - 1e-6)
-        if 1 <= last - first < most:
-            reach = step * (last - first) / (high - low)
-            found.append((round(reach, 6), first - last, step, first, last))
-    _, _, step, first, last = min(found)
-    return tuple(round(step * k, 12) for k in range(first, last + 1))

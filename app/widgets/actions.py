@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
+from app.widgets.naming import named
 
 
 def make_action(
@@ -52,3 +53,23 @@ def make_action(
     action.triggered.connect(lambda _checked=False: slot())
     parent.addAction(action)
     return action
+
+
+def action_button(action: QAction, *, primary: bool = False) -> QPushButton:
+    """Return a push button for an action, with its text, state and tooltip; it follows them."""
+    button = named(QPushButton(), f"{action.objectName()}.button", action.text().replace("&", ""))
+    button.setProperty("primary", primary)
+    button.clicked.connect(lambda _=False: action.trigger())
+
+    def follow() -> None:
+        button.setText(action.text())
+        button.setIcon(action.icon())
+        button.setEnabled(action.isEnabled())
+        button.setCheckable(action.isCheckable())
+        button.setChecked(action.isChecked())
+        button.setToolTip(action.toolTip())
+
+    action.changed.connect(follow)
+    action.toggled.connect(lambda _on: follow())
+    follow()
+    return button

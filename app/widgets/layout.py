@@ -94,6 +94,16 @@ def scroll_area(inside: QWidget) -> QScrollArea:
     return area
 
 
+def side_panel(parts: tuple[Any, ...], below: tuple[Any, ...], *, width: int = 280) -> QWidget:
+    """Return a panel of fixed width: parts that scroll, and below them parts at a fixed place."""
+    panel, inside, foot = QWidget(), QWidget(), QWidget()
+    vbox(*parts, None, of=inside, margins=(16, 12, 12, 12), spacing=12)
+    vbox(*below, of=foot, margins=(16, 8, 16, 12), spacing=8)
+    vbox((scroll_area(inside), 1), foot, of=panel, margins=0, spacing=0)
+    panel.setFixedWidth(width)
+    return panel
+
+
 def splitter(
     orientation: Qt.Orientation, *parts: tuple[QWidget, int], sizes: tuple[int, ...] = ()
 ) -> QSplitter:

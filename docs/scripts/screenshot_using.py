@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QSpinBox
 from screenshot_operator import Operator
 
 from app.inspect.page import InspectPage
+from app.inspect.views import Layout
 from app.measure.page import MeasurePage
 from app.sources.bench import Bench
 
@@ -36,7 +37,7 @@ def inspect(operator: Operator) -> None:
     operator.until(lambda: page.views.surface.view is not None, "the 3D view")
     operator.pause(6.0)
     operator.shot("inspect")
-    page.views.docks["quality"].raise_()
+    page.views.arrange(Layout("quality"))
     choice = page.views.quality.findChild(QComboBox, "inspect.quality.what")
     assert choice is not None
     choice.setCurrentIndex(choice.findData("uncertainty"))
@@ -48,7 +49,7 @@ def inspect(operator: Operator) -> None:
     operator.pause(2.0)
     operator.shot("inspect-standing")
     page.pause(False)
-    page.views.docks["camera"].raise_()
+    page.views.arrange(Layout())
 
 
 def recording(operator: Operator) -> None:

@@ -3,7 +3,7 @@
     xvfb-run -a -s "-screen 0 1920x1200x24" python tests/long/inspect_figures.py \
         --calibration sensor.gplcal --seconds 60
     ... --effort fast                    another effort than balanced
-    ... --views height,camera            the views that are shown; all others are hidden
+    ... --stage four --section           what is shown: one of STAGES of app/inspect/views.py
 
 The calibration has to be one of the virtual sensor; its image size is the camera's. An object is
 dragged about. Printed are the frames per second made and shown; how often the surface was drawn for
@@ -26,6 +26,7 @@ from PySide6.QtWidgets import QApplication
 from app.context.context import AppContext
 from app.desktop import make_application, make_context
 from app.inspect.page import InspectPage
+from app.inspect.views import Layout
 from app.live.frame_results import Shown
 from app.sources.bench import PRESSED, Bench
 from app.theme import theme
@@ -49,8 +50,7 @@ class Measurement:
         context.source.choose_virtual_sensor()
         self.page = InspectPage(context=context)
         self.page.resize(*SIZE)
-        for name, dock in self.page.views.docks.items():
-            dock.setVisible(name in options.views.split(","))
+        self.page.views.arrange(Layout(options.stage, section=options.section))
         self._lateness, self._began_s = Lateness(), time.monotonic()
         self._depth_ms: list[float] = []
         self._ages_ms: list[float] = []
@@ -118,7 +118,8 @@ def main() -> None:
     parser.add_argument("--effort", default="balanced")
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--warm-up", type=float, default=12.0, help="seconds not measured")
-    parser.add_argument("--views", default="surface,height,camera")
+    parser.add_argument("--stage", default="four")
+    parser.add_argument("--section", action="store_true")
     options = parser.parse_args()
     application = make_application()
     theme.apply(application, "light")

@@ -81,7 +81,9 @@ def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
     fake.plugged = False
     context.cameras.driver = FakeDriver(fake)
     button.list_cameras()
-    (none,) = [action for action in button.menu().actions() if action.objectName() == "state.camera.0"]
+    (none,) = [
+        action for action in button.menu().actions() if action.objectName() == "state.camera.0"
+    ]
     assert (none.text(), none.isEnabled()) == ("No camera connected", False)
 
 

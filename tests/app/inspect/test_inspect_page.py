@@ -17,6 +17,7 @@ from pytestqt.qtbot import QtBot
 from app.context.context import AppContext
 from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
+from app.inspect.views import Layout
 from app.live.zero import FRAMES, zero_calibration
 from app.sources.processor import Outcome
 from app.view3d.saving import MovieChoice
@@ -80,7 +81,7 @@ def test_the_virtual_sensor_without_a_calibration_can_be_calibrated_by_one_click
     text, button = _advice(page)
     assert "Only" in text or "only" in text
     assert "Calibrate the virtual sensor now" in button.text()
-    assert page.views.docks["bench"].isVisible()
+    assert page.views.bench.isVisible()
 
 
 def test_depth_is_shown_in_3d_once_for_each_frame(
@@ -226,13 +227,13 @@ def test_a_frozen_image_ends_with_its_source(
 
 def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: QtBot) -> None:
     page.enter()
-    page.views.docks["normals"].hide()
-    page.views.docks["section"].hide()
+    page.views.arrange(Layout("four", section=True))
+    page.views.arrange(Layout("normals", section=True, maximised=True))
     page.leave()
     again = InspectPage(context=context)
     qtbot.addWidget(again)
-    assert again.views.docks["normals"].isHidden()
-    assert not again.views.docks["height"].isHidden()
+    assert again.views.layout_shown == Layout("normals", section=True)
+    assert not again.views.normals.isHidden() and again.views.height.isHidden()
     again.may_close()
 
 
@@ -362,7 +363,6 @@ def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstruct
     assert last is not None and last.raw is not None and last.heightmap is not None
     assert last.processed[0] in line.text()
     assert not np.array_equal(last.raw.depth_mm, last.heightmap.depth_mm)
-    assert "(processed)" in page.views.docks["surface"].windowTitle()
     mask = page.findChild(QComboBox, "inspect.processing.mask")
     assert mask is not None
     mask.setCurrentIndex(mask.findData("outside"))
@@ -372,7 +372,6 @@ def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstruct
     qtbot.waitUntil(lambda: not page.processed.isVisible(), timeout=WAIT_MS)
     assert mask.currentData() == "none" and not page.views.region._roi.isVisible()
     assert page.depth.last is not None and page.depth.last.heightmap is last.raw
-    assert "(processed)" not in page.views.docks["surface"].windowTitle()
 
 
 def test_the_held_reference_is_subtracted_as_it_was_reconstructed(

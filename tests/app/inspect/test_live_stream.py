@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.inspect.page import InspectPage
+from app.inspect.views import Layout
 from app.widgets.question import Question
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -26,8 +27,7 @@ WAIT_MS = 60_000
 @pytest.fixture
 def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
     made = InspectPage(context=context)
-    for dock in made.views.docks.values():
-        dock.hide()  # the stream alone makes depth and normals necessary
+    made.views.arrange(Layout("camera"))  # the stream alone makes depth and normals necessary
     yield made
     made.leave()
     made.may_close()

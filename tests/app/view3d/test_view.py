@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import weakref
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from pytestqt.qtbot import QtBot
 from app.services.jobs import Jobs
 from app.services.settings import Settings
 from app.view2d.display import colour_table
+from app.view3d.overlays import axes_marks
 from app.view3d.panel import SurfacePanel
 from app.view3d.style import VIEWS, Style
 from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, Made, flat_map, pixels
@@ -122,19 +124,18 @@ def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(
     panel: SurfacePanel, qtbot: QtBot
 ) -> None:
     panel.set_style(Style(exaggeration=5.0))
-    axes = panel.view.renderer.cube_axes_actor  # type: ignore[union-attr]
-    labels = [
-        [
-            axes.GetAxisLabels(k).GetValue(n)
-            for n in range(axes.GetAxisLabels(k).GetNumberOfValues())
-        ]
-        for k in range(3)
-    ]
-    x, y, depth = ([float(text) for text in axis if text.strip()] for axis in labels)
-    assert x == sorted(x) and y == sorted(y, reverse=True)  # y points down in the sensor's frame
-    assert min(x) <= -8.0 and max(x) >= 8.0
-    assert depth[0] == 0.0 and depth[-1] == 1.0
-    assert axes.GetBounds()[5] == pytest.approx(5.0)
+    box = panel.view.scene.box  # type: ignore[union-attr]
+    assert box[5] == pytest.approx(5.0)
+    _, points, texts = axes_marks(box, 5.0)
+    titles = [texts.index(f"{name} (mm)") for name in ("x", "y", "depth")]
+    x, y, depth = (
+        [(float(texts[n]), points[n, axis]) for n in range(first + 1, last)]
+        for axis, (first, last) in enumerate(itertools.pairwise([*titles, len(texts)]))
+    )
+    assert x and all(value == pytest.approx(place) for value, place in x)
+    assert y and all(value == pytest.approx(-place) for value, place in y), "y points down"
+    assert depth[0][0] == 0.0 and depth[-1][0] == 1.0
+    assert all(5.0 * value == pytest.approx(place) for value, place in depth)
     with_axes = _drawn(panel, qtbot)
     panel.set_style(replace(panel.style, axes=False))
     assert np.abs(with_axes.astype(int) - _drawn(panel, qtbot)).max() > 60
