@@ -20,6 +20,7 @@ from app.live.height_panel import HeightPanel
 from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Jobs
+from app.theme.icons import icon
 from app.view2d.cuts import Cut, Section
 from app.view2d.display import Display, display_as_text, display_from_text
 from app.view2d.map_view import MapView, extent_of
@@ -52,8 +53,8 @@ SECTION_PX = 230
 class Layout:
     """What is visible: one of STAGES, the section, and whether the stage has all of the page."""
 
-    stage: str = choice("two", "", {key: text for key, (text, _) in STAGES.items()})
-    section: bool = switch(False, "", "")
+    stage: str = choice("surface", "", {key: text for key, (text, _) in STAGES.items()})
+    section: bool = switch(True, "", "")
     maximised: bool = False
 
     @property
@@ -139,7 +140,7 @@ class Views(QWidget):
         )
         self._stage.setSizes([3 * SECTION_PX, 2 * SECTION_PX, SECTION_PX])
         processing = Fold("inspect.processing.fold", tr("Processing"), self.processing)
-        parts = (*top, self.display, processing, self.bench)
+        parts = (*top, self.display, self.surface.tools, processing, self.bench)
         self.inspector = named(side_panel(parts, below), "inspect.inspector", tr("Inspector"))
         column = vbox(self._make_switch(), (self._stage, 1), margins=0, spacing=0)
         row = hbox(of=self, margins=0, spacing=0)
@@ -154,7 +155,6 @@ class Views(QWidget):
         for number, (key, (text, _views)) in enumerate(STAGES.items(), start=1):
             row.addWidget(self._button(key, text, f"Alt+{number}"))
         row.addStretch(1)
-        row.addWidget(self.surface.tools)
         for key, text, keys in (
             ("section", tr("Section"), "Alt+0"),
             ("maximised", tr("Maximise"), "F"),
@@ -170,6 +170,9 @@ class Views(QWidget):
         action.setCheckable(True)
         button = named(QToolButton(), f"inspect.switch.{key}", text)
         button.setDefaultAction(action)
+        if key == "maximised":
+            action.setIcon(icon("maximise"))
+            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._switch.addButton(button)
         self._switch.setExclusive(False)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QInputDialog, QMenu
 
 from app.services.settings import Settings
@@ -44,12 +44,15 @@ class ViewMenu(QMenu):
 
     Signals
     -------
+    colour_chosen(str)
+        Another quantity was selected for the colours.
     reference_wanted(str)
         ``hold``, ``load`` or ``clear`` the reference of the difference.
     copy_wanted(), image_wanted(), movie_wanted(), mesh_wanted()
         Copy the image, or save an image, a movie, or the mesh.
     """
 
+    colour_chosen = Signal(str)
     reference_wanted = Signal(str)
     copy_wanted = Signal()
     image_wanted = Signal()
@@ -70,6 +73,8 @@ class ViewMenu(QMenu):
         self.clip_action = self._add("clip", tr("Clip by a plane"), self._clip)
         self.clip_action.setCheckable(True)
         self.addSeparator()
+        self._colours = self.addMenu(tr("Colour by"))
+        self._group = QActionGroup(self)
         self._reference = self.addMenu(tr("Reference for differences"))
         for name, text in (
             ("hold", tr("Use the current frame")),
@@ -92,7 +97,7 @@ class ViewMenu(QMenu):
         ):
             self._add(name, text, lambda _on, signal=signal: signal.emit())
         self._action("mesh").setVisible(False)
-        self._reference.menuAction().setVisible(False)
+        self.set_colours({}, "")
         self.aboutToShow.connect(self._follow)
 
     def offer_mesh(self) -> None:
@@ -107,6 +112,22 @@ class ViewMenu(QMenu):
         action.setObjectName(f"view3d.{name}")
         action.triggered.connect(slot)
         return action
+
+    def set_colours(self, names: dict[str, str], chosen: str) -> None:
+        """Offer these quantities for the colours."""
+        self._colours.clear()
+        for action in self._group.actions():
+            self._group.removeAction(action)
+        for key, text in names.items():
+            action = self._add(
+                f"colour_{key}", text, lambda _on, key=key: self.colour_chosen.emit(key),
+                self._colours,
+            )  # fmt: skip
+            action.setCheckable(True)
+            action.setChecked(key == chosen)
+            self._group.addAction(action)
+        self._colours.menuAction().setVisible(bool(names))
+        self._reference.menuAction().setVisible("difference" in names)
 
     def _follow(self) -> None:
         """Update the check marks, and enable what can be used now."""

@@ -119,6 +119,7 @@ class SurfacePanel(QWidget):
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setMenu(self.menu)
         row.addWidget(button)
+        row.addStretch(1)
         self._hint = self._make_hint()
         vbox(self.tools, self._why, (self._stack, 1), self._hint, of=self, margins=0, spacing=0)
 

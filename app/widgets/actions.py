@@ -67,7 +67,7 @@ def action_button(action: QAction, *, primary: bool = False) -> QPushButton:
         button.setEnabled(action.isEnabled())
         button.setCheckable(action.isCheckable())
         button.setChecked(action.isChecked())
-        button.setToolTip(action.toolTip())
+        button.setToolTip(plain_tip(action.toolTip()))
 
     action.changed.connect(follow)
     action.toggled.connect(lambda _on: follow())

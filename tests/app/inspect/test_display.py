@@ -35,7 +35,7 @@ def test_unreadable_display_settings_give_the_default(text: str) -> None:
 def test_the_views_restore_their_display_settings(context: AppContext) -> None:
     for restored in (False, True):
         jobs = Jobs("look")
-        views = Views(jobs, context=context)
+        views = Views(jobs, (), (), context=context)
         if restored:
             views.restore()
             assert views.display.display == CHOSEN

@@ -33,6 +33,7 @@ WAIT_MS = 60_000
 def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
     made = InspectPage(context=context)
     made.resize(1180, 760)
+    made.views.arrange(Layout("four", section=True))
     made.show()
     yield made
     made.leave()
@@ -114,7 +115,9 @@ def test_all_views_share_the_cursor_and_its_values_are_shown(
     page.views.pointed.emit(1.0, 2.0)
     readout = page.findChild(QLabel, "inspect.readout")
     assert readout is not None
-    assert "x 1.00 mm" in readout.text() and "depth" in readout.text()
+    assert "x 1.00, y 2.00 mm" in readout.text()
+    value = page.findChild(QLabel, "inspect.depth")
+    assert value is not None and value.text().endswith(" mm")
     assert page.views.height.map._lines[0].value() == 1.0
 
 

@@ -186,7 +186,8 @@ def test_a_click_on_the_orientation_widget_changes_the_view(
     qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=at)
 
     def from_the_top() -> bool:
-        x, y, z = view.scene.viewpoint.position
+        viewpoint = view.scene.viewpoint
+        x, y, z = np.subtract(viewpoint.position, viewpoint.focus)
         return abs(x) < 0.1 and abs(y) < 0.1 and z > 10.0
 
     qtbot.waitUntil(from_the_top, timeout=WAIT_MS)
