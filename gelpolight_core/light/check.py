@@ -24,24 +24,19 @@ from gelpolight_core.light.fit import (
     uneven_change,
 )
 from gelpolight_core.light.judging import (
-    PRESS,
-    PRESS_BY_INTERREFLECTION,
-    all_pressed_finding,
+    DARK,
     bad_pixel_findings,
     blur_finding,
-    compressed_finding,
     corrected,
-    dark_finding,
     dirt_finding,
     far_moved_finding,
+    fault,
     led_off_findings,
     light_findings,
     light_gain,
     may_have_moved,
     moved_finding,
     saturated_finding,
-    stranger_finding,
-    swapped_finding,
     uneven_finding,
     with_shape,
 )
@@ -55,7 +50,7 @@ from gelpolight_core.light.samples import (
     compare_samples,
     samples_of,
 )
-from gelpolight_core.light.usual import Usual
+from gelpolight_core.light.usual import ANY_LIGHT, Usual
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.sensor_calibration import SensorModel
 
@@ -64,17 +59,14 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 LEAST_UNTOUCHED = 0.12
 """Share of the field that must look as at calibration; otherwise all faults are unknown."""
-BOUNDARY_CHANGE, LEAST_RIM = 0.02, 0.5
-"""Alternatively, this share of the boundary must have at most this change of light: a contact
-covers the rest."""
+BOUNDARY_CHANGE = 0.02
+"""Alternatively, most of the boundary must have at most this change of light: a contact covers the
+rest."""
 UNJUDGED = tuple(key for key in KEYS if key not in ("other_sensor", "colour_order", "dark"))
-DARK = 0.1
-"""Share of the light at calibration below which an image is dark."""
 STRIPE_ROWS = 12
 """Rows of each frame that are searched for bad pixels; each frame uses other rows."""
 MISSING = 65535
 """Code of a float that is not finite: it counts as saturated."""
-ORDERS = tuple(order for order in permutations(range(3)) if order != (0, 1, 2))
 
 
 class HealthCheck:
@@ -86,12 +78,10 @@ class HealthCheck:
     ----------
     calibration : SensorModel
         The sensor's.
-    interreflection : float, optional
-        Of its membrane, which a press makes brighter around it.
+    usual : Usual, optional
+        How healthy presses change the light; by default in any way.
     crosstalk : (3, 3), optional
         Of the LEDs in the channels; by default none.
-    usual : Usual, optional
-        Of a closed sensor, whose light changes with each press, so that it is always corrected.
     leds_mm : (3, 3), optional
         Positions of the LEDs; without them, a press of the whole field is not told from other
         light.
@@ -100,10 +90,9 @@ class HealthCheck:
     def __init__(
         self,
         calibration: SensorModel,
+        usual: Usual = ANY_LIGHT,
         *,
-        interreflection: float = 0.0,
         crosstalk: NDArray[np.float64] | None = None,
-        usual: Usual | None = None,
         leds_mm: NDArray[np.float64] | None = None,
     ) -> None:
         self.calibration = calibration
@@ -113,7 +102,6 @@ class HealthCheck:
         self._square, self._full = np.zeros(cells), np.zeros(cells)
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
-        self._press_sd = PRESS + PRESS_BY_INTERREFLECTION * interreflection
         self._usual = usual
         mixing = np.eye(3) if crosstalk is None else crosstalk
         self._unmix = np.asarray(np.linalg.inv(mixing), np.float64)
@@ -189,31 +177,30 @@ class HealthCheck:
         pixels: list[Finding],
     ) -> Health:
         """Return the changes on the membrane of this sensor."""
-        press_sd, samples = self._press_sd, self.samples
+        usual, samples = self._usual, self.samples
         uneven = uneven_change(samples, self._change, common)
-        usual = self._usual
-        shaded = uneven_finding(uneven if usual is None else usual.uneven(uneven), press_sd)
+        shaded = uneven_finding(usual.uneven(uneven))
         if uneven is not None and shaded is not None:
             less = evened(samples, self._change, self._square, uneven.shape)
             common = common_change(samples, *less, self._full)
         if (common.values[:6:2] < DARK - 1.0).all():
-            return health_of([dark_finding()], untouched=common.share)
+            return health_of(led_off_findings(1.0 + common.values[:6:2]), untouched=common.share)
         full = float(self._full.sum() / samples.count.sum())
-        judged = common if usual is None else usual.common(common)
+        judged = usual.common(common)
         follow = whole and may_have_moved(judged)
         seen_px = movement_px(samples, raw, light) if follow else None
         moved = moved_finding(judged, seen_px)
-        changes = light_findings(judged, press_sd, 1.0 / np.iinfo(raw.dtype).max)
-        gain = light_gain(common, changes, press_sd)
-        if usual is not None:
+        changes = light_findings(judged, 1.0 / np.iinfo(raw.dtype).max)
+        gain = light_gain(judged, changes)
+        if usual.corrected:
             gain = LightGain(1.0 + common.gain, scatter_of_cells(samples, common))
-        if uneven is not None and shaded is not None:
-            changes.append(shaded)
-            known = usual is not None or not shaded.meaningless
-            gain = with_shape(gain, common, uneven) if known else None
         if moved is not None and moved.value > FOLLOWED_PX:
             # The pattern of the light has moved, too.
             changes, gain = [finding for finding in changes if finding.meaningless], None
+        elif uneven is not None and shaded is not None:
+            changes.append(shaded)
+            known = usual.corrected or not shaded.meaningless
+            gain = with_shape(gain, common, uneven) if known else None
         if (changes or moved) and self._is_pressed(common):
             return self._all_pressed(pixels)
         if gain is not None:
@@ -224,7 +211,7 @@ class HealthCheck:
         blurred = None if detail else blur_finding(judged, samples.blur_strength)
         if blurred is not None and blurred.meaningless and common.share < LEAST_START:
             # The texture is missing.
-            return health_of([stranger_finding()], untouched=common.share)
+            return health_of([fault("other_sensor", far=True)], untouched=common.share)
         # Specks that have moved or become weaker are not dirt, nor is a bad line.
         specks = detail or blurred or any(finding.key == "bad_line" for finding in pixels)
         found = [
@@ -250,10 +237,12 @@ class HealthCheck:
         grain, blocks = self.calibration.grain, self.samples.blocks
         if grain is None or not blocks.size:
             return None
-        if not untouched.any():
-            return compressed_finding(grain.in_blocks(block_grain(raw, light, blocks)), far=True)
-        seen, step = block_grain(raw, light, blocks[untouched]), light[:, -1] - light[:, -2]
-        return compressed_finding(max(grain.in_blocks(seen), grain.lost(seen, float(step.max()))))
+        if untouched.any():
+            seen, step = block_grain(raw, light, blocks[untouched]), light[:, -1] - light[:, -2]
+            lost = max(grain.in_blocks(seen), grain.lost(seen, float(step.max())))
+        else:
+            lost = grain.in_blocks(block_grain(raw, light, blocks))
+        return fault("compressed", lost, far=not untouched.any()) if lost > 1.0 else None
 
     def _is_pressed(self, common: CommonChange) -> bool:
         """Return whether a press of the whole field explains a frame better than its light."""
@@ -263,7 +252,7 @@ class HealthCheck:
         return is_pressed(self.samples, self._press, change, usable, common.change)
 
     def _all_pressed(self, pixels: list[Finding]) -> Health:
-        return health_of([all_pressed_finding(), *pixels], unknown=UNJUDGED, untouched=0.0)
+        return health_of([fault("all_pressed"), *pixels], unknown=UNJUDGED, untouched=0.0)
 
     def _boundary_fits(self) -> bool:
         """Return whether the boundary looks as at calibration, where a contact covers the rest."""
@@ -271,8 +260,8 @@ class HealthCheck:
         at_boundary = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (
             self._full == 0.0
         )
-        fits = (np.abs(self._cell_light()[at_boundary]) < BOUNDARY_CHANGE).all(axis=1)
-        return bool(fits.size and fits.mean() > LEAST_RIM)
+        change = np.abs(self._cell_light()[at_boundary]).max(axis=1)
+        return bool(change.size and np.median(change) < BOUNDARY_CHANGE)
 
     def _strange(self, raw: NDArray[Any], light: Map, share: float, whole: bool) -> Health:
         """Return why an image does not look like this sensor's membrane."""
@@ -280,20 +269,20 @@ class HealthCheck:
         if saturated is not None and saturated.meaningless:
             return health_of([saturated], untouched=share)
         seen = 1.0 + self._run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
-        if (seen < DARK).all():
-            return health_of([dark_finding()], untouched=share)
-        if off := led_off_findings(seen - 1.0):
+        if off := led_off_findings(seen):
             return health_of(off, untouched=share)
-        for order in ORDERS:
+        for order in permutations(range(3)):
             turned = self._common(np.ascontiguousarray(raw[..., order]), light[list(order)])
             if turned.share > LEAST_START:
-                return health_of([swapped_finding(order)], untouched=share)
+                letters = "".join("RGB"[k] for k in order)
+                swapped = fault("colour_order", far=True, letters=letters)
+                return health_of([swapped], untouched=share)
         compressed = self._compressed(raw, light, np.zeros(self.samples.count.size, np.bool_))
         if compressed is not None:
             return health_of([compressed], untouched=share)
         seen_px = movement_px(self.samples, raw, light) if whole else None
-        finding = stranger_finding() if seen_px is None else far_moved_finding(seen_px)
-        return health_of([finding], untouched=share)
+        far = fault("other_sensor", far=True) if seen_px is None else far_moved_finding(seen_px)
+        return health_of([far], untouched=share)
 
     def _common(self, raw: NDArray[Any], light: Map) -> CommonChange:
         s = self.samples

@@ -1,4 +1,8 @@
-"""Derive faults from the fit of a frame; the limits keep the error of the depth at 10 um."""
+"""Derive faults from the fit of a frame.
+
+A change is stated where it is larger than its standard deviation explains and costs more than a
+percent of the heights; where it costs a fifth of them, they mean nothing.
+"""
 
 from __future__ import annotations
 
@@ -23,33 +27,144 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SIGMAS, CLEAR = 3.0, 2.0
-"""Standard deviations from which on a change is stated, and from which on it is corrected."""
-PRESS, PRESS_BY_INTERREFLECTION = 0.001, 0.0015
-"""Standard deviation of the change of a channel that presses cause in the untouched membrane, and
-its part over the membrane's interreflection. 10 um of a press 1 mm deep are the cost of a change by
-0.5 %, and of one of all channels by 0.22 %."""
-LEAST_OFFSET, LEAST_LOSS, ROUNDING = 0.0002, 0.0006, 0.125
-"""More and less room light than at calibration, share of full scale; 0.0003 costs 10 um. A shallow
-press over much of the field looks like a loss of up to 0.0005. Means of four pixels that are
-rounded to whole numbers, as in images of half the size, are too large by an eighth of a step."""
+"""Standard deviations from which on a change is stated, and up to which it may explain an error."""
+GAIN, OFFSET, SHIFT_PX, BLUR_PX = 0.0022, 0.0003, 0.6, 1.4
+"""Changes that make a press of 1 mm wrong by 1 %: of all light, of room light as a share of full
+scale, of the camera's place, of the sharpness."""
+ALONE = 2.0
+"""Of a single channel, more is needed by this factor."""
+FAR = 20.0
+"""Percent of the heights from which on an error makes them meaningless; it grows with the square of
+a blur. A gain of any size is corrected."""
+ROUNDING = 0.125
+"""Means of four pixels that are rounded to whole numbers, as in images of half the size, are too
+large by an eighth of a step."""
 CORRECTABLE = ("exposure", "led_weak", "uneven")
-LEAST_SHIFT_PX = 0.5
-"""0.6 px cost 10 um."""
-LEAST_BLUR_PX = 1.0
-"""A blur of 1.4 px costs 10 um."""
-LED_OFF, LEAST_LIT = -0.8, -0.5
-"""Change of a channel below which its LED is off, and above which the others are on."""
-FAR_UNEVEN, FAR_OFFSET = 0.05, 0.005
-"""Above these, the error of the depth is a third of its value or more: such a change need not have
-the shapes that are fitted. A gain of any size is corrected to a few hundredths of a percent."""
-FAR_SHIFT_PX, FAR_BLUR_PX = 10.0, 6.0
+DARK = 0.2
+"""Share of the light at calibration below which an LED is off."""
 SATURATED_SHARE, SATURATED_CONTACT, MOSTLY_SATURATED = 0.01, 0.05, 0.3
 """Of the field, and of its part that has changed: a shiny membrane saturates in a contact, and
 less than a twentieth of it that is left out costs little."""
 DIRT_CHANGE, DIRT_SPREAD, DIRT_RUNS = -0.06, 0.12, 2
 """Dirt darkens the channels alike; a slope does not."""
 BAD_SHARE, LEAST_BAD = 1e-4, 3
-BACKGROUND = tr("set to zero or capture the background again")
+_AGAIN = tr("set to zero or capture the background again")
+_NEW_CAMERA = tr("Calibrate again, so that they are left out, or replace the camera")
+FAULTS = {
+    "dark": (
+        tr("the image is dark: the LEDs are off, or the lens is covered"),
+        tr("Switch the LEDs on and uncover the lens"),
+        "",
+    ),
+    "all_pressed": (
+        tr(
+            "nearly everything is pressed: too little untouched membrane is left to compare with, "
+            "and all heights may be wrong by one constant"
+        ),
+        tr("Press so that a part of the field stays free, also at its boundary"),
+        "",
+    ),
+    "compressed": (
+        tr("fine detail of the image is lost: it was compressed, resized or filtered"),
+        tr(
+            "Use the camera's images as at calibration: PNG or TIFF, without noise reduction or "
+            "other processing"
+        ),
+        "",
+    ),
+    "led_off": (
+        tr("the {name} LED is off"),
+        tr("Check its cable and driver, then calibrate again"),
+        "%",
+    ),
+    "led_weak": (
+        tr("the {name} LED is {n:.1f} % {how} than at calibration"),
+        tr("Let the LEDs warm up and check their current; then {again}"),
+        "%",
+    ),
+    "exposure": (
+        tr("the light is {n:.1f} % {how} than at calibration: exposure, gain or LEDs changed"),
+        tr("Restore the camera settings of the calibration, or {again}"),
+        "%",
+    ),
+    "uneven": (
+        tr("parts of the image are up to {n:.1f} % {how} than at calibration"),
+        tr("Clean the lens and check that nothing shades it; then {again}"),
+        "%",
+    ),
+    "room_light": (
+        tr("there is {n:.2f} % of full scale {more} room light than at calibration"),
+        tr("Shade the sensor as at calibration, and check the camera's black level"),
+        "%",
+    ),
+    "camera_moved": (
+        tr("the camera has moved against the membrane by {n:.1f} px"),
+        tr("Seat the camera and the elastomer as at calibration, or calibrate again"),
+        "px",
+    ),
+    "blurred": (
+        tr("the image is blurred by {n:.1f} px more than at calibration"),
+        tr("Focus the lens and clean it; calibrate again if the focus was changed"),
+        "px",
+    ),
+    "dirt": (
+        tr("something dark lies on the membrane, the window or the lens"),
+        tr("Clean the sensor and the lens"),
+        "mm2",
+    ),
+    "saturated": (
+        tr("{n:.0f} % of the membrane is saturated"),
+        tr("Restore the exposure of the calibration, and shade the sensor"),
+        "%",
+    ),
+    "bad_line": (tr("the camera has a dead or hot {kind} at {places}"), _NEW_CAMERA, ""),
+    "bad_pixels": (tr("{n:.2g} % of the pixels are dead or hot"), _NEW_CAMERA, "%"),
+    "colour_order": (
+        tr("the colours come in the order {letters} instead of RGB"),
+        tr("Set the camera's colour order as at calibration"),
+        "",
+    ),
+    "other_sensor": (
+        tr(
+            "nothing in the image looks like this sensor's untouched membrane: it is another "
+            "sensor, or nearly everything is pressed"
+        ),
+        tr(
+            "Use the calibration of the sensor that captured the image; if it is the "
+            "right one, press less of the field, and seat camera and elastomer"
+        ),
+        "",
+    ),
+}
+"""Text, remedy and unit of each fault; `n` is its size without its sign."""
+
+
+def fault(key: str, value: float = math.nan, *, far: bool = False, **facts: object) -> Finding:
+    """Return a finding of `FAULTS`; one that is `far` makes the depth meaningless.
+
+    Parameters
+    ----------
+    key : str
+        Of the fault.
+    value : float, optional
+        Its size, in its unit.
+    far : bool, optional
+        Whether the depth means nothing.
+    **facts
+        Other words of the text.
+    """
+    text, remedy, unit = FAULTS[key]
+    how = tr("brighter") if value > 0.0 else tr("darker")
+    more = tr("more") if value > 0.0 else tr("less")
+    return Finding(
+        key,
+        text.format(n=abs(value), how=how, more=more, **facts),
+        value,
+        unit,
+        verdict=Verdict.FAIL if far else Verdict.WARN,
+        remedy=remedy.format(again=_AGAIN),
+        heights=Heights.MEANINGLESS if far else Heights.DOUBTFUL,
+    )
 
 
 def may_have_moved(common: CommonChange) -> bool:
@@ -58,66 +173,56 @@ def may_have_moved(common: CommonChange) -> bool:
     return bool(large or common.values[BLUR] > 1.0)
 
 
-def light_findings(common: CommonChange, press_sd: float, step: float) -> list[Finding]:
+def light_findings(common: CommonChange, step: float) -> list[Finding]:
     """Return changes of the LEDs, the exposure and the room's light.
 
-    `press_sd` is the standard deviation of what a press changes in a channel around it, `step` the
-    share of full scale from one number of the image to the next.
+    `common` is the difference from healthy presses, and `step` the share of full scale from one
+    number of the image to the next.
     """
     found = []
-    gains, gain_sd = common.values[:6:2], common.sd[:6:2]
-    offsets, offset_sd = common.values[1:6:2], common.sd[1:6:2]
+    gains, offsets = common.values[:6:2], common.values[1:6:2]
+    gain_sd, offset_sd = common.sd[:6:2], common.sd[1:6:2]
     # A shallow wide face in much noise looks like a gain and room light that cancel each other.
-    net, net_sd = abs(float(common.gain.mean())), float(common.gain_sd.max()) / math.sqrt(3.0)
-    single = _led_finding(gains, press_sd + gain_sd)
-    if single is not None:
-        found.append(single)
-    else:
-        mean, sd = float(gains.mean()), float(gain_sd.max()) / math.sqrt(3.0)
-        of_press = press_sd / math.sqrt(3.0)
-        if abs(mean) > SIGMAS * (of_press + sd) and net > SIGMAS * (of_press + net_sd):
-            found.append(_exposure_finding(mean))
-    worst = int(np.argmax(np.abs(offsets)))
-    mean = float(offsets.mean())
-    least, least_of_one = (
-        max(LEAST_OFFSET if offset > 0.0 else LEAST_LOSS, ROUNDING * step)
-        for offset in (mean, offsets[worst])
-    )
-    common_size = least + SIGMAS * float(offset_sd.max()) / math.sqrt(3.0)
-    own_size = 2.0 * least_of_one + SIGMAS * float(offset_sd[worst])
-    size = max(abs(mean) / common_size, float(abs(offsets[worst])) / own_size)
-    if size > (1.0 if net > SIGMAS * net_sd else SIGMAS):
-        found.append(_room_finding(float(offsets[worst])))
+    clear = abs(float(common.gain.mean())) > SIGMAS * float(common.gain_sd.max())
+    mean, middle = float(gains.mean()), float(np.median(gains))
+    k = int(np.argmax(np.abs(gains - middle)))
+    change, apart = float(gains[k]), abs(float(gains[k]) - middle)
+    if apart > max(SIGMAS * float(gain_sd[k]), ALONE * GAIN):
+        if change < DARK - 1.0:
+            found.append(_led_off(k, change))
+        else:
+            found.append(fault("led_weak", 100.0 * change, name=channel_name(k)))
+    elif clear and abs(mean) > max(SIGMAS * float(gain_sd.max()), GAIN):
+        found.append(fault("exposure", 100.0 * mean))
+    k = int(np.argmax(np.abs(offsets)))
+    offset, least = float(offsets[k]), max(OFFSET, ROUNDING * step)
+    of_all = least + SIGMAS * float(offset_sd.max()) / math.sqrt(3.0)
+    of_one = ALONE * least + SIGMAS * float(offset_sd[k])
+    size = max(abs(float(offsets.mean())) / of_all, abs(offset) / of_one)
+    if size > (1.0 if clear else SIGMAS):
+        found.append(fault("room_light", 100.0 * offset, far=abs(offset) > FAR * OFFSET))
     return found
 
 
-def light_gain(
-    common: CommonChange, changes: Sequence[Finding], press_sd: float
-) -> LightGain | None:
+def light_gain(common: CommonChange, changes: Sequence[Finding]) -> LightGain | None:
     """Return the correction of the light; None if the light is the same, or too different.
 
     Parameters
     ----------
     common : CommonChange
-        The fit to the untouched membrane.
+        The difference from healthy presses.
     changes : sequence of Finding
         From :func:`light_findings`. An LED that is off has no light to correct.
-    press_sd : float
-        Standard deviation of what a press changes in a channel around it.
     """
     if any(found.meaningless for found in changes):
         return None
     gain, sd = common.gain, common.gain_sd
     if any(found.key not in CORRECTABLE for found in changes):
-        if not any(found.key in CORRECTABLE for found in changes):
-            return None
         # With room light, which remains a fault, the gain is that of the joint fit.
         gain, sd = common.values[:6:2], common.sd[:6:2]
-    mean, of_mean = abs(float(gain.mean())), math.sqrt(1.0 / 3.0)
-    sure = (np.abs(gain) > CLEAR * press_sd + SIGMAS * sd).any()
-    if not sure and mean < of_mean * (CLEAR * press_sd + SIGMAS * float(sd.max())):
-        return None
-    return LightGain(1.0 + gain, np.hypot(sd, press_sd))
+    stated = any(found.key in CORRECTABLE for found in changes)
+    small = not changes and bool((np.abs(gain) > SIGMAS * sd).any())
+    return LightGain(1.0 + gain, sd) if stated or small else None
 
 
 def with_shape(gain: LightGain | None, common: CommonChange, uneven: Uneven) -> LightGain:
@@ -137,73 +242,30 @@ def corrected(change: Finding) -> Finding:
     return replace(change, remedy=remedy, verdict=Verdict.WARN, heights=Heights.STATED)
 
 
-def uneven_finding(uneven: Uneven | None, press_sd: float) -> Finding | None:
+def uneven_finding(uneven: Uneven | None) -> Finding | None:
     """Return that the light has another distribution over the image; None where it has not."""
-    if uneven is None or abs(uneven.largest) < SIGMAS * (press_sd + uneven.sd):
+    if uneven is None or abs(uneven.largest) < max(SIGMAS * uneven.sd, GAIN):
         return None
-    text = tr("parts of the image are up to {p:.1f} % {how} than at calibration")
-    text = text.format(
-        p=100.0 * abs(uneven.largest), how=tr("darker") if uneven.largest < 0.0 else tr("brighter")
-    )
-    remedy = tr("Clean the lens and check that nothing shades it; then {again}")
-    far = abs(uneven.largest) > FAR_UNEVEN
-    largest = 100.0 * uneven.largest
-    return _graded("uneven", text, remedy.format(again=BACKGROUND), far, largest, "%")
+    far = abs(uneven.largest) > FAR * GAIN
+    return fault("uneven", 100.0 * uneven.largest, far=far)
 
 
-def _led_finding(gains: Array, sd: Array) -> Finding | None:
-    """Return the LED whose channel has changed differently from the others, or None."""
-    middle = float(np.median(gains))
-    k = int(np.argmax(np.abs(gains - middle)))
-    change = float(gains[k])
-    if abs(change - middle) < SIGMAS * float(sd[k]):
-        return None
-    if change < LED_OFF:
-        return _led_off_finding(k, change)
-    text = tr("the {name} LED is {p:.1f} % {how} than at calibration").format(
-        name=channel_name(k),
-        p=100.0 * abs(change),
-        how=tr("weaker") if change < 0.0 else tr("brighter"),
-    )
-    remedy = tr("Let the LEDs warm up and check their current; then {again}")
-    return _graded("led_weak", text, remedy.format(again=BACKGROUND), False, 100.0 * change, "%")
-
-
-def led_off_findings(change: Array) -> list[Finding]:
+def led_off_findings(light: Array) -> list[Finding]:
     """Return the LEDs that are off, where crosstalk changes the pattern of all channels.
 
     Parameters
     ----------
-    change : (3,)
-        Change of all light of each channel over that at calibration; -1 is no light.
+    light : (3,)
+        All light of each channel over that at calibration.
     """
-    off = change < LED_OFF
-    lit = change > LEAST_LIT
-    if not off.any() or not (off | lit).all():
-        return []
-    return [_led_off_finding(int(k), float(change[k])) for k in np.flatnonzero(off)]
+    off = light < DARK
+    if off.all():
+        return [fault("dark", far=True)]
+    return [_led_off(int(k), float(light[k]) - 1.0) for k in np.flatnonzero(off)]
 
 
-def _led_off_finding(k: int, change: float) -> Finding:
-    text = tr("the {name} LED is off").format(name=channel_name(k))
-    remedy = tr("Check its cable and driver, then calibrate again")
-    return _graded("led_off", text, remedy, True, 100.0 * change, "%")
-
-
-def _exposure_finding(change: float) -> Finding:
-    text = tr("the light is {p:.1f} % {how} than at calibration: exposure, gain or LEDs changed")
-    text = text.format(p=100.0 * abs(change), how=tr("brighter") if change > 0.0 else tr("darker"))
-    remedy = tr("Restore the camera settings of the calibration, or {again}")
-    return _graded("exposure", text, remedy.format(again=BACKGROUND), False, 100.0 * change, "%")
-
-
-def _room_finding(offset: float) -> Finding:
-    text = tr("room light reaches the membrane ({p:.2f} % of full scale)")
-    if offset < 0.0:
-        text = tr("there is less room light than at calibration ({p:.2f} % of full scale)")
-    text = text.format(p=100.0 * abs(offset))
-    remedy = tr("Shade the sensor as at calibration, and check the camera's black level")
-    return _graded("room_light", text, remedy, abs(offset) > FAR_OFFSET, 100.0 * offset, "%")
+def _led_off(k: int, change: float) -> Finding:
+    return fault("led_off", 100.0 * change, far=True, name=channel_name(k))
 
 
 def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> Finding | None:
@@ -216,83 +278,34 @@ def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> 
     seen_px : (float, float) or None
         Result of a search, if there was one.
     """
-    if seen_px is not None and math.hypot(*seen_px) > LEAST_SHIFT_PX:
+    if seen_px is not None and math.hypot(*seen_px) > SHIFT_PX:
         return far_moved_finding(seen_px)
-    shift = (float(common.values[SHIFT_U]), float(common.values[SHIFT_V]))
-    sd = float(np.hypot(common.sd[SHIFT_U], common.sd[SHIFT_V]))
-    size = math.hypot(*shift)
-    if size <= LEAST_SHIFT_PX + SIGMAS * sd:
+    size = math.hypot(common.values[SHIFT_U], common.values[SHIFT_V])
+    if size < max(SIGMAS * math.hypot(common.sd[SHIFT_U], common.sd[SHIFT_V]), SHIFT_PX):
         return None
-    text = tr("the camera has moved against the membrane by {n:.1f} px")
-    if size > FOLLOWED_PX:
-        text = tr("the camera has moved against the membrane by {n:.1f} px or more")
-    far = common.share < LEAST_START and size > FOLLOWED_PX
-    return _moved(text.format(n=size), size, far)
+    return fault("camera_moved", size, far=common.share < LEAST_START and size > FOLLOWED_PX)
 
 
 def far_moved_finding(shift_px: tuple[float, float]) -> Finding:
     """Return that the camera has moved, by a search."""
     size = math.hypot(*shift_px)
-    text = tr("the camera has moved against the membrane by {n:.1f} px")
-    return _moved(text.format(n=size), size, size > FAR_SHIFT_PX)
-
-
-def _moved(text: str, size: float, far: bool) -> Finding:
-    remedy = tr("Seat the camera and the elastomer as at calibration, or calibrate again")
-    return _graded("camera_moved", text, remedy, far, size, "px")
+    return fault("camera_moved", size, far=size > FAR * SHIFT_PX)
 
 
 def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
     """Return that the image is blurred; None if it is not, or if there is no texture."""
-    if not strength.size:
+    if not strength.size or common.values[BLUR] < SIGMAS * common.sd[BLUR]:
         return None
-    seen, sd = float(common.values[BLUR]), float(common.sd[BLUR])
-    sizes = (0.0, *BLURS_PX)
-    if seen < float(np.interp(LEAST_BLUR_PX, sizes, strength)) + SIGMAS * sd:
-        return None
-    size = float(np.interp(seen, strength, sizes))
-    text = tr("the image is blurred by {n:.1f} px more than at calibration").format(n=size)
-    remedy = tr("Focus the lens and clean it; calibrate again if the focus was changed")
-    return _graded("blurred", text, remedy, size > FAR_BLUR_PX, size, "px")
-
-
-def all_pressed_finding() -> Finding:
-    """Return that nothing untouched is left to compare with."""
-    text = tr(
-        "nearly everything is pressed: too little untouched membrane is left to compare with, and "
-        "all heights may be wrong by one constant"
-    )
-    remedy = tr("Press so that a part of the field stays free, also at its boundary")
-    return _graded("all_pressed", text, remedy, False)
-
-
-def compressed_finding(lost: float, *, far: bool = False) -> Finding | None:
-    """Return that fine detail of the image is lost.
-
-    Parameters
-    ----------
-    lost : float
-        Of :meth:`~gelpolight_core.image.grain.Grain.lost`.
-    far : bool, optional
-        Whether nothing of the membrane is recognised.
-    """
-    if lost <= 1.0:
-        return None
-    text = tr("fine detail of the image is lost: it was compressed, resized or filtered")
-    remedy = tr(
-        "Use the camera's images as at calibration: PNG or TIFF, without noise reduction or "
-        "other processing"
-    )
-    return _graded("compressed", text, remedy, far, lost)
+    size = float(np.interp(common.values[BLUR], strength, (0.0, *BLURS_PX)))
+    cost = (size / BLUR_PX) ** 2
+    return fault("blurred", size, far=cost > FAR) if cost > 1.0 else None
 
 
 def saturated_finding(share: float, changed: float = 1.0) -> Finding | None:
     """Return that much of the field is saturated, and of its `changed` share."""
     if share < max(SATURATED_SHARE, SATURATED_CONTACT * changed):
         return None
-    text = tr("{p:.0f} % of the membrane is saturated").format(p=100.0 * share)
-    remedy = tr("Restore the exposure of the calibration, and shade the sensor")
-    return _graded("saturated", text, remedy, share > MOSTLY_SATURATED, 100.0 * share, "%")
+    return fault("saturated", 100.0 * share, far=share > MOSTLY_SATURATED)
 
 
 def dirt_finding(
@@ -317,61 +330,19 @@ def dirt_finding(
     around = runs + runs[samples.beside].sum(axis=1)
     if around.max() < DIRT_RUNS:
         return None
-    text = tr("something dark lies on the membrane, the window or the lens")
-    remedy = tr("Clean the sensor and the lens")
-    return _graded("dirt", text, remedy, False, float(np.count_nonzero(runs)), "mm2")
+    return fault("dirt", float(np.count_nonzero(runs)))
 
 
 def bad_pixel_findings(
     share: float, count: int, columns: Sequence[int], rows: Sequence[int]
 ) -> list[Finding]:
     """Return lines and single pixels that do not follow the light."""
-    remedy = tr("Calibrate again, so that they are left out, or replace the camera")
     found = []
     for kind, places in ((tr("column"), columns), (tr("row"), rows)):
         if places:
-            text = tr("the camera has a dead or hot {kind} at {places}")
-            text = text.format(kind=kind, places=", ".join(str(n) for n in places[:5]))
-            line = _graded("bad_line", text, remedy, False, float(len(places)), "")
+            names = ", ".join(str(n) for n in places[:5])
+            line = fault("bad_line", float(len(places)), kind=kind, places=names)
             found.append(replace(line, verdict=Verdict.FAIL))
     if share > BAD_SHARE and count >= LEAST_BAD:
-        text = tr("{p:.2g} % of the pixels are dead or hot").format(p=100.0 * share)
-        far = share > FAR_SHARE
-        found.append(_graded("bad_pixels", text, remedy, far, 100.0 * share, "%"))
+        found.append(fault("bad_pixels", 100.0 * share, far=share > FAR_SHARE))
     return found
-
-
-def dark_finding() -> Finding:
-    """Return that there is no light."""
-    text = tr("the image is dark: the LEDs are off, or the lens is covered")
-    return _graded("dark", text, tr("Switch the LEDs on and uncover the lens"), True)
-
-
-def swapped_finding(order: Sequence[int]) -> Finding:
-    """Return that the channels come in another order."""
-    text = tr("the colours come in the order {letters} instead of RGB")
-    text = text.format(letters="".join("RGB"[k] for k in order))
-    remedy = tr("Set the camera's colour order as at calibration")
-    return _graded("colour_order", text, remedy, True)
-
-
-def stranger_finding() -> Finding:
-    """Return that nothing in the image looks like this sensor's untouched membrane."""
-    remedy = tr(
-        "Use the calibration of the sensor that captured the image; if it is the "
-        "right one, press less of the field, and seat camera and elastomer"
-    )
-    text = tr(
-        "nothing in the image looks like this sensor's untouched membrane: it is another sensor, "
-        "or nearly everything is pressed"
-    )
-    return _graded("other_sensor", text, remedy, True)
-
-
-def _graded(
-    key: str, text: str, remedy: str, far: bool, value: float = math.nan, unit: str = ""
-) -> Finding:
-    """Return a finding that makes the depth meaningless where the fault is `far`."""
-    verdict = Verdict.FAIL if far else Verdict.WARN
-    heights = Heights.MEANINGLESS if far else Heights.DOUBTFUL
-    return Finding(key, text, value, unit, verdict=verdict, remedy=remedy, heights=heights)

@@ -1,12 +1,12 @@
 """How much the light of healthy presses differs from that of the untouched membrane.
 
-A press changes the light of a closed sensor by some percent everywhere. The images of the
-calibration's own balls show by how much; only what exceeds it is a change of the sensor.
+The images of the calibration's own balls show by how much; only what exceeds it is a change of the
+sensor. A press changes the light of a closed sensor by some percent everywhere.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,16 @@ from scipy.special import stdtrit
 
 from gelpolight_core.light.fit import CommonChange, Uneven
 from gelpolight_core.light.judging import SIGMAS
-from gelpolight_core.light.samples import PARAMETERS
+from gelpolight_core.light.samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V
 
 Array = NDArray[np.float64]
 FALSE_ALARMS = 1e-3
 """Tolerated share of healthy images in which a change is stated."""
 KINDS = PARAMETERS + 4
 """Kinds of change: all parameters, the gains without room light, and the uneven change."""
+PRESS = 0.0006
+"""Standard deviation of the light around presses of an open sensor without interreflection; with
+it, more light comes back."""
 
 
 def changes_of(common: CommonChange, uneven: Uneven | None) -> Array:
@@ -29,24 +32,21 @@ def changes_of(common: CommonChange, uneven: Uneven | None) -> Array:
     return np.concatenate([common.values, common.gain, [largest]])
 
 
+@dataclass(frozen=True, slots=True)
 class Usual:
     """The scatter of healthy presses.
 
-    Parameters
+    Attributes
     ----------
-    seen : (presses, KINDS) float64 or None
-        Result of :func:`changes_of` for each; None: any change may be healthy.
+    mean, sd : (KINDS,)
+        Of their changes.
+    corrected : bool
+        Whether the light of every press is corrected, as that of the calibration's presses was.
     """
 
-    def __init__(self, seen: Array | None) -> None:
-        self._mean, self._sd = np.zeros(KINDS), np.full(KINDS, np.inf)
-        if seen is None:
-            return
-        count = len(seen)
-        # Of a normal value that few others predict: Student's distribution.
-        far = stdtrit(count - 1, 1.0 - FALSE_ALARMS / (2 * KINDS)) / SIGMAS
-        self._mean = seen.mean(axis=0)
-        self._sd = far * np.sqrt(1.0 + 1.0 / count) * seen.std(axis=0, ddof=1)
+    mean: Array
+    sd: Array
+    corrected: bool = False
 
     def common(self, found: CommonChange) -> CommonChange:
         """Return a common change as its difference from the usual one, with its scatter.
@@ -54,16 +54,50 @@ class Usual:
         Gains are those without room light, unless there is more than usual.
         """
         every, alone = slice(0, PARAMETERS), slice(PARAMETERS, KINDS - 1)
-        values, sd = found.values - self._mean[every], np.hypot(found.sd, self._sd[every])
-        gain_sd = np.hypot(found.gain_sd, self._sd[alone])
+        values, sd = found.values - self.mean[every], np.hypot(found.sd, self.sd[every])
+        gain, gain_sd = found.gain - self.mean[alone], np.hypot(found.gain_sd, self.sd[alone])
         if (np.abs(values[1:6:2]) < SIGMAS * sd[1:6:2]).all():
             values[1:6:2] = 0.0
-            values[:6:2], sd[:6:2] = found.gain - self._mean[alone], gain_sd
-        return replace(found, values=values, sd=sd, gain_sd=gain_sd)
+            values[:6:2], sd[:6:2] = gain, gain_sd
+        return replace(found, values=values, sd=sd, gain=gain, gain_sd=gain_sd)
 
     def uneven(self, found: Uneven | None) -> Uneven | None:
         """Return an uneven change as its difference from the usual one, with its scatter."""
         if found is None:
             return None
-        sd = float(np.hypot(found.sd, self._sd[-1]))
-        return replace(found, largest=found.largest - float(self._mean[-1]), sd=sd)
+        sd = float(np.hypot(found.sd, self.sd[-1]))
+        return replace(found, largest=found.largest - float(self.mean[-1]), sd=sd)
+
+
+ANY_LIGHT = Usual(np.zeros(KINDS), np.full(KINDS, np.inf), corrected=True)
+"""Where nothing is known of the presses: every change may be healthy."""
+
+
+def usual_of(seen: Array | None) -> Usual:
+    """Return the scatter of some presses of a closed sensor.
+
+    Parameters
+    ----------
+    seen : (presses, KINDS) float64 or None
+        Result of :func:`changes_of` for each, if it is known.
+    """
+    if seen is None:
+        return ANY_LIGHT
+    count = len(seen)
+    # Of a normal value that few others predict: Student's distribution.
+    far = stdtrit(count - 1, 1.0 - FALSE_ALARMS / (2 * KINDS)) / SIGMAS
+    sd = far * np.sqrt(1.0 + 1.0 / count) * seen.std(axis=0, ddof=1)
+    return Usual(seen.mean(axis=0), np.asarray(sd), corrected=True)
+
+
+def usual_of_open(interreflection: float = 0.0) -> Usual:
+    """Return the scatter of presses of an open sensor, which the model of its light explains.
+
+    Parameters
+    ----------
+    interreflection : float, optional
+        Of its membrane.
+    """
+    of_light = np.full(KINDS, PRESS * (1.0 + interreflection))
+    of_light[[1, 3, 5, SHIFT_U, SHIFT_V, BLUR]] = 0.0
+    return Usual(np.zeros(KINDS), of_light)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import QualityTable, Verdict, judge
-from gelpolight_core.light.check import DARK, HealthCheck
-from gelpolight_core.light.judging import LEAST_SHIFT_PX
+from gelpolight_core.light.check import HealthCheck
+from gelpolight_core.light.judging import DARK, SHIFT_PX
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.sensor_calibration import Calibration, HandEdit
 from gelpolight_core.translation import tr
@@ -80,7 +80,7 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     around = seen[check.samples.beside].mean(axis=1)
     touched = bool((np.abs(seen - around) > TOUCHED_SHARE).any())
     differs = 100.0 * float((np.abs(seen) > DIFFERS).any(axis=1).mean())
-    shift = None if touched else check.movement(frame, LEAST_SHIFT_PX)
+    shift = None if touched else check.movement(frame, SHIFT_PX)
     red, green, blue = (100.0 * float(change) for change in middle)
     quality = _judge(shift, (red, green, blue), differs, touched)
     return BackgroundShift(shift, (red, green, blue), differs, touched, quality)
@@ -163,7 +163,7 @@ def _judge(
                 tr("Membrane moved in the image"),
                 math.hypot(*shift_px),
                 "px",
-                warn=LEAST_SHIFT_PX,
+                warn=SHIFT_PX,
                 fail=2.0,
                 remedy=tr(
                     "Camera and elastomer have moved against each other: seat them, or "

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.finding import Health, LightGain
+from gelpolight_core.light.usual import usual_of_open
 from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reconstruction.checks import condition_notes
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -212,12 +213,9 @@ class OpenSolver(ABC):
     @cached_property
     def _health(self) -> HealthCheck:
         full = self.calibration.full
-        interreflection = 0.0 if full is None else full.membrane.interreflection
+        usual = usual_of_open(0.0 if full is None else full.membrane.interreflection)
         return HealthCheck(
-            self.calibration,
-            interreflection=interreflection,
-            crosstalk=self.calibration.crosstalk,
-            leds_mm=self._leds_mm,
+            self.calibration, usual, crosstalk=self.calibration.crosstalk, leds_mm=self._leds_mm
         )
 
     @cached_property

@@ -17,6 +17,7 @@ from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.finding import KEYS
 from gelpolight_core.light.fit import CommonChange
 from gelpolight_core.light.judging import dirt_finding
+from gelpolight_core.light.usual import usual_of_open
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter
@@ -58,9 +59,8 @@ def check(known: KnownSensor) -> HealthCheck:
 
 def _check_of(calibration: Calibration) -> HealthCheck:
     full = calibration.data.full
-    around = 0.0 if full is None else full.membrane.interreflection
-    crosstalk = calibration.data.crosstalk
-    return HealthCheck(calibration.data, interreflection=around, crosstalk=crosstalk)
+    usual = usual_of_open(0.0 if full is None else full.membrane.interreflection)
+    return HealthCheck(calibration.data, usual, crosstalk=calibration.data.crosstalk)
 
 
 def light(*shares: float) -> Change:
@@ -367,7 +367,7 @@ def test_a_shaded_corner_is_corrected_and_a_strong_shade_is_refused(
     # Darker to the right: the share falls along x.
     assert tilted.light.shape[1] == pytest.approx(-0.015, abs=0.003)
     assert abs(tilted.light.shape[2]) < 0.002
-    monkeypatch.setattr("gelpolight_core.light.judging.FAR_UNEVEN", 0.012)
+    monkeypatch.setattr("gelpolight_core.light.judging.FAR", 5.0)
     strong = check.check(known.noisy(frame * (1.01 - 0.04 * ramp)))
     assert strong.meaningless is not None
     assert strong.meaningless.key == "uneven"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.finding import Heights, Verdict
 from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.finding import KEYS, Health, LightGain, health_of
-from gelpolight_core.light.usual import Usual
+from gelpolight_core.light.usual import usual_of
 from gelpolight_core.reconstruction.checks import free_boundary_note
 from gelpolight_core.reconstruction.height_map import (
     COARSE,
@@ -78,7 +78,7 @@ class InPlaceSolver:
 
     @cached_property
     def _health(self) -> HealthCheck:
-        return HealthCheck(self.calibration, usual=Usual(self._model.press_light))
+        return HealthCheck(self.calibration, usual_of(self._model.press_light))
 
     def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
         """Return the faults of a frame, and the change of its light; see :class:`Solver`.
