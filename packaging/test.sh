@@ -27,7 +27,7 @@ if [ $# -eq 0 ]; then
 fi
 
 # One core for the types, and one for the rest.
-check "types of the core" .venv/bin/python -m mypy --strict >"$results/types" 2>&1 &
+check "types" .venv/bin/python -m mypy --strict >"$results/types" 2>&1 &
 types=$!
 check "code style" .venv/bin/python -m ruff check .
 check "formatting" .venv/bin/python -m ruff format --check .

@@ -84,12 +84,13 @@ class FormatRows(QWidget):
         code, (width, height), rate = (
             b.currentData() for b in (self._code, self._size, self._rate)
         )
-        order = {
-            self._code: lambda f: (f.code == code, (f.width, f.height) == (width, height)),
-            self._size: lambda f: ((f.width, f.height) == (width, height), f.code == code),
-            self._rate: lambda f: (f.code == code, (f.width, f.height) == (width, height)),
-        }[box]
-        best = max(self._offered, key=lambda f: (*order(f), -abs(f.rate_hz - rate)))
+
+        def agrees(f: Format) -> tuple[bool, bool, float]:
+            same = f.code == code, (f.width, f.height) == (width, height)
+            first, second = reversed(same) if box is self._size else same
+            return first, second, -abs(f.rate_hz - rate)
+
+        best = max(self._offered, key=agrees)
         self.chosen.emit(best)
 
 

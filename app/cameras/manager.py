@@ -132,8 +132,9 @@ class CameraManager(QObject):
 
     def is_other(self, stored: str, info: SourceInfo | None) -> bool:
         """Return whether a source is another camera than a stored one, as far as both are known."""
-        known = bool(stored) and info is not None and info.kind == "camera" and bool(info.detail)
-        return known and not self.is_same(stored, info.detail)
+        if not stored or info is None or info.kind != "camera" or not info.detail:
+            return False
+        return not self.is_same(stored, info.detail)
 
     def of(self, info: SourceInfo | None) -> Camera | None:
         """Return the camera of a source; None if it is not a camera."""

@@ -50,10 +50,10 @@ def run(options: argparse.Namespace) -> int:
     make_folder(options.output)
     with stage_progress() as progress:
         if options.workers > 1:
-            measure = partial(measure_with, options.calibration, options.model)
+            remote = partial(measure_with, options.calibration, options.model)
             with processes(options.workers) as pool:
                 evaluation = evaluate_presses(
-                    presses, measure, progress=progress, submit=pool.submit
+                    presses, remote, progress=progress, submit=pool.submit
                 )
         else:
             measure = press_measurement(reconstructor)

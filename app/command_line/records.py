@@ -58,7 +58,7 @@ def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
     )  # fmt: skip
     lines = [head]
     for record in records:
-        who = (record.id, f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
+        who = (str(record.id), f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
         rest = record.verdict, record.note.replace("\n", " ")
         for quantity in record.quantities:
             numbers = (
@@ -72,5 +72,5 @@ def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
             )
             cells = (*who, quantity.name, *numbers, *rest)
             lines.append(_LINE.format(*(harmless(str(cell)) for cell in cells)))
-            who, rest = ("",) * 4, ("",) * 2  # once for each record
+            who, rest = ("", "", "", ""), ("", "")  # once for each record
     return [line.rstrip() for line in lines]

@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 def _refreshed(calibration: Calibration, options: argparse.Namespace) -> Calibration:
     if options.session is not None:
         session = read_session(options.session)
-        recipe = in_place_towards(calibration.in_place.coefficients)
+        recipe = in_place_towards(calibration.data_of(ClosedSensor).in_place.coefficients)
         if not recipe.fits(session):
             raise InputError(
                 tr("the session is of an open sensor: session.toml has no table [in_place]"),

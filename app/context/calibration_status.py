@@ -73,7 +73,9 @@ def put_into_use(
     def act() -> None:
         done = False
         with context.toasts.errors():
-            done = context.workspace.use(path) is None if use is None else use()
+            if use is None:
+                context.workspace.use(path)
+            done = use is None or use()
         context.requests.calibrations_changed.emit()
         if done and entry is not None and entry.state[1] == "warn":
             context.toasts.show(not_validated(), "warn")

@@ -19,6 +19,7 @@ from app.live.depth import LiveDepth
 from app.live.frame_results import Maker, Wanted
 from app.services.file_dialogs import ask_open, ask_save
 from app.sources.recording import RecordingSource
+from app.sources.source import Frame
 from app.view2d.quantities import Reference
 from app.view3d.saving import ImageChoice, Played, ViewSaving, image_dialog
 from app.view3d.surface import Surface
@@ -180,7 +181,7 @@ def png_bytes(image: QImage) -> bytes:
     """Return an image as PNG."""
     buffer = QBuffer()
     buffer.open(QBuffer.OpenModeFlag.WriteOnly)
-    image.save(buffer, "PNG")
+    image.save(buffer, b"PNG")
     return bytes(buffer.data().data())
 
 
@@ -213,7 +214,9 @@ def recorded_surfaces(
     try:
         with ThreadPoolExecutor(1, "movie") as pool:
             for index in range(len(recording)):
-                made = pool.submit(lambda frame: maker(frame).surface, recording.frame(index))
+                kept = recording.frame(index)
+                frame = Frame(kept.rgb, kept.number, kept.time_s)
+                made = pool.submit(lambda frame: maker(frame).surface, frame)
                 while wait([made], WAIT_S).not_done:
                     QCoreApplication.processEvents()
                 surface = made.result()

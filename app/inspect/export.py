@@ -199,11 +199,11 @@ class ExportDialog(Dialog):
         self._first, self._last = SpinBox(), SpinBox()
         named(self._first, "inspect.export.first", tr("First frame"))
         named(self._last, "inspect.export.last", tr("Last frame"))
-        for box, value in ((self._first, at + 1), (self._last, count)):
-            box.setRange(1, max(count, 1))
-            box.setValue(value)
-            box.setEnabled(False)
-            self._range.toggled.connect(box.setEnabled)
+        for ends, value in ((self._first, at + 1), (self._last, count)):
+            ends.setRange(1, max(count, 1))
+            ends.setValue(value)
+            ends.setEnabled(False)
+            self._range.toggled.connect(ends.setEnabled)
         self._range.toggled.connect(self._check)
         self._first.valueChanged.connect(self._last.setMinimum)
         form.addRow(self._range, hbox(self._first, self._last))
@@ -293,7 +293,7 @@ class ExportControl(QObject):
 
         elif last is not None and last.heightmap is not None:
             heightmap = last.heightmap
-            name = frame_name(last.frame, source, processed=bool(last.processed))
+            name = frame_name(last.frame, self._depth.live.source, processed=bool(last.processed))
 
             def work(progress: Any) -> list[Path]:
                 return export_frame(heightmap, choice, name)

@@ -55,7 +55,7 @@ class InspectPage(QWidget):
         self.context = context
         self.jobs = Jobs("inspect", self)
         self.live = LiveSession(context=context, name="inspect", parent=self)
-        self.depth = LiveDepth(self.live, self.jobs, self, context=context)
+        self.live_depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.zero = ZeroControl(self.live, self.jobs, context=context)
         self.modes = ModeChoice(self.jobs, self, context=context)
         idle = tr("Press an object into the membrane. Press Space to freeze it at full detail.")
@@ -89,9 +89,9 @@ class InspectPage(QWidget):
             self, "inspect.zero", tr("Zero"), self.zero.set_zero, keys=("Ctrl+0",),
             icon_name="zero", tip=tr("Use the current image as the zero reference"),
         )  # fmt: skip
-        self.recorder = RecordControl(self.depth, self, context=self.context)
-        self.stream = DepthStream(self.depth, self, context=self.context)
-        self.export = ExportControl(self.depth, self.jobs, self, context=self.context)
+        self.recorder = RecordControl(self.live_depth, self, context=self.context)
+        self.stream = DepthStream(self.live_depth, self, context=self.context)
+        self.export = ExportControl(self.live_depth, self.jobs, self, context=self.context)
         self.views = Views(
             self.jobs,
             (vbox(self._value, self._readout, spacing=2), vbox(self.modes.box, self._rate)),
@@ -102,7 +102,7 @@ class InspectPage(QWidget):
             ),
             context=self.context,
         )
-        self.file_actions = FileActions(self.depth, self.views, self, context=self.context)
+        self.file_actions = FileActions(self.live_depth, self.views, self, context=self.context)
         surface_menu = self.views.surface.menu
         surface_menu.mesh_wanted.connect(self.export.ask)
         surface_menu.offer_mesh()
@@ -118,11 +118,11 @@ class InspectPage(QWidget):
         self.views.image_pointed.connect(self._on_image_pointed)
         self.live.source_changed.connect(self._on_source)
         self.live.switched.connect(self._on_switched)
-        self.depth.shown.connect(self._show)
-        self.depth.calibration_loaded.connect(self.modes.offer)
-        self.depth.calibration_switched.connect(self._on_calibration)
-        self.depth.changed.connect(self._advise)
-        self.modes.chosen.connect(self.depth.choose)
+        self.live_depth.shown.connect(self._show)
+        self.live_depth.calibration_loaded.connect(self.modes.offer)
+        self.live_depth.calibration_switched.connect(self._on_calibration)
+        self.live_depth.changed.connect(self._advise)
+        self.modes.chosen.connect(self.live_depth.choose)
         self.context.requests.preferences_changed.connect(self._show_again)
         self.stream.changed.connect(self._on_stream)
         self.recorder.reported.connect(self._on_recorded)
@@ -136,7 +136,7 @@ class InspectPage(QWidget):
     def enter(self) -> None:
         """Show the source through the calibration in use."""
         self._want()
-        self.depth.enter()
+        self.live_depth.enter()
         self._texts.start()
         self.setFocus()
 
@@ -154,7 +154,7 @@ class InspectPage(QWidget):
         self.views.keep()
         self.jobs.close()
         self.modes.close()
-        self.depth.finish()
+        self.live_depth.finish()
         self.views.finish()
         return True
 
@@ -188,7 +188,9 @@ class InspectPage(QWidget):
         self._want()
 
     def _want(self) -> None:
-        self.depth.want(replace(self.views.wanted(), stream=self.stream.on, still=self.live.paused))
+        self.live_depth.want(
+            replace(self.views.wanted(), stream=self.stream.on, still=self.live.paused)
+        )
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
@@ -203,7 +205,7 @@ class InspectPage(QWidget):
 
     def _on_calibration(self) -> None:
         """Show the depth through another calibration, or none."""
-        used = self.depth.live_reconstructor
+        used = self.live_depth.live_reconstructor
         self._pixel_map = None if used is None else PixelMap(used.calibration.table)
         if used is not None:
             self.views.prepare()
@@ -231,11 +233,11 @@ class InspectPage(QWidget):
         return None if heightmap is None else heightmap.depth_mm
 
     def _show_texts(self) -> None:
-        self.modes.follow(self.depth.last)
+        self.modes.follow(self.live_depth.last)
         self.views.surface.refresh_pins()
-        texts = self._recorded, self.stream.text, self.depth.rate_text()
+        texts = self._recorded, self.stream.text, self.live_depth.rate_text()
         self._rate.setText("\n".join(filter(None, texts)))
-        self._rate.setToolTip(plain_tip(self.depth.trace_text()))
+        self._rate.setToolTip(plain_tip(self.live_depth.trace_text()))
         heightmap = None if self._shown is None else self._shown.heightmap
         reading = None
         if heightmap is not None and math.isfinite(self._cursor[0]):
@@ -266,7 +268,7 @@ class InspectPage(QWidget):
 
     def _advise(self) -> None:
         """Show what to do next."""
-        self.banner.advise(advise(self.depth.state))
+        self.banner.advise(advise(self.live_depth.state))
 
     def _forget(self) -> None:
         """Clear the depth, because it belongs to another calibration or source."""
@@ -278,4 +280,4 @@ class InspectPage(QWidget):
         if name == "zero":
             self.zero.set_zero()
         else:
-            self.depth.act(name)
+            self.live_depth.act(name)

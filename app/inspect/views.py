@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QButtonGroup, QToolButton, QWidget
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QToolButton, QWidget
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
@@ -112,15 +115,15 @@ class Views(QWidget):
             flat=lambda: MapView("inspect.surface.flat", tr("Shaded map")),
         )
         self.reference: Reference | None = None
-        self.height = HeightPanel(adjustable=True)
+        self.map_panel = HeightPanel(adjustable=True)
         self.normals = NormalsPanel()
         self.quality = QualityPanel()
         self.camera = ImageView()
         self.section = SectionPanel()
-        self.lines, self.region = SectionLines(self.height.map), RegionBox(self.height.map)
+        self.lines, self.region = SectionLines(self.map_panel.map), RegionBox(self.map_panel.map)
         self.display = DisplayPanel()
         self.processing = ProcessingPanel()
-        self.level_points = LevelPoints(self.height.map)
+        self.level_points = LevelPoints(self.map_panel.map)
         self._bench = BenchArea(context.source)
         self.bench = Fold("inspect.bench", tr("Virtual bench"), self._bench)
         self.layout_shown = Layout()
@@ -129,12 +132,19 @@ class Views(QWidget):
         self._connect()
 
     def _lay_out(self, top: tuple[Any, ...], below: tuple[Any, ...]) -> None:
-        upper = (self.surface, 3), (self.height, 2)
-        lower = (self.camera, 1), (self.normals, 1), (self.quality, 1)
-        self._rows = [
-            splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400, 400))
-            for parts in (upper, lower)
-        ]
+        upper: Mapping[str, QWidget] = {"surface": self.surface, "height": self.map_panel}
+        lower: Mapping[str, QWidget] = {
+            "camera": self.camera,
+            "normals": self.normals,
+            "quality": self.quality,
+        }
+        self._rows = {
+            splitter(
+                Qt.Orientation.Horizontal, *((part, 1) for part in row.values()),
+                sizes=(600, 400, 400),
+            ): row
+            for row in (upper, lower)
+        }  # fmt: skip
         self._stage = splitter(
             Qt.Orientation.Vertical, *((row, 3) for row in self._rows), (self.section, 2)
         )
@@ -149,7 +159,7 @@ class Views(QWidget):
 
     def _make_switch(self) -> QWidget:
         """Return the row of buttons that choose what fills the stage."""
-        self._switch = QButtonGroup(self)
+        self._switches: dict[str, QAction] = {}
         bar = named(QWidget(), "inspect.switch", tr("Views"))
         row = hbox(of=bar, margins=(12, 6, 12, 6), spacing=4)
         for number, (key, (text, _views)) in enumerate(STAGES.items(), start=1):
@@ -174,44 +184,47 @@ class Views(QWidget):
             action.setIcon(icon("maximise"))
             button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._switch.addButton(button)
-        self._switch.setExclusive(False)
+        self._switches[key] = action
         return button
 
     def _choose(self, key: str) -> None:
         now = self.layout_shown
-        if key in STAGES:
-            self.arrange(replace(now, stage=key))
+        if key == "section":
+            self.arrange(replace(now, section=not now.section))
+        elif key == "maximised":
+            self.arrange(replace(now, maximised=not now.maximised))
         else:
-            self.arrange(replace(now, **{key: not getattr(now, key)}))
+            self.arrange(replace(now, stage=key))
 
     def arrange(self, layout: Layout) -> None:
         """Show these views."""
         before, self.layout_shown = self.layout_shown.views, layout
         on = {layout.stage: True, "section": layout.section, "maximised": layout.maximised}
-        for button in self._switch.buttons():
-            key = button.objectName().rpartition(".")[2]
-            button.defaultAction().setChecked(on.get(key, False))
-        for key in ("surface", "height", "camera", "normals", "quality", "section"):
-            getattr(self, key).setVisible(key in layout.views)
-        for row in self._rows:
-            row.setVisible(any(row.widget(n).isVisibleTo(row) for n in range(row.count())))
+        for key, action in self._switches.items():
+            action.setChecked(on.get(key, False))
+        for row, keys in self._rows.items():
+            row.setVisible(bool(layout.views & set(keys)))
+            for key, part in keys.items():
+                part.setVisible(key in layout.views)
+        self.section.setVisible("section" in layout.views)
         self.surface.tools.setVisible("surface" in layout.views)
         self.inspector.setVisible(not layout.maximised)
-        maps = {"height": self.height, "normals": self.normals, "quality": self.quality}
+        maps = {
+            "height": self.map_panel.map, "normals": self.normals.map, "quality": self.quality.map,
+        }  # fmt: skip
         for key in layout.views & maps.keys() - before:
-            if self._has_depth and not maps[key].map.has_image:
-                maps[key].map.say(tr("Please wait."))
+            if self._has_depth and not maps[key].has_image:
+                maps[key].say(tr("Please wait."))
         self._on_section()
 
     def _connect(self) -> None:
-        for view in (self.height.map, self.normals.map, self.quality.map, self.surface):
+        for view in (self.map_panel.map, self.normals.map, self.quality.map, self.surface):
             view.pointed.connect(self.pointed)
         self.camera.pointed.connect(self.image_pointed)
         self.camera.clicked.connect(self._on_image_clicked)
         self.display.changed.connect(self._on_display)
-        self.height.range_dragged.connect(self.display.lock_range)
-        self.height.range_released.connect(self.display.unlock_range)
+        self.map_panel.range_dragged.connect(self.display.lock_range)
+        self.map_panel.range_released.connect(self.display.unlock_range)
         self.quality.chosen.connect(self.wanted_changed)
         self.normals.chosen.connect(self.wanted_changed)
         self.processing.changed.connect(self._on_section)
@@ -226,7 +239,7 @@ class Views(QWidget):
         for name, (text, keys) in DIRECTIONS.items():
             make_action(
                 self, f"inspect.view_{name}", tr("3D: {name}").format(name=text),
-                lambda name=name: self.surface.view_from(name), keys=(keys,),
+                partial(self.surface.view_from, name), keys=(keys,),
             )  # fmt: skip
         make_action(
             self, "inspect.lock", tr("Lock the colour range"), self.display.toggle_lock,
@@ -280,7 +293,7 @@ class Views(QWidget):
             self._on_section()
         if shown.surface is not None:
             self.surface.show_surface(shown.surface, still=still)
-        self.height.show_frame(shown, self.display.display.colours, still=still)
+        self.map_panel.show_frame(shown, self.display.display.colours, still=still)
         self.display.show_range(*shown.range_mm)
         self.normals.show_frame(shown)
         if self._shows("quality"):
@@ -299,13 +312,13 @@ class Views(QWidget):
         self._has_depth = False
         self._on_section()
         self.surface.show_surface(None)
-        for view in (self.height.map, self.normals.map, self.quality):
+        for view in (self.map_panel.map, self.normals.map, self.quality):
             view.say(words)
         self.section.show_cut(Cut())
 
     def show_cursor(self, x_mm: float, y_mm: float) -> None:
         """Mark a position in every view of the depth."""
-        for view in (self.height.map, self.normals.map, self.quality.map, self.surface):
+        for view in (self.map_panel.map, self.normals.map, self.quality.map, self.surface):
             view.show_cursor(x_mm, y_mm)
 
     def compare_with(self, reference: Reference | None) -> None:

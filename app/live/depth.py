@@ -255,7 +255,7 @@ class LiveDepth(QObject):
     def _note_time(self, shown: Shown) -> None:
         now = time.monotonic()
         self._shown_s.append(now)
-        trace = shown.heightmap and shown.heightmap.trace
+        trace = None if shown.heightmap is None else shown.heightmap.trace
         if trace is not None and not self.live.paused:
             self._tally.add(trace, now)
         while now - self._shown_s[0] > 2.0:

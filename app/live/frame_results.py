@@ -277,9 +277,8 @@ class _Images:
         rows, columns = self._depth.shape
         self._pitch_mm = heightmap.pitch_mm * heightmap.depth_mm.shape[1] / columns
         self._flags = self._thinned(heightmap.flags)
-        self._outside = cv2.bitwise_and(
-            self._flags, np.full((rows, columns), Flag.OUTSIDE.value, np.uint8)
-        )
+        outside = np.full((rows, columns), Flag.OUTSIDE.value, np.uint8)
+        self._outside = np.asarray(cv2.bitwise_and(self._flags, outside), np.uint8)
         self.range_mm = range_mm
         self._flat: NDArray[np.uint8] | None = None
         self._lit: NDArray[np.uint8] | None = None
@@ -332,13 +331,13 @@ class _Images:
         if self._misfit is not None:
             top = self._misfit_top
             rows, columns = self._depth.shape
-            shown = cv2.resize(np.nan_to_num(self._misfit), (columns, rows))
-            rgb = shading.coloured(np.asarray(shown), colour_table("inferno"), 0.0, top)
+            shown = np.asarray(cv2.resize(np.nan_to_num(self._misfit), (columns, rows)), np.float32)
+            rgb = shading.coloured(shown, colour_table("inferno"), 0.0, top)
             return shading.outside_filled(rgb, self._outside, SURROUND), top
         if self._wanted.quality == "uncertainty":
             if sd is None:
                 return None, 0.0
-            shown = shading.fitted(sd, self._px)
+            shown = np.asarray(shading.fitted(sd, self._px), np.float32)
             inside = shown[self._outside == 0]
             top = float(np.percentile(inside, 99.0)) if inside.size else 1.0
             rgb = shading.coloured(shown, colour_table("inferno"), 0.0, top)
@@ -355,15 +354,17 @@ class _Images:
             scale, texture = self._depth_scale(), self._shaded()
         else:
             rgb, scale = self._quantity()
-            texture = rgb if wanted.still else cv2.multiply(rgb, self._light(), scale=1 / 255.0)
+            texture = rgb
+            if not wanted.still:
+                texture = np.asarray(cv2.multiply(rgb, self._light(), scale=1 / 255.0), np.uint8)
         return surface_of(
             self._map,
-            np.asarray(texture, np.uint8),
+            texture,
             scale,
             range_mm=self.range_mm,
             largest=None if wanted.still else LIVE_NODES,
             depth_mm=None if wanted.still else self._depth,
-            light=tuple(map(float, display.light.direction())) if wanted.still else None,  # type: ignore[arg-type]
+            light=display.light.direction() if wanted.still else None,
         )
 
     def _quantity(self) -> tuple[NDArray[np.uint8], ColourScale]:

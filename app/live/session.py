@@ -13,7 +13,7 @@ from app.context.context import AppContext
 from app.sources.mailbox import Mailbox
 from app.sources.processor import Failure, Outcome, Processor
 from app.sources.recording import RecordingSource
-from app.sources.source import Frame
+from app.sources.source import Frame, Source
 from app.sources.stream import Stream
 from gelpolight_core.translation import tr
 
@@ -119,7 +119,7 @@ class LiveSession(QObject):
     def finish(self) -> None:
         """Release the source for good."""
         for connection in self._following:
-            self.disconnect(connection)
+            QObject.disconnect(connection)
         if self._page_shown:
             self.enter(False)
 
@@ -162,7 +162,7 @@ class LiveSession(QObject):
         return self._paused
 
     @property
-    def source(self) -> object:
+    def source(self) -> Source | None:
         """The open source. None if there is none."""
         return None if self.stream is None else self.stream.source
 

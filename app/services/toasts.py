@@ -63,7 +63,10 @@ class Toast(QWidget):
     gone = Signal()
 
     def __init__(
-        self, parent: QWidget, finding: Finding, actions: tuple[tuple[str, Callable], ...]
+        self,
+        parent: QWidget,
+        finding: Finding,
+        actions: tuple[tuple[str, Callable[[], object]], ...],
     ) -> None:
         super().__init__(parent)
         self.finding, self.text = finding, finding.text
@@ -82,27 +85,24 @@ class Toast(QWidget):
         close.setAutoRaise(True)
         close.clicked.connect(self.dismiss)
         top = hbox(sign, (self._label, 1), (close, 0, Qt.AlignmentFlag.AlignTop))
-        layout = vbox(top, of=self, margins=(12, 10, 8, 10))
+        self._column = vbox(top, of=self, margins=(12, 10, 8, 10))
         if actions:
             row = hbox(None)
             for i, (label, act) in enumerate(actions):
                 button = push_button(f"toast.action{i}", label, act)
                 button.clicked.connect(self.dismiss)
                 row.addWidget(button)
-            layout.addLayout(row)
+            self._column.addLayout(row)
         self._timer = QTimer(self, singleShot=True)
         self._timer.timeout.connect(self.dismiss)
         self._restart()
 
     def height_for(self, width: int) -> int:
         """Return the height that the message needs at a given width."""
-        layout = self.layout()
-        layout.activate()
-        return (
-            layout.totalHeightForWidth(width)
-            if layout.hasHeightForWidth()
-            else (layout.totalSizeHint().height())
-        )
+        self._column.activate()
+        if self._column.hasHeightForWidth():
+            return self._column.totalHeightForWidth(width)
+        return self._column.totalSizeHint().height()
 
     def again(self) -> None:
         """Count a repeated message instead of showing it twice."""

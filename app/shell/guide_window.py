@@ -46,11 +46,15 @@ OF_PAGE = {
 }
 
 
+Unknown = QTextDocument.ResourceType.UnknownResource
+
+
 class GuideText(QTextBrowser):
     """Shows a Markdown page. Its images are not wider than the window."""
 
-    def loadResource(self, kind: int, name: QUrl) -> Any:
+    def loadResource(self, kind: int, name: QUrl | str) -> Any:
         """Return a page or a scaled image."""
+        name = QUrl(name)
         if kind == QTextDocument.ResourceType.ImageResource.value:
             image = QImage(self.source().resolved(name).toLocalFile())
             width = max(self.viewport().width() - 40, 200)
@@ -59,12 +63,13 @@ class GuideText(QTextBrowser):
             return image
         return super().loadResource(kind, name)
 
-    def doSetSource(self, name: QUrl, kind: Any) -> None:
+    def doSetSource(self, name: QUrl | str, /, type: Any = Unknown) -> None:
         """Show a page of the guide. Anything else is shown by the web browser."""
+        name = QUrl(name)
         if not name.isLocalFile() and not name.isRelative():
             QDesktopServices.openUrl(name)
             return
-        super().doSetSource(name, kind)
+        super().doSetSource(name, type)
 
     def show_heading(self, words: str) -> bool:
         """Scroll to the first heading that contains some words. Return whether there is one."""

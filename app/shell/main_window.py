@@ -169,7 +169,7 @@ class MainWindow(QMainWindow):
         return next((name for name, page in self._made.items() if page is shown), "")
 
     @property
-    def shown_page(self) -> QWidget:
+    def shown_page(self) -> QWidget | None:
         """The visible page."""
         return self._stack.currentWidget()
 
@@ -212,7 +212,8 @@ class MainWindow(QMainWindow):
         before = self._stack.currentWidget()
         if after is before:
             return
-        _call(before, "leave")
+        if before is not None:
+            _call(before, "leave")
         self._stack.setCurrentWidget(after)
         self._show_in_use()  # other programs may have changed the workspace
         _call(after, "enter")

@@ -85,7 +85,7 @@ class Menus:
         actions = {}
         for key, label in THEMES.items():
             action = make_action(
-                self._window, f"theme.{key}", label, lambda key=key: self._window.set_theme(key)
+                self._window, f"theme.{key}", label, partial(self._window.set_theme, key)
             )
             action.setCheckable(True)
             action.setChecked(key == self._window.context.settings.preferences.theme)
@@ -257,7 +257,8 @@ class FileMenu(QMenu):
 
     def _fill_exports(self) -> None:
         self.exports.clear()
-        offered = getattr(self._window.shown_page, "export_actions", tuple)()
+        page = self._window.shown_page
+        offered: tuple[QAction, ...] = getattr(page, "export_actions", tuple)()
         self.exports.addActions(list(offered))
         if not offered:
             text = tr("Nothing on this page: export from Sensors, Inspect or Measure")

@@ -223,7 +223,7 @@ class PrecisionDialog(WorkDialog):
 
     def files_of(self, result: Result, folder: Path) -> list[Path]:
         """Write the report into a folder; return the files."""
-        return write_work_precision(result[0], folder)
+        return list(write_work_precision(result[0], folder))
 
     def ready(self) -> bool:
         """Whether presses with true depths are chosen."""

@@ -53,11 +53,12 @@ class Light:
     azimuth_deg: float = 315.0
     height_deg: float = 45.0
 
-    def direction(self) -> NDArray[np.float64]:
+    def direction(self) -> tuple[float, float, float]:
         """Return the unit vector towards the lamp: x right, y down, z out of the surface."""
         azimuth, height = np.radians([self.azimuth_deg, self.height_deg])
         across = np.cos(height)
-        return np.array([across * np.sin(azimuth), -across * np.cos(azimuth), np.sin(height)])
+        x, y, z = across * np.sin(azimuth), -across * np.cos(azimuth), np.sin(height)
+        return float(x), float(y), float(z)
 
 
 @dataclass(frozen=True, slots=True)

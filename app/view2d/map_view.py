@@ -279,7 +279,7 @@ class _RoundScaleBar(pg.ScaleBar):  # type: ignore[misc]
 
     def __init__(self, box: pg.ViewBox) -> None:
         super().__init__(1.0, width=3, brush="#ebeef2", pen="#0a0c0f", offset=(-12, -10))
-        self._box = box
+        self._box, self.size = box, 1.0
         self.text.setText(length_text(self.size))
         self.text.setColor("#ebeef2")
         self.text.fill = pg.mkBrush(QColor(10, 12, 15, 120))

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QEvent, QLoggingCategory, QPoint, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QGestureEvent, QWidget
+from PySide6.QtWidgets import QGestureEvent, QPinchGesture, QWidget
 from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkPropCollection
 
@@ -136,6 +137,8 @@ class Interactor(QtInteractor):  # type: ignore[misc]
             self._plane = None
             self.scene.clip_by(None)
         else:
+            if not self.scene.box:
+                return
             left, right, low, high, under, over = self.scene.box
             middle = (0.5 * (left + right), 0.5 * (low + high), 0.5 * (under + over))
             tall = (left, right, low, high, min(under, 0.0), max(over, 0.15 * (right - left)))
@@ -226,7 +229,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self.scene.clip_by((np.asarray(normal, float), np.asarray(origin, float)))
         self.update()
 
-    def _add_orientation(self) -> object:
+    def _add_orientation(self) -> Any:
         widget = self.add_camera_orientation_widget()
         shown = widget.GetRepresentation()
         # The scene's y axis points up, the sensor's down. z is depth.
@@ -311,7 +314,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         """Zoom with a pinch on a touchpad."""
         if isinstance(event, QGestureEvent):
             pinch = event.gesture(Qt.GestureType.PinchGesture)
-            if pinch is not None:
+            if isinstance(pinch, QPinchGesture):
                 self.scene.zoom(pinch.scaleFactor())
                 self.update()
                 return True

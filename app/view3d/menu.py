@@ -65,13 +65,14 @@ class ViewMenu(QMenu):
         self._panel, self._settings = panel, settings
         directions = self.addMenu(tr("View from"))
         for name, (text, keys) in DIRECTIONS.items():
-            look = partial(panel.view_from, name)
-            self._add(name, f"{text}\t{keys}", lambda _on, look=look: look(), directions)
+            self._add(name, f"{text}\t{keys}", partial(panel.view_from, name), directions)
         for name, text in STYLES.items():
-            action = self._add(f"style_{name}", text, lambda on, name=name: self._set(name, on))
+            action = self._add(f"style_{name}", text, None)
             action.setCheckable(True)
-        self.clip_action = self._add("clip", tr("Clip by a plane"), self._clip)
+            action.triggered.connect(partial(self._set, name))
+        self.clip_action = self._add("clip", tr("Clip by a plane"), None)
         self.clip_action.setCheckable(True)
+        self.clip_action.triggered.connect(self._clip)
         self.addSeparator()
         self._colours = self.addMenu(tr("Colour by"))
         self._group = QActionGroup(self)
@@ -82,12 +83,12 @@ class ViewMenu(QMenu):
             ("clear", tr("Clear")),
         ):
             self._add(
-                f"reference_{name}", text, lambda _on, name=name: self.reference_wanted.emit(name),
+                f"reference_{name}", text, partial(self.reference_wanted.emit, name),
                 self._reference,
             )  # fmt: skip
         self._viewpoints = self.addMenu(tr("Viewpoints"))
         self._viewpoints.aboutToShow.connect(self._list_viewpoints)
-        self._add("pins_clear", tr("Remove pins"), lambda _on: panel.set_pins(()))
+        self._add("pins_clear", tr("Remove pins"), partial(panel.set_pins, ()))
         self.addSeparator()
         for name, text, signal in (
             ("copy", tr("Copy image"), self.copy_wanted),
@@ -95,7 +96,7 @@ class ViewMenu(QMenu):
             ("movie", tr("Save movie…"), self.movie_wanted),
             ("mesh", tr("Export mesh…"), self.mesh_wanted),
         ):
-            self._add(name, text, lambda _on, signal=signal: signal.emit())
+            self._add(name, text, signal.emit)
         self._action("mesh").setVisible(False)
         self.set_colours({}, "")
         self.aboutToShow.connect(self._follow)
@@ -106,11 +107,12 @@ class ViewMenu(QMenu):
         self._reference.menuAction().setVisible(True)
 
     def _add(
-        self, name: str, text: str, slot: Callable[[bool], object], menu: QMenu | None = None
+        self, name: str, text: str, slot: Callable[[], object] | None, menu: QMenu | None = None
     ) -> QAction:
         action = (menu or self).addAction(text)
         action.setObjectName(f"view3d.{name}")
-        action.triggered.connect(slot)
+        if slot is not None:
+            action.triggered.connect(lambda _on=False: slot())
         return action
 
     def set_colours(self, names: dict[str, str], chosen: str) -> None:
@@ -120,7 +122,7 @@ class ViewMenu(QMenu):
             self._group.removeAction(action)
         for key, text in names.items():
             action = self._add(
-                f"colour_{key}", text, lambda _on, key=key: self.colour_chosen.emit(key),
+                f"colour_{key}", text, partial(self.colour_chosen.emit, key),
                 self._colours,
             )  # fmt: skip
             action.setCheckable(True)
@@ -131,7 +133,7 @@ class ViewMenu(QMenu):
 
     def _follow(self) -> None:
         """Update the check marks, and enable what can be used now."""
-        style = self._panel.style
+        style = self._panel.view_style
         for name in STYLES:
             self._action(f"style_{name}").setChecked(bool(getattr(style, name)))
         there = self._panel.view is not None and self._panel.view.scene.surface is not None
@@ -145,7 +147,7 @@ class ViewMenu(QMenu):
         return found
 
     def _set(self, name: str, on: bool) -> None:
-        style: Style = replace(self._panel.style, **{name: on})
+        style: Style = replace(self._panel.view_style, **{name: on})
         self._panel.set_style(style)
 
     def _clip(self, on: bool) -> None:
@@ -157,14 +159,14 @@ class ViewMenu(QMenu):
     def _list_viewpoints(self) -> None:
         menu, saved = self._viewpoints, viewpoints_from_text(self._settings.display(VIEWPOINTS))
         menu.clear()
-        self._add("viewpoint_save", tr("Save this viewpoint…"), lambda _on: self._ask_name(), menu)
+        self._add("viewpoint_save", tr("Save this viewpoint…"), self._ask_name, menu)
         for name in saved:
-            self._add("viewpoint", name, lambda _on, name=name: self.go_to(name), menu)
+            self._add("viewpoint", name, partial(self.go_to, name), menu)
         if saved:
             menu.addSeparator()
             self._add(
                 "viewpoint_clear", tr("Remove all viewpoints"),
-                lambda _on: self._settings.keep_display(VIEWPOINTS, ""), menu,
+                partial(self._settings.keep_display, VIEWPOINTS, ""), menu,
             )  # fmt: skip
 
     def _ask_name(self) -> None:
@@ -189,4 +191,4 @@ class ViewMenu(QMenu):
         if self._panel.view is None or name not in saved:
             return
         self._panel.view.scene.viewpoint = saved[name]
-        self._panel.set_style(replace(self._panel.style, parallel=saved[name].parallel))
+        self._panel.set_style(replace(self._panel.view_style, parallel=saved[name].parallel))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import TypeAlias
 
 import numpy as np
 import pyvista as pv
@@ -121,7 +122,7 @@ def draw_solid(plotter: Plotter, solid: pv.PolyData | None, exaggeration: float)
 
 
 Box = tuple[float, float, float, float, float, float]
-Plotter = BasePlotter
+Plotter: TypeAlias = BasePlotter
 FONT = 11
 
 

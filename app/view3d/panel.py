@@ -6,10 +6,8 @@ import importlib
 import logging
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
@@ -42,18 +40,6 @@ MODULE = "app.view3d.interactor"  # imports pyvista, which takes a second, when 
 HINT_SEEN = "view3d_hint"
 
 
-class FlatMap(Protocol):
-    """Replacement for the 3D view without OpenGL: a widget with a map and a cursor."""
-
-    pointed: Signal
-
-    def set_image(self, rgb: NDArray[np.uint8], extent_mm: tuple[float, ...]) -> None:
-        """Show an image over (left, top, right, bottom)."""
-
-    def show_cursor(self, x_mm: float, y_mm: float) -> None:
-        """Mark a position. NaN: none."""
-
-
 class SurfacePanel(QWidget):
     """Shows the surface. pyvista is loaded when the first one arrives.
 
@@ -64,7 +50,8 @@ class SurfacePanel(QWidget):
     settings : Settings
         Store style and viewpoints.
     flat : callable
-        Makes the map that is shown without 3D.
+        Makes the map that is shown without 3D: a widget with `set_image`, `show_cursor` and the
+        signal `pointed`.
 
     Attributes
     ----------
@@ -85,20 +72,20 @@ class SurfacePanel(QWidget):
 
     pointed = Signal(float, float)
 
-    def __init__(self, jobs: Jobs, *, settings: Settings, flat: Callable[[], FlatMap]) -> None:
+    def __init__(self, jobs: Jobs, *, settings: Settings, flat: Callable[[], Any]) -> None:
         super().__init__()
         named(self, "view3d", tr("Surface in 3D"))
         self._jobs, self._settings = jobs, settings
         self.view: Interactor | None = None
         self.reason = ""
-        self.style = style_from_text(settings.display("view3d"))
+        self.view_style = style_from_text(settings.display("view3d"))
         self.pins: tuple[Point, ...] = ()
         self._asked = False
         self._last: Surface | None = None
         self._lines: tuple[SurfaceLine, ...] = ()
         self._solid: Callable[[], pv.PolyData] | None = None
         self._make_flat = flat
-        self._flat: FlatMap | None = None
+        self._flat: Any = None
         self.menu = ViewMenu(self, settings=settings)
         self._lay_out()
 
@@ -191,11 +178,11 @@ class SurfacePanel(QWidget):
 
     def set_exaggeration(self, factor: float) -> None:
         """Set the scale of the depth."""
-        self.set_style(replace(self.style, exaggeration=factor))
+        self.set_style(replace(self.view_style, exaggeration=factor))
 
     def set_style(self, style: Style) -> None:
         """Show or hide parts of the style, and store it."""
-        self.style = style
+        self.view_style = style
         self._settings.keep_display("view3d", style_as_text(style))
         if self.view is not None:
             self.view.set_style(style)
@@ -249,7 +236,7 @@ class SurfacePanel(QWidget):
 
     def _make(self, kind: type[Interactor]) -> None:
         view = self.view = kind()
-        view.set_style(self.style)
+        view.set_style(self.view_style)
         view.scene.show_lines(self._lines)
         self.show_solid(self._solid)
         view.pointed.connect(self.pointed)
@@ -302,9 +289,10 @@ def _load() -> type[Interactor]:
         If its libraries cannot be loaded.
     """
     try:
-        return importlib.import_module(MODULE).Interactor
+        kind: type[Interactor] = importlib.import_module(MODULE).Interactor
     except ImportError as error:
         _LOG.exception("The 3D view cannot be loaded")
         raise InputError(
             tr("The library pyvista cannot be loaded"), where=tr("3D view"), advice=Remedy.REINSTALL
         ) from error
+    return kind

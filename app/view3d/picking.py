@@ -116,7 +116,7 @@ def pins_text(surface: Surface, pins: tuple[Point, ...]) -> str:
     """Return position and depth of each pin, and the measurements between two, one line each."""
     lines = [
         tr("{name}: x {x:.2f} mm  y {y:.2f} mm  depth {d}").format(
-            name=name, x=x, y=y, d=in_unit(float(surface.depth_at([x], [y])[0]))
+            name=name, x=x, y=y, d=in_unit(float(surface.depth_at(np.array([x]), np.array([y]))[0]))
         )
         for name, (x, y) in zip(PIN_NAMES, pins, strict=False)
     ]

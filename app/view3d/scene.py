@@ -30,7 +30,7 @@ from app.view3d.overlays import (
 )
 from app.view3d.picking import Point
 from app.view3d.sheet import SheetActor
-from app.view3d.style import VIEWS, Ink, Style, Viewpoint
+from app.view3d.style import VIEWS, Ink, Style, Viewpoint, vector
 from app.view3d.surface import LIVE_NODES, Surface, SurfaceLine
 
 # Around the surface, left and right, above and below: the labels of the axes reach into it.
@@ -197,8 +197,8 @@ class Scene:
         if surface is None:
             return
         ends = surface.x_mm[:, [0, -1]].ravel()
-        rims = np.column_stack([ends, -np.repeat(surface.y_mm, 2)])
-        points = np.vstack([np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]])
+        rims = np.column_stack([ends, -np.repeat(surface.y_mm, 2)]).astype(np.float64)
+        points: Array = np.vstack([np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]])
         points = np.insert(points, 3, 1.0, axis=1)
         self._plotter.renderer.reset_camera(render=False, bounds=self.box)
         size = np.maximum(self._plotter.window_size, 1)  # 0 before the first paint
@@ -249,8 +249,7 @@ class Scene:
         """The camera position."""
         camera = self._plotter.camera
         position, focus, up = (
-            tuple(float(v) for v in vector)
-            for vector in (camera.position, camera.focal_point, camera.up)
+            vector(place) for place in (camera.position, camera.focal_point, camera.up)
         )
         return Viewpoint(
             position, focus, up, bool(camera.parallel_projection), float(camera.parallel_scale)

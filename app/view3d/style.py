@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 from app.widgets.fields import is_possible, switch
 from gelpolight_core.translation import tr
@@ -92,9 +94,15 @@ def viewpoints_from_text(text: str) -> dict[str, Viewpoint]:
         return {}
 
 
-def _viewpoint(kept: dict[str, object]) -> Viewpoint:
-    vectors = [tuple(float(v) for v in kept[name]) for name in ("position", "focus", "up")]  # type: ignore[attr-defined]
-    scale = float(kept["parallel_scale"])  # type: ignore[arg-type]
-    if any(len(v) != 3 or not all(map(math.isfinite, v)) for v in vectors) or not scale > 0.0:
+def _viewpoint(kept: dict[str, Any]) -> Viewpoint:
+    position, focus, up = (vector(kept[name]) for name in ("position", "focus", "up"))
+    scale = float(kept["parallel_scale"])
+    if not all(map(math.isfinite, (*position, *focus, *up))) or not scale > 0.0:
         raise ValueError("not a viewpoint")
-    return Viewpoint(*vectors, bool(kept["parallel"]), scale)  # type: ignore[arg-type]
+    return Viewpoint(position, focus, up, bool(kept["parallel"]), scale)
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """Return three numbers as plain floats."""
+    x, y, z = map(float, values)
+    return x, y, z

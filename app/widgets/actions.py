@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QPushButton, QWidget
 
 from app.theme.icons import icon
@@ -44,7 +44,7 @@ def make_action(
     action = QAction(text, parent)
     action.setObjectName(name)
     keys = tuple(filter(None, keys))
-    action.setShortcuts(list(keys))
+    action.setShortcuts([QKeySequence(key) for key in keys])
     if icon_name:
         action.setIcon(icon(icon_name))
     if tip or keys:

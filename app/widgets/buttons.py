@@ -32,7 +32,9 @@ def push_button(
     tip : str, optional
         Tooltip.
     """
-    return _finish(QPushButton(text), name, accessible or text, slot, icon_name, tip)
+    button = QPushButton(text)
+    _finish(button, name, accessible or text, slot, icon_name, tip)
+    return button
 
 
 def tool_button(
@@ -42,7 +44,8 @@ def tool_button(
     button = QToolButton()
     button.setText(text)
     button.setAutoRaise(True)
-    return _finish(button, name, accessible or text, slot, icon_name, tip)
+    _finish(button, name, accessible or text, slot, icon_name, tip)
+    return button
 
 
 def _finish(
@@ -52,8 +55,8 @@ def _finish(
     slot: Slot,
     icon_name: str,
     tip: str,
-) -> QPushButton | QToolButton:
+) -> None:
     if icon_name:
         button.setIcon(icon(icon_name))
     button.clicked.connect(lambda _checked=False: slot())
-    return named(button, name, accessible.replace("&", ""), tip)
+    named(button, name, accessible.replace("&", ""), tip)

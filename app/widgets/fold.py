@@ -27,8 +27,9 @@ class Fold(QWidget):
     def __init__(self, name: str, title: str, content: QWidget, *, unfolded: bool = False) -> None:
         super().__init__()
         self._content = content
-        self.title = named(QToolButton(autoRaise=True, checkable=True), name, title)
+        self.title = named(QToolButton(autoRaise=True), name, title)
         self.title.setText(title)
+        self.title.setCheckable(True)
         self.title.setProperty("fold", True)
         self.title.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.title.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)

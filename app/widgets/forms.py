@@ -91,8 +91,8 @@ class Form(QWidget, Generic[V]):
     def show_row(self, name: str, on: bool) -> None:
         """Show or hide the row of a field."""
         made = self.inputs[name]
-        row = made if made.parentWidget() is self else made.parentWidget()
-        self.rows.setRowVisible(row, on)
+        holder = made.parentWidget()
+        self.rows.setRowVisible(made if holder in (self, None) else holder, on)
 
     def _put_beside(self, name: str, words: str, other: QWidget) -> None:
         made, row = self.inputs[name], QWidget()

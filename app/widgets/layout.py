@@ -26,7 +26,9 @@ def hbox(
     spacing: int | None = None,
 ) -> QHBoxLayout:
     """Return a row of widgets, see :func:`vbox`."""
-    return _fill(QHBoxLayout(), parts, of, margins, spacing)
+    row = QHBoxLayout()
+    _fill(row, parts, of, margins, spacing)
+    return row
 
 
 def vbox(
@@ -49,7 +51,9 @@ def vbox(
     spacing : int, optional
         Between two parts.
     """
-    return _fill(QVBoxLayout(), parts, of, margins, spacing)
+    column = QVBoxLayout()
+    _fill(column, parts, of, margins, spacing)
+    return column
 
 
 def _fill(
@@ -58,7 +62,7 @@ def _fill(
     of: QWidget | None,
     margins: Margins | None,
     spacing: int | None,
-) -> Any:
+) -> None:
     if of is not None:
         of.setLayout(box)
     if margins is not None:
@@ -75,7 +79,6 @@ def _fill(
             box.addLayout(item, *more)
         else:
             box.addWidget(item, *more)
-    return box
 
 
 def keep_space(widget: QWidget) -> None:

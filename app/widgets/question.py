@@ -9,6 +9,7 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QLineEdit,
     QPushButton,
+    QVBoxLayout,
     QWidget,
 )
 
@@ -53,7 +54,9 @@ class Question(Dialog):
     def require_text(self, hint: str, most: int) -> QLineEdit:
         """Add a line of text without which no answer can be chosen. Return it."""
         line = named(QLineEdit(self, placeholderText=hint, maxLength=most), "question.line", hint)
-        self.layout().insertWidget(1, line)
+        column = self.layout()
+        assert isinstance(column, QVBoxLayout)
+        column.insertWidget(1, line)
         for button in self.findChildren(QPushButton, QRegularExpression("question.answer")):
             button.setEnabled(False)
             line.textChanged.connect(lambda text, b=button: b.setEnabled(bool(text.strip())))

@@ -195,8 +195,8 @@ class Workspace:
 
     def entry_of(self, identity: str) -> Entry | None:
         """Return a calibration by its identity; None if it is not in the library."""
-        entries = (e for e in self.entries() if e.summary is not None)
-        return next((e for e in entries if e.summary.identity == identity), None)
+        found = (e for e in self.entries() if e.summary and e.summary.identity == identity)
+        return next(found, None)
 
     def sessions(self) -> tuple[SessionEntry, ...]:
         """Return every session, by sensor, the last changed first.

@@ -77,7 +77,7 @@ def drift(operator: Operator) -> None:
     bench(operator).lay("bare")
     bench(operator).adjust(exposure_ms=DRIFTED_MS)
     operator.pause(3.0)
-    operator.until(lambda: page.depth.state.fault is not None, "the fault")
+    operator.until(lambda: page.live_depth.state.fault is not None, "the fault")
     operator.shot("inspect-drift")
     bench(operator).adjust(exposure_ms=10.0)
     operator.pause(6.0)

@@ -13,7 +13,7 @@ import pytest
 from report_pdf import report_data
 
 from app.command_line.main import MENDABLE, main
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place import BALLS
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.errors import InputError
@@ -85,6 +85,15 @@ def test_a_new_gel_needs_a_background_only(
     command = ["refresh", str(calibration), "--background", str(background), "-o", str(new)]
     assert main(command) == 0
     assert new.is_file()
+
+
+def test_a_new_gel_with_some_balls_is_corrected(
+    calibration: Path, closed_folder: Path, tmp_path: Path
+) -> None:
+    new = tmp_path / "new.gplcal"
+    command = ["refresh", str(calibration), "--session", str(closed_folder), "-o", str(new)]
+    assert main(command) == 0
+    assert read_calibration(new).model == "in-place"
 
 
 def test_one_message_lists_all_that_an_open_calibration_lacks(

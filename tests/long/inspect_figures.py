@@ -54,12 +54,12 @@ class Measurement:
         self._lateness, self._began_s = Lateness(), time.monotonic()
         self._depth_ms: list[float] = []
         self._ages_ms: list[float] = []
-        self.page.depth.shown.connect(self._on_shown)
+        self.page.live_depth.shown.connect(self._on_shown)
         self._move = QTimer()
         self._move.timeout.connect(self._drag)
         self._move.start(DRAG_MS)
         live = Reconstructor(calibration, effort=options.effort)
-        self.page.depth.calibrations.loaded.emit(live, live)
+        self.page.live_depth.calibrations.loaded.emit(live, live)
         self.page.show()
         self.page.enter()
 

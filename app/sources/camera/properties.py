@@ -33,7 +33,7 @@ class _Property:
 
 
 def _milliseconds(log2_seconds: float) -> float:
-    return 1000.0 * 2.0 ** min(max(log2_seconds, -20.0), 10.0)
+    return 1000.0 * math.exp2(min(max(log2_seconds, -20.0), 10.0))
 
 
 def _log2_seconds(milliseconds: float) -> float:

@@ -217,8 +217,8 @@ class V4l2:
         elif not kind.switch:
             low, high = query.minimum * scale, query.maximum * scale
             step, value = max(query.step, 1) * scale, reading.value * scale
-        rounded = (round(x, 6) for x in (low, high, step, value))
-        return Setting(key, kind.label(), kind.unit, *rounded, writable)
+        low, high, step, value = (round(x, 6) for x in (low, high, step, value))
+        return Setting(key, kind.label(), kind.unit, low, high, step, value, writable)
 
     def _query(self, key: str) -> QueryControl | None:
         query = QueryControl(id=_KNOWN[key].number) if key in _KNOWN else None
@@ -237,7 +237,7 @@ class V4l2:
         if key == "power_line_hz":
             return min(MAINS_HZ, key=lambda number: abs(MAINS_HZ[number] - value))
         number = round(value / _KNOWN[key].scale)
-        return min(max(number, query.minimum), query.maximum)
+        return int(min(max(number, query.minimum), query.maximum))
 
     def _automatic_exposure(self, query: QueryControl) -> int:
         """Return the automatic exposure mode that the camera has; most have only one."""
@@ -271,7 +271,8 @@ class V4l2:
 
 def gone(address: str, error: OSError) -> CameraGone:
     """Return why a camera cannot be used, from the system's error."""
-    found, advice = tr("the camera was not found"), Remedy.PLUG_IN
+    found = tr("the camera was not found")
+    advice: Remedy | str = Remedy.PLUG_IN
     if error.errno in (errno.EBUSY, errno.EAGAIN):
         found, advice = tr("another program uses the camera"), Remedy.CLOSE_PROGRAM
     elif error.errno in (errno.EACCES, errno.EPERM):

@@ -55,12 +55,12 @@ def presses(small_session: Path, context: AppContext) -> Path:
 def _use(page: InspectPage, calibration: Calibration) -> None:
     """Show depth through a calibration with the paper's model, which is fast."""
     reconstructor = Reconstructor(calibration, model="paper")
-    page.depth.calibrations.loaded.emit(reconstructor, reconstructor)
+    page.live_depth.calibrations.loaded.emit(reconstructor, reconstructor)
 
 
 def _wait_for_depth(page: InspectPage, qtbot: QtBot) -> None:
     def there() -> bool:
-        return page.depth.last is not None and page.depth.last.heightmap is not None
+        return page.live_depth.last is not None and page.live_depth.last.heightmap is not None
 
     qtbot.waitUntil(there, timeout=WAIT_MS)
 
@@ -95,9 +95,9 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     assert surface.view is not None and surface.reason == ""
     view = surface.view
     qtbot.waitUntil(lambda: view.drawings > 3, timeout=WAIT_MS)
-    frames, drawings = page.views.height.map.shown_images, view.drawings
+    frames, drawings = page.views.map_panel.map.shown_images, view.drawings
     qtbot.waitUntil(lambda: view.drawings > drawings + 5, timeout=WAIT_MS)
-    shown = page.views.height.map.shown_images - frames
+    shown = page.views.map_panel.map.shown_images - frames
     # The painting of the last frame may still be running.
     assert abs((view.drawings - drawings) - shown) <= 1
     image = view.grabFramebuffer()
@@ -118,19 +118,19 @@ def test_all_views_share_the_cursor_and_its_values_are_shown(
     assert "x 1.00, y 2.00 mm" in readout.text()
     value = page.findChild(QLabel, "inspect.depth")
     assert value is not None and value.text().endswith(" mm")
-    assert page.views.height.map._lines[0].value() == 1.0
+    assert page.views.map_panel.map._lines[0].value() == 1.0
 
 
 def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
     page: InspectPage,
 ) -> None:
-    height, display = page.views.height, page.views.display
+    height, display = page.views.map_panel, page.views.display
     height.range_dragged.emit(0.1, 0.45)
     assert display.display.range_mm == pytest.approx((0.1, 0.45))
-    assert page.depth._maker.wanted.display.range_mm == display.display.range_mm
+    assert page.live_depth._maker.wanted.display.range_mm == display.display.range_mm
     height.range_released.emit()
     assert display.display.range_mm is None
-    assert page.depth._maker.wanted.display.range_mm is None
+    assert page.live_depth._maker.wanted.display.range_mm is None
 
 
 def test_a_frozen_image_stays_until_it_is_continued(
@@ -145,12 +145,12 @@ def test_a_frozen_image_stays_until_it_is_continued(
     qtbot.keyClick(page, Qt.Key.Key_Space)
     assert page.live.paused
     qtbot.wait(200)
-    assert page.depth.last is not None
-    number = page.depth.last.frame.number
+    assert page.live_depth.last is not None
+    number = page.live_depth.last.frame.number
     qtbot.wait(400)
-    assert page.depth.last.frame.number == number
+    assert page.live_depth.last.frame.number == number
     page.pause_action.trigger()
-    qtbot.waitUntil(lambda: page.depth.last.frame.number > number, timeout=WAIT_MS)  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: page.live_depth.last.frame.number > number, timeout=WAIT_MS)  # type: ignore[union-attr]
 
 
 def test_a_calibration_of_another_image_size_is_refused_with_both_sizes(
@@ -179,7 +179,7 @@ def test_a_calibration_of_another_sensor_is_refused_with_both_serials(
     text, button = _advice(page)
     assert "lab-7" in text and "virtual-1" in text
     assert "Calibrate the virtual sensor" in button.text()
-    assert page.depth.live_reconstructor is None
+    assert page.live_depth.live_reconstructor is None
 
 
 def _wait_for_section(page: InspectPage, qtbot: QtBot) -> None:
@@ -197,15 +197,15 @@ def test_an_unused_calibration_is_released(
     figures = page.findChild(QLabel, "inspect.section.figures")
     readout = page.findChild(QLabel, "inspect.readout")
     assert figures is not None and readout is not None
-    assert views.height.map.has_image and figures.text() and readout.text()
-    last = page.depth.last
+    assert views.map_panel.map.has_image and figures.text() and readout.text()
+    last = page.live_depth.last
     assert last is not None
     late = Outcome(live._processor.generation, last.frame, last)  # type: ignore[union-attr]
-    page.depth.calibrations.loaded.emit(None, None)
+    page.live_depth.calibrations.loaded.emit(None, None)
     live._outbox.put(late)
     live._poll()
     page._show_texts()
-    assert not views.height.map.has_image
+    assert not views.map_panel.map.has_image
     assert views.section.cut.profile is None
     assert (figures.text(), readout.text()) == ("", "")
     assert page._pixel_map is None
@@ -223,7 +223,7 @@ def test_a_frozen_image_ends_with_its_source(
     page.pause(True)
     info = image_folder(small_session / "background")
     context.source.choose(info)
-    assert not page.views.height.map.has_image
+    assert not page.views.map_panel.map.has_image
     assert not page.live.paused and not page.pause_action.isChecked()
     _wait_for_section(page, qtbot)
 
@@ -236,7 +236,7 @@ def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: Q
     again = InspectPage(context=context)
     qtbot.addWidget(again)
     assert again.views.layout_shown == Layout("normals", section=True)
-    assert not again.views.normals.isHidden() and again.views.height.isHidden()
+    assert not again.views.normals.isHidden() and again.views.map_panel.isHidden()
     again.may_close()
 
 
@@ -248,7 +248,7 @@ def test_the_frame_that_is_shown_is_exported_as_reconstructed(
     _wait_for_depth(page, qtbot)
     page.pause(True)
     qtbot.wait(300)
-    last = page.depth.last
+    last = page.live_depth.last
     assert last is not None and last.heightmap is not None
     page.export.run(ExportChoice(tmp_path / "out", ("npz",)))
     path = tmp_path / "out" / f"frame-{last.frame.number:05d}.npz"
@@ -281,8 +281,8 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     page.file_actions.saving.save_movie(tmp_path / "press.mp4", choice)
     movie = cv2.VideoCapture(str(tmp_path / "press.mp4"))
     assert movie.get(cv2.CAP_PROP_FRAME_COUNT) == source.playback().count  # type: ignore[attr-defined]
-    shown = page.views.height.map.shown_images
-    qtbot.waitUntil(lambda: page.views.height.map.shown_images > shown, timeout=WAIT_MS)
+    shown = page.views.map_panel.map.shown_images
+    qtbot.waitUntil(lambda: page.views.map_panel.map.shown_images > shown, timeout=WAIT_MS)
 
 
 def test_zero_uses_the_present_background_and_can_be_undone(
@@ -297,7 +297,7 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     write_calibration(small_calibration, path)
     context.workspace.use(path)
     page.enter()
-    qtbot.waitUntil(lambda: page.depth.reconstructor is not None, timeout=4 * WAIT_MS)
+    qtbot.waitUntil(lambda: page.live_depth.reconstructor is not None, timeout=4 * WAIT_MS)
     page.zero.set_zero()
     zero = path.with_name("mine-zero.gplcal")
     qtbot.waitUntil(lambda: context.workspace.in_use == zero, timeout=WAIT_MS)
@@ -362,19 +362,19 @@ def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstruct
     assert not page.processed.isVisible()
     page.pause(True)
     qtbot.waitUntil(page.processed.isVisible, timeout=WAIT_MS)
-    last = page.depth.last
+    last = page.live_depth.last
     assert last is not None and last.raw is not None and last.heightmap is not None
     assert last.processed[0] in line.text()
     assert not np.array_equal(last.raw.depth_mm, last.heightmap.depth_mm)
     mask = page.findChild(QComboBox, "inspect.processing.mask")
     assert mask is not None
     mask.setCurrentIndex(mask.findData("outside"))
-    qtbot.waitUntil(lambda: len(page.depth.last.processed) == 2, timeout=WAIT_MS)  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: len(page.live_depth.last.processed) == 2, timeout=WAIT_MS)  # type: ignore[union-attr]
     assert page.views.region._roi.isVisible()
     reset.click()
     qtbot.waitUntil(lambda: not page.processed.isVisible(), timeout=WAIT_MS)
     assert mask.currentData() == "none" and not page.views.region._roi.isVisible()
-    assert page.depth.last is not None and page.depth.last.heightmap is last.raw
+    assert page.live_depth.last is not None and page.live_depth.last.heightmap is last.raw
 
 
 def test_the_held_reference_is_subtracted_as_it_was_reconstructed(
@@ -390,6 +390,6 @@ def test_the_held_reference_is_subtracted_as_it_was_reconstructed(
     hold.click()
     subtract.setChecked(True)
     qtbot.waitUntil(page.processed.isVisible, timeout=WAIT_MS)
-    last = page.depth.last
+    last = page.live_depth.last
     assert last is not None and last.heightmap is not None
     assert np.abs(last.heightmap.depth_mm).max() == pytest.approx(0.0, abs=1e-6)

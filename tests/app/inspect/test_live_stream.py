@@ -46,7 +46,7 @@ def live(
     context.source.choose(info)
     page.enter()
     reconstructor = Reconstructor(small_calibration, model="paper")
-    page.depth.calibrations.loaded.emit(reconstructor, reconstructor)
+    page.live_depth.calibrations.loaded.emit(reconstructor, reconstructor)
     return page
 
 

@@ -48,7 +48,7 @@ def test_an_image_has_any_size_and_the_screen_s_content(
 
 def test_a_scale_bar_goes_with_an_image_though_the_screen_shows_none(panel: SurfacePanel) -> None:
     assert panel.view is not None
-    assert not panel.style.scale_bar
+    assert not panel.view_style.scale_bar
     image_of(panel.view.scene, (320, 240))
     assert "scale-bar" not in panel.view.actors
 

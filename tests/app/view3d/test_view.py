@@ -137,7 +137,7 @@ def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(
     assert depth[0][0] == 0.0 and depth[-1][0] == 1.0
     assert all(5.0 * value == pytest.approx(place) for value, place in depth)
     with_axes = _drawn(panel, qtbot)
-    panel.set_style(replace(panel.style, axes=False))
+    panel.set_style(replace(panel.view_style, axes=False))
     assert np.abs(with_axes.astype(int) - _drawn(panel, qtbot)).max() > 60
 
 
@@ -197,7 +197,7 @@ def test_a_click_on_the_orientation_widget_changes_the_view(
 def test_style_and_viewpoints_are_remembered(
     panel: SurfacePanel, settings: Settings, qtbot: QtBot
 ) -> None:
-    panel.set_style(replace(panel.style, wireframe=True, orientation=False))
+    panel.set_style(replace(panel.view_style, wireframe=True, orientation=False))
     panel.view_from("side")
     side = panel.view.scene.viewpoint  # type: ignore[union-attr]
     panel.menu.save_viewpoint("from the side")
@@ -207,7 +207,7 @@ def test_style_and_viewpoints_are_remembered(
     jobs = Jobs("again")
     again = SurfacePanel(jobs, settings=settings, flat=flat_map)
     qtbot.addWidget(again)
-    assert again.style.wireframe and not again.style.orientation
+    assert again.view_style.wireframe and not again.view_style.orientation
     jobs.close()
 
 
