@@ -30,6 +30,9 @@ TOGETHER = 4.0
 """Neighbours along a row with one error, by resampling and denoising."""
 OFTEN = 0.8
 """Share of the nodes that must agree: pixels at edges, beside shadows and on specks do not."""
+BLOCK = 3
+"""Squares to a side of a block: one and a half decay lengths, over which errors of the model are
+alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,8 @@ class ContactLight:
     spread : float
         Size of what is left on gentle slopes, in standard deviations.
     uneven : float
-        Share of the slopes that belongs to no surface, over the misfit of the calibration's balls.
+        Share of the slopes of a block that belongs to no surface, over what the misfit of the
+        calibration's balls and the nodes explain; of the worst, over the worst expected of as many.
     """
 
     stretch: float
@@ -104,7 +108,7 @@ def contact_light(
         the flat membrane's, and the slope; NaN where not known.
     step : int
         Distance of the rows in nodes: half the drape's decay length.
-    uneven : (2, rows, columns) float32
+    uneven : (2, rows, columns / step) float32
         Size of the part of the slopes that belongs to no surface, and of the slopes, both averaged
         over squares; NaN where not known.
     misfit : float
@@ -142,9 +146,26 @@ def contact_light(
         deviation = (rest - found * stretch * whole)[judged] / sigma[judged]
         usual = NormalDist().inv_cdf(0.5 * (1.0 + OFTEN))
         spread = float(np.quantile(np.abs(deviation), OFTEN)) / usual
-    off, size_of = uneven[:, uneven[1] > EDGES[0]]
-    share = float(np.median(off / (EDGES[0] + size_of))) if off.size >= LEAST_NODES else 0.0
-    return ContactLight(found, found_sd, spread, share / misfit)
+    return ContactLight(found, found_sd, spread, _worst_block(uneven, step, misfit))
+
+
+def _worst_block(uneven: Map, step: int, misfit: float) -> float:
+    """Return the unevenness of the worst block, over the worst expected of as many."""
+    # Lamps are not points: beside nodes without light they are hidden in part.
+    solved = np.isfinite(uneven[1]).astype(np.uint8)
+    usable = cv2.erode(solved, np.ones((3, 3), np.uint8), borderValue=1) > 0
+    known = usable & (uneven[1] > EDGES[0])
+    share = np.where(known, uneven[0] / (EDGES[0] + uneven[1]), np.float32(0.0))
+    count, total = (
+        cv2.boxFilter(part, -1, (BLOCK, BLOCK), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        for part in (known.astype(np.float32), share)
+    )
+    at, blocks = count > BLOCK, np.count_nonzero(known) / BLOCK**2
+    if blocks < 2.0 or not at.any():
+        return 0.0
+    # A slope that decays is known to within one node, over the root of 12.
+    level = math.hypot(misfit, 0.5 / step / math.sqrt(12.0))
+    return float((total[at] / count[at]).max()) / level / math.sqrt(2.0 * math.log(blocks))
 
 
 def _proportional(seen: NDArray[np.float64]) -> tuple[float, float]:

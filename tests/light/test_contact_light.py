@@ -83,11 +83,24 @@ def test_an_object_that_moves_during_the_exposure_is_doubtful(
     assert keys(Reconstructor(known.calibration, effort=effort).depth(image)) == {"residual"}
 
 
-def test_dirt_on_the_wall_of_a_contact_is_doubtful(known: KnownSensor, press: KnownPress) -> None:
+@pytest.mark.parametrize(("x_mm", "y_mm"), [(3.8, -0.8), (1.2, 1.8)])
+def test_dirt_on_the_wall_of_a_contact_is_doubtful(
+    known: KnownSensor, press: KnownPress, x_mm: float, y_mm: float
+) -> None:
     rays = known.sensor.rays
-    spot = np.hypot(rays.x_mm - 3.7, rays.y_mm + 0.8) < 0.5
+    spot = np.hypot(rays.x_mm - x_mm, rays.y_mm - y_mm) < 0.5
     image = known.noisy(press.frame * (1.0 - 0.3 * spot)[..., None].astype(np.float32))
     assert "residual" in keys(Reconstructor(known.calibration).depth(image))
+
+
+def test_one_uneven_block_is_found_and_one_beside_nodes_without_light_is_not() -> None:
+    gap = np.full((4, 40, 160), np.nan, np.float32)
+    uneven = np.stack([np.full((40, 40), 1e-3), np.full((40, 40), 0.5)]).astype(np.float32)
+    assert not contact_light(gap, 4, uneven, 0.01).findings
+    uneven[0, 20:23, 20:23] = 0.3
+    assert [f.key for f in contact_light(gap, 4, uneven, 0.01).findings] == ["residual"]
+    uneven[:, 21, 21] = np.nan
+    assert not contact_light(gap, 4, uneven, 0.01).findings
 
 
 def test_the_share_by_stretch_is_found_in_noise_and_its_deviation_follows_from_the_misfit() -> None:
@@ -96,12 +109,13 @@ def test_the_share_by_stretch_is_found_in_noise_and_its_deviation_follows_from_t
     stretch, whole = np.sqrt(1.0 + slope**2) - 1.0, np.full_like(slope, 1.2)
     noise = np.full_like(slope, 0.01)
     left = -0.08 * stretch * whole + noise * random.standard_normal(slope.shape)
-    even = np.stack([np.full((9, 9), 1e-4), np.full((9, 9), 0.5)]).astype(np.float32)
+    even = np.stack([np.full((60, 200), 1e-4), np.full((60, 200), 0.5)]).astype(np.float32)
     found = contact_light(np.stack([left, whole, noise, slope]), 1, even, 0.005)
     assert found.stretch == pytest.approx(-0.08, abs=0.005)
     assert 0.002 < found.stretch_sd < 0.02
     assert found.spread == pytest.approx(0.9, abs=0.15)
-    assert found.uneven == pytest.approx(1e-4 / 0.6 / 0.005, rel=1e-3)
+    level, worst = np.hypot(0.005, 0.5 / np.sqrt(12.0)), np.sqrt(2.0 * np.log(60 * 200 / 9))
+    assert found.uneven == pytest.approx(1e-4 / 0.6 / level / worst, rel=1e-3)
     assert [f.key for f in found.findings] == ["stretched"]
     twice = contact_light(np.stack([left, whole, noise, slope]), 1, even, 0.01)
     assert twice.stretch_sd == pytest.approx(2.0 * found.stretch_sd, rel=0.1)

@@ -757,25 +757,31 @@ def uneven_rows(first, last, slopes, depth, pitch_mm, size, uneven):  # type: ig
     size : int
         Nodes to a side of a square whose slopes are averaged.
     uneven : (2, squares down, squares across) float32
-        Size of the mean difference, and of the mean slope, of every second square along both axes;
-        NaN where less than half a square has two lights. Written.
+        Size of the mean difference, and of the mean slope, of every square; NaN where a node has
+        less than two lights. Written.
     """
     weight, slope_x, slope_y = slopes.weight, slopes.slope_x, slopes.slope_y
     per_mm = ONE / pitch_mm
     for row in range(first, last):
+        top = row * size
+        bottom = min(top + size, depth.shape[0] - 1)
         for column in range(uneven.shape[2]):
-            count, off_x, off_y, mean_x, mean_y = ZERO, ZERO, ZERO, ZERO, ZERO
-            top, left = 2 * row * size, 2 * column * size
-            for i in range(top, min(top + size, depth.shape[0] - 1)):
-                for j in range(left, min(left + size, depth.shape[1] - 1)):
-                    known = ONE if weight[i, j] >= _ONE_DARK else ZERO
-                    x = HALF * (slope_x[i, j] + slope_x[i, j + 1])
-                    y = HALF * (slope_y[i, j] + slope_y[i + 1, j])
-                    off_x += known * (x - (depth[i, j + 1] - depth[i, j]) * per_mm)
-                    off_y += known * (y - (depth[i + 1, j] - depth[i, j]) * per_mm)
-                    mean_x += known * x
-                    mean_y += known * y
-                    count += known
-            share = ONE / count if count > HALF * single(size * size) else single(np.nan)
+            left = column * size
+            right = min(left + size, depth.shape[1] - 1)
+            known, off_x, off_y, sum_x, sum_y = True, ZERO, ZERO, ZERO, ZERO
+            # Differences of the depth add up to those between the square's sides.
+            for i in range(top, bottom):
+                off_x += HALF * (slope_x[i, right] - slope_x[i, left])
+                off_x -= (depth[i, right] - depth[i, left]) * per_mm
+                for j in range(left, right):
+                    known &= weight[i, j] >= _ONE_DARK
+                    sum_x += slope_x[i, j]
+                    sum_y += slope_y[i, j]
+            for j in range(left, right):
+                off_y += HALF * (slope_y[bottom, j] - slope_y[top, j])
+                off_y -= (depth[bottom, j] - depth[top, j]) * per_mm
+            off_x, off_y = off_x + sum_x, off_y + sum_y
+            count = single((bottom - top) * (right - left))
+            share = ONE / count if known and count > ZERO else single(np.nan)
             uneven[0, row, column] = share * sqrt(off_x * off_x + off_y * off_y)
-            uneven[1, row, column] = share * sqrt(mean_x * mean_x + mean_y * mean_y)
+            uneven[1, row, column] = share * sqrt(sum_x * sum_x + sum_y * sum_y)

@@ -358,7 +358,7 @@ class RegionSolver:
         found = (scale, corner, self.maps.membrane, solved.slopes)
         image, start = solved.compared.fine, solved.start_mm
         self._workers.run(rows // step, left_rows, image, start, *found, step, left)
-        uneven = np.empty((2, rows // (2 * step), columns // (2 * step)), np.float32)
+        uneven = np.empty((2, rows // step, columns // step), np.float32)
         surface = (solved.slopes, solved.depth_mm, np.float32(scale.pitch_mm), step)
         self._workers.run(uneven.shape[1], uneven_rows, *surface, uneven)
         # Where nodes do not resolve the drape, a node at an edge has no single normal.
