@@ -60,13 +60,14 @@ class BackgroundStep(ImageStep):
 
     step = step_of(
         BACKGROUND,
-        tr(
-            "The membrane is in place, and nothing touches it. Switch automatic exposure and white "
-            "balance off, and do not change the exposure or the light afterwards."
-        ),
+        tr("Mount the membrane, and let nothing touch it."),
         "membrane",
         frames=16,
         wanted=1,
+        advice=tr(
+            "Switch automatic exposure and white balance off, and do not change the exposure or "
+            "the light afterwards."
+        ),
     )
 
     def detector(self, name: str) -> Detector:

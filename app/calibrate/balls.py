@@ -26,11 +26,11 @@ from app.calibrate.image_step import ImageStep
 from app.calibrate.marks import ball_contour, ball_handle, working_circle
 from app.calibrate.step import Parts
 from app.calibrate.step_data import step_of
+from app.calibrate.step_panel import Remedy
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
 from app.widgets.inputs import DoubleSpinBox
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
@@ -39,8 +39,11 @@ from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.optics.resampling import ResamplingTable, seen_at
-from gelpolight_core.reflectance.press import BallPress, find_ball
+from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable, seen_at
+from gelpolight_core.reflectance.agreement import PressAgreement
+from gelpolight_core.reflectance.ball import ball_depth_from_contact
+from gelpolight_core.reflectance.ball_detection import find_indentation
+from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr
 
@@ -52,6 +55,8 @@ FIRST_RADIUS = 0.1
 # A ball pressed in by half its radius has a contact of this radius.
 CONTACT_OF_RADIUS = 0.87
 COARSER = 8
+LIVE_NODES = 200
+"""A contact of 1 mm radius still has more nodes than its detection needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +75,8 @@ class BallSetting:
         The bare membrane, resampled onto the table's grid, crosstalk removed.
     image_size : (width, height)
         Size of the frames in pixels.
+    step : int
+        Pixels over which a frame is averaged before it is resampled.
     """
 
     table: ResamplingTable
@@ -77,6 +84,34 @@ class BallSetting:
     crosstalk: Array
     background: NDArray[np.float32]
     image_size: tuple[int, int]
+    step: int = 1
+
+    def coarser(self) -> BallSetting:
+        """Return the setting for live images, on at least LIVE_NODES nodes along each axis."""
+        step = max(1, min(self.table.grid.shape) // LIVE_NODES)
+        grid, table = self.table.grid, self.table
+        rows, columns = (count // step for count in grid.shape)
+
+        def reduced(nodes: NDArray[Any]) -> NDArray[np.float32]:
+            part = np.asarray(nodes[: step * rows, : step * columns], np.float32)
+            return np.asarray(cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA))
+
+        seen = reduced(table.u_px >= 0.0) == 1.0
+        u_px, v_px = (
+            np.where(seen, reduced(px), np.float32(-1.0)) for px in (table.u_px, table.v_px)
+        )
+        x_mm, y_mm = (
+            axis[: step * count].reshape(-1, step).mean(axis=1)
+            for axis, count in ((grid.x_mm, columns), (grid.y_mm, rows))
+        )
+        coarse = ResamplingTable(
+            MembraneGrid(x_mm, y_mm, step * grid.pitch_mm),
+            u_px,
+            v_px,
+            reduced(table.valid) == 1.0,
+            reduced(table.ray_slope),
+        )
+        return replace(self, table=coarse, background=reduced(self.background), step=step)
 
 
 def detect_ball(
@@ -87,6 +122,7 @@ def detect_ball(
     earlier_mm: Sequence[Point] = (),
     next_mm: Point | None = None,
     editable: bool = False,
+    live: bool = False,
 ) -> Detection:
     """Find a pressed ball.
 
@@ -104,6 +140,8 @@ def detect_ball(
         Where to press next, from :func:`next_press_mm`.
     editable : bool, optional
         Whether the contact circle can be dragged; its handle is ball.
+    live : bool, optional
+        Only find the contact, without its comparison with the shading: ten times a second.
     """
     table = setting.table
     done = _pixels(earlier_mm, table)
@@ -112,24 +150,31 @@ def detect_ball(
 
     def detect() -> Detection:
         refuse_size(rgb, setting.image_size)
-        seen = unmix(table.apply(as_image(rgb).rgb), setting.crosstalk)
-        press = find_ball(
-            seen,
-            setting.background,
-            table,
-            setting.led_positions_mm,
-            radius_mm=radius_mm,
-            name=tr("Image"),
-        )
-        handle = ball_handle(press, table) if editable else None
+        image, step = as_image(rgb).rgb, setting.step
+        image = image if step == 1 else np.asarray(cv2.blur(image, (step, step)), np.float32)
+        seen, name = unmix(table.apply(image), setting.crosstalk), tr("Image")
+        if live:
+            found = find_indentation(seen, setting.background, valid=table.valid, name=name)
+            figures = found.quality.figures
+            contact_mm = table.grid.pitch_mm * found.contact_radius_px
+            if contact_mm >= radius_mm:
+                raise larger_contact(contact_mm, radius_mm, name)
+            depth_mm = ball_depth_from_contact(contact_mm, radius_mm)
+        else:
+            press = find_ball(
+                seen, setting.background, table, setting.led_positions_mm,
+                radius_mm=radius_mm, name=name,
+            )  # fmt: skip
+            found, figures = press.indentation, press.quality.figures
+            contact_mm, depth_mm = press.contact_radius_mm, press.pose.depth_mm
+        handle = ball_handle(found, table) if editable else None
         marks = Overlay(
             markers=press_marks(done),
             circles=() if handle is None else (handle,),
-            lines=(circle, *ball_contour(press, table)),
+            lines=(circle, *ball_contour(found, table)),
         )
         good = tr("Ball found: contact radius {c:.2f} mm, depth {d:.2f} mm.")
-        text = good.format(c=press.contact_radius_mm, d=press.pose.depth_mm)
-        return judged(marks, press.quality.figures, text)
+        return judged(marks, figures, good.format(c=contact_mm, d=depth_mm))
 
     return or_refusal(detect, marks=Overlay(markers=press_marks(done, there), lines=(circle,)))
 
@@ -207,7 +252,7 @@ class RadiusRow(QWidget):
             tr("Diameter of the ball in mm"),
             tr("Diameter for the next press, or for the shown one"),
         )
-        hbox(PlainLabel(tr("Ball diameter")), (self.box, 1), of=self, margins=0)
+        hbox((self.box, 1), of=self, margins=0)
 
     @property
     def radius_mm(self) -> float:
@@ -237,18 +282,19 @@ class BallsStep(ImageStep):
         self._next_mm: float | None = None
         self.radius = RadiusRow()
         self.radius.box.valueChanged.connect(lambda _: self._on_radius(self.radius.radius_mm))
-        self.panel.add_extra(self.radius, self.radius.box)
+        self._card = self.panel.add_extra(tr("Ball diameter"), self.radius)
 
     step = step_of(
         BALLS,
-        tr(
-            "Press a ball of known diameter into the membrane. Vary the position over the "
-            "whole field, as the ring in the image suggests, and the depth. Enter the ball "
-            "diameter for each press."
-        ),
+        tr("Press the ball where the ring is, and hold it still."),
         "ball",
         frames=4,
         wanted=10,
+        advice=tr(
+            "Vary the position over the whole field, and the depth. Enter the ball diameter of "
+            "each press."
+        ),
+        figure="shading_misfit_percent",
     )
 
     def detector(self, name: str) -> Detector:
@@ -266,10 +312,11 @@ class BallsStep(ImageStep):
             )
             return partial(
                 detect_ball,
-                setting=setting,
+                setting=setting.coarser(),
                 radius_mm=radius_mm,
                 earlier_mm=done,
                 next_mm=next_press_mm(setting.table, radius_mm, done),
+                live=True,
             )
         detect = partial(detect_ball, setting=setting, radius_mm=radius_mm, editable=True)
         return self.of_capture(name, detect, Overlay(lines=(working_circle(setting.table),)))
@@ -288,6 +335,17 @@ class BallsStep(ImageStep):
     def judge(self, path: Path) -> Finding | None:
         """Return how a press was judged."""
         return judge_ball(path.name, self.model.project)
+
+    def remedies(self, state: str) -> tuple[Remedy, ...]:
+        """Offer the diameter that fits a press which disagrees with the others."""
+        project = self.model.project
+        for press in _presses(project):
+            if (odd := _agreement(press, project)) is not None and odd.fault is not None:
+                diameter_mm, name = 2.0 * odd.radius_mm, press.name
+                text = tr("Set {name} to {d:.2g} mm").format(name=Path(name).stem, d=diameter_mm)
+                fit = partial(self.set_radius, name, 0.5 * float(f"{diameter_mm:.2g}"))
+                return (text, fit), (tr("Repeat it"), partial(self.repeat, name))
+        return super().remedies(state)
 
     def note(self, name: str) -> str:
         """Return the diameter of the ball of a press."""
@@ -330,13 +388,13 @@ class BallsStep(ImageStep):
 
     def enter(self) -> None:
         """Show the step with the input of the radius."""
-        self.radius.show()
+        self._card.show()
         super().enter()
 
     def leave(self) -> None:
         """Keep a typed radius, and hide the input."""
         self.radius.box.interpretText()
-        self.radius.hide()
+        self._card.hide()
 
     def close(self) -> None:
         """Keep a typed radius while it can still be saved."""
@@ -395,6 +453,8 @@ def setting_of(results: Results) -> BallSetting | None:
     bare = results.get(BACKGROUND)
     if lens is None or top is None or lights is None or bare is None:
         return None
+    if bare.light.shape[:2] != top.table.grid.shape:  # of an earlier top surface
+        return None
     crosstalk, camera = lights.crosstalk.matrix, lens.camera
     return BallSetting(
         top.table,
@@ -417,17 +477,23 @@ def judge_ball(name: str, project: Project) -> Finding | None:
     press = ball.press
     error_percent = 100.0 * press.shading_misfit
     found = Finding("shading_error_percent", tr("Shading error"), error_percent, "%")
-    if (odd := _disagreement(press, project)) is not None:
-        return replace(found, verdict=Verdict.FAIL, remedy=odd.line)
+    odd = _agreement(press, project)
+    if odd is not None and odd.fault is not None:
+        return replace(found, verdict=Verdict.FAIL, remedy=odd.fault.line)
     worst = worst_of(press.quality.figures)
     return found if worst is None else replace(found, verdict=worst.verdict, remedy=worst.remedy)
 
 
-def _disagreement(press: BallPress, project: Project) -> Finding | None:
-    """Return why a press disagrees with the others, if it was compared with its present radius."""
+def _presses(project: Project) -> tuple[BallPress, ...]:
+    balls = project.results.get(BALLS)
+    return () if balls is None else tuple(balls.presses)
+
+
+def _agreement(press: BallPress, project: Project) -> PressAgreement | None:
+    """Return how a press agrees with the others, if it was compared with its present radius."""
     compared = project.results.get(REFLECTANCE)
     for agreement in () if compared is None else compared.table.agreements:
         same = agreement.stated_radius_mm == press.pose.radius_mm
         if agreement.name == press.name and same:
-            return agreement.fault
+            return agreement
     return None

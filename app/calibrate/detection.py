@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.live.image_checks import Rgb, end_of_scale
-from app.live.live_detection import Detection
+from app.live.live_detection import Detection as Detection
 from app.live.overlay import Overlay
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of

@@ -9,11 +9,27 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from PySide6.QtCore import QPoint, QSize, Qt, Signal
-from PySide6.QtGui import QIcon, QImage, QKeyEvent, QPainter, QPaintEvent, QPixmap
-from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu
+from PySide6.QtCore import (
+    QModelIndex,
+    QPersistentModelIndex,
+    QPoint,
+    QRect,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QColor, QImage, QKeyEvent, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtWidgets import (
+    QListView,
+    QListWidget,
+    QListWidgetItem,
+    QMenu,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+)
 
-from app.calibrate.states import state_icon, state_word
+from app.calibrate.states import state_icon, state_meaning, state_word
 from app.theme import theme
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
@@ -23,6 +39,8 @@ from gelpolight_core.image.file import decode_image
 from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
+GAP = 8
+PLATE = QColor(0, 0, 0, 170)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +119,11 @@ class FilmStrip(QListWidget):
         self.setMovement(QListView.Movement.Static)
         self.setUniformItemSizes(True)
         self.setIconSize(THUMB)
-        self.setGridSize(QSize(THUMB.width() + 12, THUMB.height() + 36))
-        self.setFixedHeight(136)
+        self.setGridSize(THUMB + QSize(GAP, GAP))
+        self.setFixedHeight(THUMB.height() + 3 * GAP)
+        self.setProperty("plain", True)
+        self.setItemDelegate(_Thumb(self))
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._on_menu)
         self.itemClicked.connect(lambda item: self.chosen.emit(_capture_of(item).path.name))
@@ -119,7 +138,8 @@ class FilmStrip(QListWidget):
         for capture in captures:
             word = capture.word
             sentence = "" if capture.finding is None else capture.finding.sentence
-            item = QListWidgetItem(self._icon(capture), f"{capture.path.stem}\n{capture.caption}")
+            item = QListWidgetItem(f"{capture.path.stem}\n{capture.caption}")
+            item.setData(Qt.ItemDataRole.DecorationRole, self._thumb(capture.path))
             item.setData(Qt.ItemDataRole.UserRole, capture)
             item.setToolTip(plain_tip(f"{capture.path.name}: {word}. {sentence}".strip()))
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{capture.path.stem}, {word}")
@@ -184,21 +204,6 @@ class FilmStrip(QListWidget):
         menu.exec(self.mapToGlobal(position))
         menu.deleteLater()
 
-    def _icon(self, capture: Capture) -> QIcon:
-        pixmap = QPixmap(self._thumb(capture.path))
-        painter = QPainter(pixmap)
-        if capture.excluded:
-            painter.fillRect(pixmap.rect(), Qt.GlobalColor.black)
-            painter.setOpacity(0.35)
-            painter.drawPixmap(0, 0, self._thumb(capture.path))
-            painter.setOpacity(1.0)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self.palette().base())
-        painter.drawEllipse(2, 2, 20, 20)
-        state_icon(capture.state).paint(painter, 3, 3, 18, 18)
-        painter.end()
-        return QIcon(pixmap)
-
     def _thumb(self, path: Path) -> QPixmap:
         try:
             key = path, path.stat().st_mtime_ns
@@ -207,6 +212,43 @@ class FilmStrip(QListWidget):
         if key not in self._thumbs:
             self._thumbs[key] = thumbnail(path)
         return self._thumbs[key]
+
+
+class _Thumb(QStyledItemDelegate):
+    """Draws a capture with a border in the colour of its state, and its caption in a corner."""
+
+    def paint(
+        self,
+        painter: QPainter,
+        option: QStyleOptionViewItem,
+        index: QModelIndex | QPersistentModelIndex,
+    ) -> None:
+        """Draw the image, the caption, and the sign of the state."""
+        capture: Capture = index.data(Qt.ItemDataRole.UserRole)
+        cell: QRect = option.rect
+        box = QRect(cell.center() - QPoint(THUMB.width() // 2, THUMB.height() // 2), THUMB)
+        chosen = option.state & QStyle.StateFlag.State_Selected
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setOpacity(0.35 if capture.excluded else 1.0)
+        painter.drawPixmap(box, index.data(Qt.ItemDataRole.DecorationRole))
+        painter.setOpacity(1.0)
+        ink = theme.colour("accent" if chosen else state_meaning(capture.state))
+        painter.setPen(QPen(ink, 3.0 if chosen else 1.5))
+        painter.drawRoundedRect(box, 4.0, 4.0)
+        metrics = option.fontMetrics
+        caption = metrics.elidedText(
+            capture.caption, Qt.TextElideMode.ElideRight, THUMB.width() - 28
+        )
+        plate = QRect(0, 0, metrics.horizontalAdvance(caption) + 10, metrics.height() + 2)
+        plate.moveBottomRight(box.bottomRight() - QPoint(3, 3))
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(PLATE)
+        painter.drawRoundedRect(plate, 4.0, 4.0)
+        painter.setPen(Qt.GlobalColor.white)
+        painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, caption)
+        state_icon(capture.state).paint(painter, box.x() + 4, box.y() + 4, 16, 16)
+        painter.restore()
 
 
 def thumbnail(path: Path) -> QPixmap:

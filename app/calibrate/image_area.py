@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import (
-    QPushButton,
-    QSizePolicy,
-    QTabWidget,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtWidgets import QFrame, QPushButton, QSizePolicy, QStackedWidget, QToolButton, QWidget
 
-from app.calibrate.film_strip import FilmStrip
+from app.calibrate.film_strip import Capture, FilmStrip
 from app.calibrate.maps import MapsView, Panel
+from app.calibrate.states import state_icon, state_word
 from app.live.image_checks import Rgb
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import make_bold, show_ground, show_meaning
 from app.widgets.naming import named
+from app.widgets.sign import Sign
+from gelpolight_core.finding import value_text
 from gelpolight_core.translation import tr
 
 IMAGE, RESULT = range(2)
+VERDICT_MS = 3000
+VERDICT_WIDTH = 320
+EDGE = 8
 
 
 class ImageArea(QWidget):
@@ -33,19 +34,40 @@ class ImageArea(QWidget):
         self.view = LiveView()
         self.maps = MapsView()
         self.strip = FilmStrip()
-        self.tabs = named(QTabWidget(documentMode=True), "calibrate.tabs", tr("Image or result"))
-        self.tabs.addTab(self.view, tr("Image"))
-        self.tabs.addTab(self.maps, tr("Result"))
-        # In the corner of the tabs, so that the image does not move.
-        self.back_to_live = named(
-            QToolButton(),
-            "calibrate.back_to_live",
-            tr("Back to the live image"),
-            tr("Back to the live image (Esc)"),
-        )
-        self.tabs.setCornerWidget(self.back_to_live)
-        vbox(self._build_lost(), (self.tabs, 1), self.strip, of=self, margins=0, spacing=2)
+        self.stack = QStackedWidget()
+        self.stack.addWidget(self.view)
+        self.stack.addWidget(self.maps)
+        vbox(self._build_lost(), (self.stack, 1), self.strip, of=self, margins=0, spacing=0)
+        self.result = self._floating("calibrate.result", tr("Result"))
+        self.result.setCheckable(True)
+        self.result.toggled.connect(lambda on: self.stack.setCurrentIndex(RESULT if on else IMAGE))
+        self.back_to_live = self._floating("calibrate.back_to_live", tr("Back to the live image"))
+        self.verdict = Verdict(self.view)
+        self.stack.installEventFilter(self)
         self.show_capture_name("")
+
+    def _floating(self, name: str, accessible: str) -> QToolButton:
+        """Return a button at the top right corner of the image: it takes no space from it."""
+        button = named(QToolButton(self), name, accessible)
+        button.setText(accessible)
+        return button
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Keep the floating buttons in their corner."""
+        if event.type() in (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show):
+            self._place()
+        return super().eventFilter(watched, event)
+
+    def _place(self) -> None:
+        right = self.stack.geometry().right() - EDGE
+        for button in (self.result, self.back_to_live):
+            if button.isVisibleTo(self):
+                button.adjustSize()
+                right -= button.width()
+                button.move(right, self.stack.y() + EDGE)
+                button.raise_()
+                right -= EDGE
+        self.verdict.place()
 
     def _build_lost(self) -> QWidget:
         self.lost = named(QWidget(), "calibrate.lost", tr("The camera is lost"))
@@ -65,19 +87,27 @@ class ImageArea(QWidget):
         self.why.setText(why)
         self.lost.setVisible(bool(why))
 
+    def show_verdict(self, capture: Capture | None) -> None:
+        """Show for a moment how a new capture was judged."""
+        self.verdict.show_capture(capture)
+
     def show_capture_name(self, name: str) -> None:
         """Show the name of the shown capture; an empty name means the live image."""
         self.back_to_live.setText(
             tr("{name}: back to live (Esc)").format(name=name) if name else ""
         )
         self.back_to_live.setVisible(bool(name))
+        self._place()
 
     def show_step(self, *, strip: bool, image: bool) -> None:
         """Show the parts that a step needs: the film strip, and the image or else the result."""
         self.strip.setVisible(strip)
-        self.show_tab(IMAGE, image)
-        self.show_tab(RESULT, not image)
-        self.tabs.setCurrentIndex(IMAGE if image else RESULT)
+        self.verdict.hide()
+        self._has_image = image
+        self.result.setChecked(not image)
+        self.show_result_button(False)
+
+    _has_image = True
 
     def show_stream(self, stream: Stream | None) -> None:
         """Show the live image."""
@@ -96,13 +126,63 @@ class ImageArea(QWidget):
         self.show_capture_name(name)
 
     def show_result(self, panel: Panel) -> None:
-        """Show an image of a result, and open its tab."""
+        """Show an image of a result instead of the image."""
         self.maps.show_panels((panel,))
-        self.show_tab(RESULT, True)
-        self.tabs.setCurrentIndex(RESULT)
+        self.show_result_button(True)
+        self.result.setChecked(True)
 
-    def show_tab(self, tab: int, on: bool) -> None:
-        """Show or hide a tab; if the hidden tab is open, the other one opens."""
-        if not on and self.tabs.currentIndex() == tab:
-            self.tabs.setCurrentIndex(RESULT if tab == IMAGE else IMAGE)
-        self.tabs.setTabVisible(tab, on)
+    def show_result_button(self, there: bool) -> None:
+        """Offer the images of the result, if there are any and the step has an image, too."""
+        if not there and self._has_image:
+            self.result.setChecked(False)
+        self.result.setVisible(there and self._has_image)
+        self._place()
+
+
+class Verdict(QFrame):
+    """A card over the image that says for a moment how a new capture was judged.
+
+    Parameters
+    ----------
+    view : QWidget
+        The image.
+    """
+
+    def __init__(self, view: QWidget) -> None:
+        super().__init__(view)
+        named(self, "card", tr("Verdict on the new capture"))
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._view, self._sign = view, Sign()
+        self.title = named(PlainLabel(), "calibrate.verdict", tr("Verdict on the new capture"))
+        make_bold(self.title)
+        self._why = PlainLabel(wrap=True)
+        vbox(
+            hbox(self._sign, (self.title, 1), margins=0), self._why, of=self, margins=12, spacing=4
+        )
+        self.setFixedWidth(VERDICT_WIDTH)
+        self._end = QTimer(self, singleShot=True, interval=VERDICT_MS)
+        self._end.timeout.connect(self.hide)
+        self.hide()
+
+    def show_capture(self, capture: Capture | None) -> None:
+        """Show the verdict on a capture; None: nothing."""
+        if capture is None or capture.finding is None:
+            self.hide()
+            return
+        poor, value = not capture.used or capture.state != "pass", capture.residual
+        shown = value_text(capture.finding) if value == value else state_word(capture.state)
+        self.title.setText(f"{capture.path.stem}: {shown}")
+        self._why.setText(capture.finding.sentence if poor else "")
+        self._why.setVisible(poor)
+        self._sign.show_icon(state_icon(capture.state))
+        show_ground(self, capture.state)
+        self.adjustSize()
+        self.place()
+        self.show()
+        self.raise_()
+        self._end.start()
+
+    def place(self) -> None:
+        """Stay in the middle of the lower edge of the image."""
+        room = self._view.rect()
+        self.move((room.width() - self.width()) // 2, room.height() - self.height() - 48)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from app.calibrate.step import Parts, StepPresenter, no_camera
 from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.live_detection import Detection, Seen
-from app.live.overlay import Overlay
+from app.live.overlay import Overlay, hold_ring
 from app.services.jobs import Job
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
@@ -53,6 +54,7 @@ class ImageStep(StepPresenter):
         super().__init__(parts)
         self._armed: tuple[Any, ...] = ()
         self._paused_until = 0.0
+        self._fresh = ""  # a capture whose verdict is still to be shown
 
     # Supplied by the step
 
@@ -104,7 +106,7 @@ class ImageStep(StepPresenter):
         panel = self.panel
         if panel.finished:
             return panel.next
-        return panel.capture if panel.capture.isEnabled() else panel.import_files
+        return panel.capture if panel.capture.isEnabled() else panel.more
 
     def captures(self) -> tuple[Capture, ...]:
         """Return the images of the step with their states."""
@@ -121,7 +123,12 @@ class ImageStep(StepPresenter):
     def refresh(self) -> None:
         """Update to changed results and corrections, also after undo."""
         super().refresh()
-        self.panel.residuals.show_captures(self.captures(), shown=self.model.shown)
+        captures = self.captures()
+        self.panel.residuals.show_captures(captures, shown=self.model.shown)
+        fresh = next((one for one in captures if one.path.name == self._fresh), None)
+        if fresh is not None and fresh.finding is not None and not self.model.busy_with_images:
+            self._fresh = ""
+            self.area.show_verdict(fresh)
         self._point_to_captures()
         self.arm()
 
@@ -196,14 +203,29 @@ class ImageStep(StepPresenter):
             Job(title, lambda _progress: detector(read_raw(path)), done, failed)
         )
 
-    def _show(self, found: Detection, *, waits: bool = False) -> None:
+    def _show(self, found: Detection) -> None:
         self.area.view.set_overlay(found.overlay)
-        sentence = found.sentence
-        if waits:
-            sentence += " " + tr("Move it for an automatic capture, or click Capture.")
-        self.panel.show_live(sentence, ready=found.good)
+        self.panel.show_live(found.sentence, ready=found.good)
 
-    def detected(self, item: Outcome | Failure) -> None:
+    def _show_seen(self, seen: Seen) -> None:
+        """Show what is in the live image, and how long it must still be held."""
+        found, held = seen.detection, 0.0
+        sentence, changed = found.sentence, self.model.camera_change(self.stage)
+        if changed:
+            self._show(replace(found, finding=Finding("camera", changed, verdict=Verdict.WARN)))
+            return
+        if self._captures_itself and found.good and not self._has_its_image:
+            if seen.moved:
+                held, sentence = seen.held, tr("Hold still: captures by itself.")
+            else:
+                sentence += " " + tr("Move it for an automatic capture, or click Capture.")
+        elif self.panel.finished and found.ready:
+            sentence = tr("This step is complete.")
+        rings = hold_ring(found.overlay, self.area.view.image.image_size, held)
+        self.area.view.set_overlay(replace(found.overlay, rings=rings))
+        self.panel.show_live(sentence, ready=found.good or self.panel.finished)
+
+    def detected(self, item: Outcome[Any] | Failure) -> None:
         """Show what was detected in a live image, and capture a good one if that is wanted."""
         if self.model.shown:
             return
@@ -212,7 +234,7 @@ class ImageStep(StepPresenter):
             self.panel.show_live(item.sentence, ready=False)
         elif isinstance(item.value, Seen):
             if item.frame.settled:
-                self._show(item.value.detection, waits=self._waits_for_movement(item.value))
+                self._show_seen(item.value)
             else:
                 self.area.view.set_overlay(Overlay())
                 self.panel.show_live(tr("The image is changing."), ready=False)
@@ -223,17 +245,20 @@ class ImageStep(StepPresenter):
         """Return whether the image can be captured automatically: never the same view twice."""
         ready = seen.still and seen.detection.good and frame.settled and seen.moved
         waiting = self.model.busy_with_images or time.monotonic() < self._paused_until
-        return ready and not self._has_its_image and not waiting
+        changed = self.model.camera_change(self.stage)
+        return ready and not self._has_its_image and not waiting and not changed
 
-    def _waits_for_movement(self, seen: Seen) -> bool:
-        """Return whether a good image is not captured automatically because nothing has moved."""
-        on = self.panel.automatic.isChecked() and not self.model.busy_with_images
-        return on and seen.detection.good and not seen.moved and not self._has_its_image
+    @property
+    def _captures_itself(self) -> bool:
+        """Whether a good image is captured automatically now."""
+        return self.panel.automatic.isChecked() and not self.model.busy_with_images
 
     @property
     def _has_its_image(self) -> bool:
-        """Whether the step needs one image and has it: another one is the user's decision."""
-        return self.step.wanted == 1 and bool(self.model.project.session.found(self.step.folder))
+        """Whether the step needs one image and has it, and it did not fail."""
+        found = self.model.project.session.found(self.step.folder)
+        failed = self.model.states[self.step.key][0] == StageState.FAIL.value
+        return self.step.wanted == 1 and bool(found) and not failed
 
     # Images
 
@@ -244,6 +269,7 @@ class ImageStep(StepPresenter):
             return
         self.panel.show_notice("", "pass")
         radius_mm = self.radius_mm
+        self.area.show_verdict(None)
         self.model.live_detection.forget_movement()  # before the next automatic capture
         self._paused_until = time.monotonic() + PAUSE_S
         self.arm(force=True)
@@ -258,6 +284,11 @@ class ImageStep(StepPresenter):
             self.panel.show_notice(text, "warn")
             return
         self.capture()
+
+    def captured(self, name: str) -> None:
+        """Show the verdict on a new image as soon as there is one."""
+        self._fresh = name
+        self.area.view.set_overlay(None)
 
     def repeat(self, name: str) -> None:
         """Exclude a capture, and show the live image to capture it again."""

@@ -245,13 +245,16 @@ class LensStep(ImageStep):
     step = step_of(
         LENS,
         tr(
-            "Use the camera alone. Hold the checkerboard in front of it. Tilt it by 15 to 40 "
-            "degrees in a new direction for each image, until its corners have covered the "
-            "whole image."
+            "Hold the checkerboard in front of the camera, tilted in a new direction for each "
+            "image."
         ),
         "camera",
         wanted=12,
         least=MIN_VIEWS,
+        advice=tr(
+            "Use the camera alone. Tilt the board by 15 to 40 degrees, until its corners have "
+            "covered the whole image."
+        ),
     )
 
     def start(self) -> None:

@@ -15,8 +15,11 @@ from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Job
 from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import judge
 from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
+from gelpolight_core.optics.board_search import find_rough_corners
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -28,7 +31,11 @@ LED_OFF_OF_WIDTH = 0.05
 
 
 def detect_mirror(
-    rgb: Rgb, *, expected_px: Array | None = None, editable: bool = False
+    rgb: Rgb,
+    *,
+    expected_px: Array | None = None,
+    editable: bool = False,
+    boards: tuple[BoardSpec, ...] = (),
 ) -> Detection:
     """Find the reflections of the LEDs.
 
@@ -40,6 +47,8 @@ def detect_mirror(
         Expected positions of the spots, from :func:`app.calibrate.marks.mirror_positions_px`.
     editable : bool, optional
         Whether the spots can be dragged; their handles are mirror.0, mirror.1 and mirror.2.
+    boards : tuple of BoardSpec, optional
+        Boards that may have been left in place of the mirror.
     """
     positions = () if expected_px is None else tuple(expected_px)
     expected = tuple(
@@ -47,7 +56,11 @@ def detect_mirror(
     )
 
     def detect() -> Detection:
-        spots = find_mirror_spots(as_image(rgb))
+        try:
+            spots = find_mirror_spots(as_image(rgb))
+        except InputError:
+            _refuse_boards(rgb, boards)
+            raise
         marks = Overlay(
             markers=(*expected, *spot_markers(spots, editable=editable)),
             masks=tuple(
@@ -66,6 +79,17 @@ def detect_mirror(
         return judged(marks, figures, tr("All three LED reflections were found."))
 
     return or_refusal(detect, marks=Overlay(markers=expected))
+
+
+def _refuse_boards(rgb: Rgb, boards: tuple[BoardSpec, ...]) -> None:
+    """Raise InputError if the image shows a checkerboard instead of the mirror."""
+    grey = as_image(rgb).rgb.mean(axis=2)
+    if any(find_rough_corners(grey, board.inner_corners) is not None for board in boards):
+        raise InputError(
+            tr("the checkerboard is still in place of the mirror"),
+            where=tr("Image"),
+            advice=Remedy.CLEAN_MIRROR,
+        )
 
 
 def placed_spots(rgb: Rgb, session: Session) -> Detection:
@@ -87,13 +111,12 @@ class LightsStep(ImageStep):
 
     step = step_of(
         LIGHTS,
-        tr(
-            "Replace the board with the mirror. Switch all three LEDs on and darken the room. "
-            "Shorten the exposure until the three spots are small and not saturated."
-        ),
+        tr("Lay the mirror on the top opening, with all LEDs on and the room dark."),
         "mirror",
         frames=16,
         wanted=1,
+        advice=tr("Shorten the exposure until the three spots are small and not saturated."),
+        figure="led_sd_mm",
     )
 
     def detector(self, name: str) -> Detector:
@@ -102,11 +125,12 @@ class LightsStep(ImageStep):
         if name and session.decisions.spots_px:
             return partial(placed_spots, session=session)
         expected = None
-        lens, top, lights = (results.get(s) for s in (LENS, TOP_POSE, LIGHTS))
+        lens, top, lights = results.get(LENS), results.get(TOP_POSE), results.get(LIGHTS)
         if lens and top and lights:
             plane, leds_mm = top.pose.plane, lights.leds.led_positions_mm
             expected = mirror_positions_px(lens.camera, plane, leds_mm)
-        return partial(detect_mirror, expected_px=expected, editable=bool(name))
+        boards = session.top_pose, session.checkerboard
+        return partial(detect_mirror, expected_px=expected, editable=bool(name), boards=boards)
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
         """Move an LED's spot to the spot at this point, or to the point itself."""

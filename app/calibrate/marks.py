@@ -16,7 +16,7 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, boundary_px, seen_at
-from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.reflectance.indentation import Indentation
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -96,9 +96,8 @@ def working_circle(table: ResamplingTable) -> Line:
     return Line(boundary_px(table), "info", closed=True)
 
 
-def ball_contour(press: BallPress, table: ResamplingTable) -> tuple[Line, ...]:
+def ball_contour(found: Indentation, table: ResamplingTable) -> tuple[Line, ...]:
     """Return the detected edge of the contact, and the circle fitted to it."""
-    found = press.indentation
     angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     fitted = np.asarray(found.centre) + found.contact_radius_px * ring
@@ -108,9 +107,8 @@ def ball_contour(press: BallPress, table: ResamplingTable) -> tuple[Line, ...]:
     )
 
 
-def ball_handle(press: BallPress, table: ResamplingTable) -> Circle | None:
+def ball_handle(found: Indentation, table: ResamplingTable) -> Circle | None:
     """Return the contact as a circle that the user can move; None if it is not visible."""
-    found = press.indentation
     centre = np.asarray(found.centre)
     across = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     middle = seen_at(table, centre[None])

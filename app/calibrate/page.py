@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
 
-from app.calibrate.closed_offer import closed_offer, copy_images
+from app.calibrate.in_place_offer import copy_images, in_place_offer
 from app.calibrate.question_view import QuestionView
 from app.calibrate.session_camera import SetupCamera
 from app.calibrate.setup_form import SetupForm
@@ -90,7 +90,7 @@ class CalibratePage(QWidget):
             project = Project(folder)
         except InputError as error:
             self._leave_session()
-            self._offer = closed_offer(folder)
+            self._offer = in_place_offer(folder)
             if self._offer is None:
                 self.start.show_problem(str(error))
             else:

@@ -117,14 +117,14 @@ class RadianceStep(ImageStep):
 
     step = step_of(
         RADIANCE,
-        tr(
-            "Insert the elastomer without the membrane. Press the white board onto it without "
-            "air bubbles. Set the exposure so that nothing is saturated, and do not change it "
-            "afterwards."
-        ),
+        tr("Press the white board onto the elastomer, without membrane and without air bubbles."),
         "whiteboard",
         frames=16,
         wanted=1,
+        advice=tr(
+            "Set the exposure so that nothing is saturated, and do not change it afterwards."
+        ),
+        figure="whiteboard_unlit_percent",
     )
 
     def detector(self, name: str) -> Detector:

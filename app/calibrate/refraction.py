@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from app.calibrate.balls import judge_ball
 from app.calibrate.detection import read_raw
 from app.calibrate.film_strip import Capture
-from app.calibrate.image_area import IMAGE, RESULT
 from app.calibrate.image_step import captures_of
 from app.calibrate.maps import Panel
 from app.calibrate.step import StepPresenter
@@ -157,8 +156,6 @@ class RefractionStep(StepPresenter):
         except InputError as error:
             why = str(error)
         self.area.maps.show_panels(panels, none=why)
-        self.area.show_tab(RESULT, True)
-        self.area.show_tab(IMAGE, False)
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the press before and after the correction; nothing without results."""

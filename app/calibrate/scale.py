@@ -69,13 +69,13 @@ class ScaleStep(ImageStep):
     step = step_of(
         SCALE,
         tr(
-            "Press the pin grid or the flat punch whose size is stated in the set-up straight into "
-            "the membrane, at a different place for each image. The size of a pixel is measured "
-            "on it."
+            "Press the pin grid or the flat punch straight into the membrane, at a new place for "
+            "each image."
         ),
         "indenter",
         frames=4,
         wanted=3,
+        advice=tr("The size of a pixel is measured on it. Its own size is stated in the set-up."),
     )
 
     def detector(self, name: str) -> Detector:

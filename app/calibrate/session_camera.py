@@ -11,7 +11,7 @@ from app.calibrate.model import WizardModel
 from app.calibrate.setup_form import SetupForm
 from app.context.context import AppContext
 from app.context.source_button import show_settings_of_source
-from app.sources.camera.applying import is_locked
+from app.sources.camera.applying import differences, is_locked
 from app.widgets.question import Question
 from app.widgets.question import ask as question
 from gelpolight_core.errors import InputError
@@ -91,6 +91,7 @@ class SessionCamera(QObject):
         self._model, self._context, self._window = model, context, window
         model.photographed.connect(self._on_photographed)
         model.camera_fault = self.fault
+        model.camera_change = self.change
 
     def fault(self, *, ask: bool = True) -> str:
         """Return why the present camera cannot be used: the session belongs to another camera.
@@ -127,6 +128,26 @@ class SessionCamera(QObject):
             question(self._window, tr("Another camera"), text, same)
         return text
 
+    def change(self, stage: str) -> str:
+        """Return what was changed on the camera since the image with which a stage is compared."""
+        session, stream = self._model.project.session, self._model.live.stream
+        stored, others = session.camera_settings, self._lit_folders(other_than=stage)
+        if stored is None or stream is None or not any(map(session.found, others)):
+            return ""
+        camera = self._context.cameras.of(self._context.source.info)
+        if camera is not None:
+            _, clauses = self._context.cameras.differs(camera)
+        else:
+            clauses = differences(stored, None, stream.source.settings())
+        text = tr("The camera was changed since the other images: {how}. Set it back.")
+        return text.format(how="; ".join(clauses)) if clauses else ""
+
+    def _lit_folders(self, *, other_than: str) -> tuple[str, ...]:
+        """Return the other folders with which a stage is compared; none if it is not compared."""
+        lit = [stage for stage in self._model.project.recipe.stages if stage.lit]
+        compared = other_than in [stage.key for stage in lit]
+        return tuple(stage.folder for stage in lit if compared and stage.key != other_than)
+
     def _present(self) -> CameraSettings | None:
         """Return which camera is selected, the virtual one included; None for recorded images."""
         source = self._context.source
@@ -136,8 +157,10 @@ class SessionCamera(QObject):
             return CameraSettings(device.name, device.identity, device.model)
         if source.info is None or source.info.kind != "virtual" or source.bench is None:
             return None
-        serial = source.bench.design.serial
-        return CameraSettings(serial, f"virtual:{serial}")
+        serial, stream = source.bench.design.serial, self._model.live.stream
+        settings = () if stream is None else stream.source.settings()
+        controls = {setting.key: setting.value for setting in settings}
+        return CameraSettings(serial, f"virtual:{serial}", controls=controls)
 
     def refer(self) -> None:
         """Make the settings of the session the reference of the camera."""

@@ -83,8 +83,8 @@ class StartView(QWidget):
     def show_recent(self, folders: Sequence[Path]) -> None:
         """Show buttons for these sessions."""
         while self._recent.count():
-            old = self._recent.takeAt(0).widget()
-            if old is not None:
+            item = self._recent.takeAt(0)
+            if item is not None and (old := item.widget()) is not None:
                 old.deleteLater()
         if folders:
             self._recent.addWidget(PlainLabel(tr("Continue a recent session")))

@@ -58,8 +58,7 @@ def step_state(
     found = [statuses[stage] for stage in step.stages]
     worst = max(found, key=lambda status: _ORDER.index(status.state.value))
     if worst.state is StageState.FAIL and 0 < count < step.least:
-        text = tr("{n} captured. At least {m} are needed, {w} are recommended.")
-        return BEGUN, text.format(n=count, m=step.least, w=step.wanted)
+        return BEGUN, tr("{n} of {m} captured").format(n=count, m=step.wanted)
     return worst.state.value, worst.sentence
 
 

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.calibrate.film_strip import Capture
-from app.calibrate.image_area import RESULT, ImageArea
+from app.calibrate.image_area import ImageArea
 from app.calibrate.maps import Panel
 from app.calibrate.model import WizardModel
 from app.calibrate.states import RUNNING, StepState, is_done, step_state
 from app.calibrate.step_data import Step
-from app.calibrate.step_panel import StepPanel
+from app.calibrate.step_panel import Remedy, StepPanel
 from app.context.context import AppContext
 from app.sources.bench import Scene
 from app.sources.processor import Failure, Outcome
 from gelpolight_core.calibration.status import StageState
-from gelpolight_core.finding import QualityTable
+from gelpolight_core.finding import Finding, QualityTable
 from gelpolight_core.translation import tr
 
 
@@ -127,6 +128,30 @@ class StepPresenter(QObject):
         """Return why the next step cannot follow yet; empty if it can."""
         return ""
 
+    def number(self) -> Finding | None:
+        """Return the one figure of the step; None without a result."""
+        figures = [figure for table in self.tables() for figure in table.figures]
+        named = (figure for figure in figures if figure.key == self.step.figure)
+        return next(named, figures[0] if figures else None)
+
+    def progress_line(self) -> str:
+        """Return how many images there are, and how many are wanted; nothing else says it."""
+        step, count = self.step, self.count()
+        if not step.captures:
+            return ""
+        if step.wanted > 1:
+            return tr("{n} of {m} captured").format(n=count, m=max(step.wanted, count))
+        return tr("Captured") if count else tr("Not captured yet")
+
+    def remedies(self, state: str) -> tuple[Remedy, ...]:
+        """Return the buttons that mend what is wrong, the best first."""
+        stages = self.step.stages
+        upto = stages[-1] if stages else None
+        stale = state in (StageState.STALE.value, StageState.WAITING.value)
+        if stale and not self.model.jobs.busy and self.model.project.stale(upto=upto):
+            return ((tr("Recompute"), lambda: self.model.compute(upto)),)
+        return ()
+
     def tables(self) -> Sequence[QualityTable]:
         """Return the quality tables of the step."""
         return [self.model.statuses[stage].quality for stage in self.step.stages]
@@ -161,21 +186,24 @@ class StepPresenter(QObject):
         """Show the images of the result, if there are any."""
         panels = self.result_panels()
         self.area.maps.show_panels(panels)
-        self.area.show_tab(RESULT, bool(panels))
+        self.area.show_result_button(bool(panels))
 
     def show_state(self, state: str, sentence: str) -> None:
         """Show the state in the side panel."""
-        panel, stages, count = self.panel, self.step.stages, self.count()
-        panel.show_count(count)
+        panel = self.panel
+        panel.show_number(self.number(), self.progress_line())
         if state == RUNNING:
             panel.show_running()
             return
-        stale = state in (StageState.STALE.value, StageState.WAITING.value)
-        upto = stages[-1] if stages else None
-        offer = stale and not self.model.jobs.busy and self.model.project.stale(upto=upto)
         finished = self.is_finished(state)
         advance = finished and not panel.finished
-        panel.show_state(state, sentence, self.tables(), recompute=bool(offer), finished=finished)
+        panel.show_state(
+            state,
+            sentence,
+            self.tables(),
+            remedies=self.remedies(state),
+            finished=finished,
+        )
         # Only if the focus is on the last pressed button: never interrupt a person who is typing.
         if advance and QApplication.focusWidget() in (None, panel.capture):
             panel.next.setFocus()
@@ -207,6 +235,9 @@ class StepPresenter(QObject):
         if self.model.shown:
             self.live()
 
+    def captured(self, name: str) -> None:
+        """Note that the step has a new image."""
+
     def repeat(self, name: str) -> None:
         """Exclude a capture, and capture it again."""
 
@@ -218,7 +249,7 @@ class StepPresenter(QObject):
         if self.step.stage is not None:
             self.model.exclude(self.step.stage, name, excluded)
 
-    def detected(self, item: Outcome | Failure) -> None:
+    def detected(self, item: Outcome[Any] | Failure) -> None:
         """Show the detection in a live image."""
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:

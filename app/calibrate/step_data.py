@@ -21,7 +21,7 @@ class Step:
     stages : tuple of str
         Keys of the stages that make up the step; the first one has the images.
     task : str
-        Instruction for the technician, in one to three sentences.
+        Instruction for the technician, in one sentence.
     assembly : str
         How the sensor is assembled in this step; a name of :mod:`app.calibrate.assembly`.
     frames : int
@@ -34,6 +34,10 @@ class Step:
         Folder of its images; empty if it has none.
     one_image : bool
         Whether a new image replaces the former one.
+    advice : str
+        More about the set-up, for the help.
+    figure : str
+        Key of the one figure that the step shows; empty for the first one of its stages.
     """
 
     key: str
@@ -47,6 +51,8 @@ class Step:
 
     folder: str = ""
     one_image: bool = False
+    advice: str = ""
+    figure: str = ""
 
     @property
     def stage(self) -> str | None:
@@ -59,9 +65,7 @@ class Step:
         return bool(self.folder) and self.wanted > 0
 
 
-def step_of(
-    stage: Stage[Any], task: str, assembly: str, *, frames: int = 1, wanted: int = 0, least: int = 1
-) -> Step:
+def step_of(stage: Stage[Any], task: str, assembly: str, **more: Any) -> Step:
     """Return the step of a stage; arguments as in :class:`Step`."""
     return Step(
         stage.key,
@@ -69,9 +73,7 @@ def step_of(
         (stage.key,),
         task,
         assembly,
-        frames,
-        wanted,
-        least,
-        stage.folder,
-        stage.one_image,
+        folder=stage.folder,
+        one_image=stage.one_image,
+        **more,
     )

@@ -1,43 +1,47 @@
-"""The side panel of a step: its task, its state, and its buttons."""
+"""The side panel of a step: its task, its one number, its one cause, and its buttons."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QPaintEvent
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
-    QCheckBox,
+    QFrame,
+    QMenu,
     QProgressBar,
     QPushButton,
     QScrollArea,
-    QScrollBar,
-    QSizePolicy,
     QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
-from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.residual_table import ResidualTable
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.step_data import Step
+from app.calibrate.step_help import StepHelp
+from app.widgets.actions import make_action
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
-from gelpolight_core.finding import QualityTable
+from gelpolight_core.finding import Finding, QualityTable, value_text
 from gelpolight_core.translation import tr
 
-WIDTH = 372
-# This space is always reserved, so that nothing below moves when a message changes.
-LIVE_LINES = 4
+WIDTH = 304
+# This space is always reserved, so that nothing moves when a message changes.
+HINT_LINES = 4
+NUMBER_LINES = 3
+
+Remedy = tuple[str, Callable[[], object]]
+"""Text of a button, and what it does."""
 
 
 class StepPanel(QWidget):
-    """The side panel of a step with images; its lower part is always visible.
+    """The side panel of a step; its lower part is always visible and never moves.
 
     Attributes
     ----------
@@ -52,147 +56,182 @@ class StepPanel(QWidget):
         self.setFixedWidth(WIDTH)
         self.finished = False
         self._step: Step | None = None
+        self._following = ""
+        self._remedies: dict[str, Callable[[], object]] = {}
         self._scroll, inside = side_scroll("calibrate.panel.scroll", tr("This step"))
-        self._column = vbox(of=inside, margins=(12, 10, 12, 6), spacing=8)
-        self._build_head()
-        self._build_capture()
-        self._build_state()
-        self._column.addStretch(1)
+        self._extra = QVBoxLayout()
+        self._column = vbox(
+            *self._build_head(),
+            self._build_number(),
+            self._extra,
+            self._build_message(),
+            self._build_details(),
+            None,
+            of=inside,
+            margins=(16, 16, 16, 8),
+            spacing=12,
+        )
         vbox((self._scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
 
-    def _build_head(self) -> None:
+    def _build_head(self) -> tuple[object, ...]:
         self.title = named(PlainLabel(), "calibrate.title", tr("Step"))
-        make_bold(self.title, size=1.35)
-        self.task = named(_wrapped(), "calibrate.task", tr("Task"))
-        self.assembly = AssemblyDrawing()
-        self.help = help_button("calibrate.help")
-        head = hbox((self.title, 1), self.help)
-        self._column.addLayout(head)
-        for widget in (self.assembly, self.task):
-            self._column.addWidget(widget)
+        make_bold(self.title, size=1.5)
+        self.task = named(PlainLabel(wrap=True), "calibrate.task", tr("Task"))
+        self.help = StepHelp()
+        return hbox((self.title, 1), self.help, margins=0), self.task
 
-    def _build_capture(self) -> None:
-        self.live = named(
-            _wrapped(lines=LIVE_LINES), "calibrate.live", tr("Content of the live image")
+    def _build_number(self) -> QFrame:
+        self.caption = named(
+            PlainLabel(wrap=True), "calibrate.number.caption", tr("Figure of this step")
         )
-        self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.capture = named(
-            QPushButton(tr("&Capture"), minimumHeight=38),
-            "calibrate.capture",
-            tr("Capture"),
-            tr("Capture this image"),
-            "C",
-        )
-        self.automatic = named(
-            QCheckBox(tr("&Automatic: capture and continue")),
-            "calibrate.automatic",
-            tr(
-                "Capture automatically when the image is still and good, and continue when complete"
-            ),
-            tr("Hands-free: after each capture it waits until you have moved something"),
-        )
-        self.import_files = named(
-            QPushButton(tr("&Import…")), "calibrate.import", tr("Import image files")
-        )
-        buttons = hbox((self.capture, 2), (self.import_files, 1))
-        self.capturing = QWidget()
-        self.lay = lay_button("calibrate.lay")
-        self._extra = QVBoxLayout()
-        self.notice = named(_wrapped(lines=2), "calibrate.notice", tr("Result of the last action"))
-        self.notice.setAlignment(Qt.AlignmentFlag.AlignTop)
-        vbox(
-            self.lay,
-            self.live,
-            self._extra,
-            buttons,
-            self.automatic,
-            self.notice,
-            of=self.capturing,
-            margins=0,
-        )
-        self._column.addWidget(self.capturing)
-
-    def _build_state(self) -> None:
+        self.number = named(PlainLabel(), "calibrate.number", tr("Its value"))
+        make_bold(self.number, size=1.6)
         self._sign = Sign()
         self._word = named(PlainLabel(), "calibrate.state", tr("State of the step"))
         make_bold(self._word)
-        self.recompute = named(
-            QPushButton(tr("&Recompute")),
-            "calibrate.recompute",
-            tr("Recompute"),
-            tr("Compute this step again from the stored captures"),
+        self.below = named(PlainLabel(wrap=True), "calibrate.count", tr("Captures of this step"))
+        self.details = named(QToolButton(), "calibrate.details", tr("Figures of this step"))
+        self.details.setText(tr("Details"))
+        self.details.setCheckable(True)
+        words = QWidget()
+        words.setFixedHeight(NUMBER_LINES * words.fontMetrics().lineSpacing())
+        vbox(self.caption, self.below, None, of=words, margins=0, spacing=0)
+        for label in (self.caption, self.below):
+            show_meaning(label, "muted")
+        return card(
+            hbox((self.number, 1), self._sign, self._word, margins=0, spacing=4),
+            words,
+            hbox(None, self.details, margins=0),
         )
-        row = hbox(self._sign, (self._word, 1), self.recompute)
-        self.sentence = named(_wrapped(), "calibrate.sentence", tr("Message about the step"))
+
+    def _build_message(self) -> QFrame:
+        """Return the card of what is wrong; an action that failed comes before the step's state."""
+        self.notice = named(_message(), "calibrate.notice", tr("Result of the last action"))
+        self.sentence = named(_message(), "calibrate.sentence", tr("Message about the step"))
+        self.buttons = [
+            named(QPushButton(), f"calibrate.remedy{place}", tr("Remedy")) for place in range(2)
+        ]
+        for button in self.buttons:
+            button.clicked.connect(lambda _on=False, b=button: self._remedies[b.text()]())
+        self._message = card(self.notice, self.sentence, hbox(*self.buttons, None, margins=0))
+        return self._message
+
+    def _build_details(self) -> QWidget:
         self.quality = QualityTableWidget(
             "calibrate.quality", tr("Quality figures of this step"), narrow=True
         )
-        self._column.addLayout(row)
-        self._column.addWidget(self.sentence)
-        self._column.addWidget(self.quality)
         self.residuals = ResidualTable()
-        self._column.addWidget(self.residuals)
+        details = QWidget()
+        vbox(self.quality, self.residuals, of=details, margins=0)
+        details.hide()
+        self.details.toggled.connect(details.setVisible)
+        return details
 
-    def _build_foot(self) -> QVBoxLayout:
+    def _build_foot(self) -> QWidget:
+        self.lay = lay_button("calibrate.lay")
+        self.live = named(PlainLabel(wrap=True), "calibrate.live", tr("Content of the live image"))
+        self.live.setFixedHeight(HINT_LINES * self.live.fontMetrics().lineSpacing())
+        self.live.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom)
         self.progress = named(QProgressBar(), "calibrate.progress", tr("Progress"))
         self.progress.setRange(0, 100)
-        self.progress.setTextVisible(True)
-        self.cancel = named(QPushButton(tr("Stop")), "calibrate.stop", tr("Stop the work"))
+        self.cancel = named(QToolButton(), "calibrate.stop", tr("Stop the work"))
+        self.cancel.setText(tr("Stop"))
         for widget in (self.progress, self.cancel):
+            widget.setFixedHeight(22)
             keep_space(widget)
-        row = hbox((self.progress, 1), self.cancel)
+        self.capture = named(
+            QPushButton(tr("&Capture")), "calibrate.capture", tr("Capture"),
+            tr("Capture this image"), "C",
+        )  # fmt: skip
+        self.more = named(
+            QToolButton(popupMode=QToolButton.ToolButtonPopupMode.InstantPopup),
+            "calibrate.more",
+            tr("More about capturing"),
+            tr("Import image files, or switch automatic captures"),
+        )
+        self.more.setText("…")
+        menu = QMenu(self.more)
+        self.import_files = make_action(
+            menu, "calibrate.import", tr("&Import image files…"), lambda: None
+        )
+        self.automatic = QAction(tr("&Capture and continue automatically"), menu, checkable=True)
+        self.automatic.setObjectName("calibrate.automatic")
+        menu.addAction(self.automatic)
+        self.more.setMenu(menu)
+        self.capturing = QWidget()
+        row = hbox((self.capture, 1), self.more, margins=0, spacing=8)
+        vbox(self.lay, self.live, row, of=self.capturing, margins=0, spacing=8)
         self.next = named(QPushButton(tr("&Next step")), "calibrate.next", tr("Next step"))
-        self.next.setMinimumHeight(38)
-        foot = vbox(row, self.next, margins=(12, 4, 12, 10), spacing=6)
+        self.next.setProperty("primary", True)
+        for button in (self.capture, self.next):
+            button.setFixedHeight(36)
+        self.more.setFixedSize(48, 36)
+        foot = QWidget()
+        vbox(
+            hbox((self.progress, 1), self.cancel, margins=0), self.capturing, self.next,
+            of=foot, margins=(16, 8, 16, 16), spacing=8,
+        )  # fmt: skip
         self.show_work("", 0.0)
         return foot
 
-    def add_extra(self, widget: QWidget, focus: QWidget) -> None:
-        """Add a step's own input above the buttons; the step shows and hides it."""
-        self._extra.addWidget(widget)
-        QWidget.setTabOrder(self.lay, focus)
-        widget.hide()
+    def add_extra(self, text: str, field: QWidget) -> QFrame:
+        """Add the card of a value that a step needs; the step shows and hides it."""
+        caption = PlainLabel(text)
+        show_meaning(caption, "muted")
+        made = card(caption, field)
+        self._extra.addWidget(made)
+        QWidget.setTabOrder(self.lay, field)
+        made.hide()
+        return made
+
+    # What is shown
 
     def show_step(self, step: Step, *, following: str) -> None:
         """Show the task of another step; `following`: title of the next step, if any."""
         if step is not self._step:
             # The message belongs to the previous step; remove it, even during a computation.
             self._show_figures(())
+            self.show_number(None, "")
+            self.sentence.setText("")
             self.residuals.show_captures((), shown="")
-        self._step = step
-        self._show_finished(False)
+        self._step, self._following = step, following
+        self.finished = False
         self.title.setText(step.title)
         self.task.setText(step.task)
-        self.assembly.show_assembly(step.assembly)
+        self.help.show_step(step)
         self.capturing.setVisible(step.captures)
         self.show_notice("", "pass")
         self.next.setVisible(bool(following))
-        self.next.setText(tr("&Next: {title}").format(title=following))
+        self.show_countdown(0)
         self._scroll.verticalScrollBar().setValue(0)
 
-    def show_count(self, count: int) -> None:
-        """Show on the Capture button how many images there are, and how many are recommended."""
-        wanted = 1 if self._step is None else self._step.wanted
-        text = tr("&Capture")
-        if wanted > 1:
-            text = tr("&Capture  ({n} of {m})").format(n=count, m=max(wanted, count))
-        elif count:
-            alone = self._step is not None and self._step.one_image
-            text = tr("&Capture again") if alone else tr("&Capture another")
-        self.capture.setText(text)
+    def show_countdown(self, seconds: int) -> None:
+        """Show on Next after how many seconds the next step opens by itself; 0: it does not."""
+        text = tr("&Next: {title}").format(title=self._following)
+        self.next.setText(f"{text}  ({seconds})" if seconds else text)
+
+    def show_number(self, number: Finding | None, below: str) -> None:
+        """Show the one figure of the step, and a line about its captures."""
+        self.caption.setText(tr("No result yet") if number is None else number.text)
+        self.caption.setToolTip("" if number is None else number.text)
+        self.number.setText("\u2013" if number is None else value_text(number))
+        self.below.setText(below)
 
     def show_notice(self, sentence: str, role: str) -> None:
-        """Show the result of the last capture, import or correction."""
+        """Show why the last capture, import or correction was not done; else an empty text."""
         self.notice.setText(sentence)
-        show_meaning(self.notice, role)
+        self._notice_role = role
+        self._show_message()
 
     def show_running(self) -> None:
         """Show that the step is being computed; its figures stay until new ones arrive."""
         self._show_sign(RUNNING)
-        self.sentence.setText(tr("Computing from the captures."))
-        self.recompute.hide()
+        self.sentence.setText("")
+        self._remedies = {}
+        self._show_message()
 
     def _show_sign(self, state: str) -> None:
+        self._state = state
         self._sign.show_icon(state_icon(state))
         self._word.setText(state_word(state).capitalize())
         show_meaning(self._word, state_meaning(state))
@@ -208,7 +247,7 @@ class StepPanel(QWidget):
         sentence: str,
         tables: Sequence[QualityTable],
         *,
-        recompute: bool,
+        remedies: Sequence[Remedy] = (),
         finished: bool,
     ) -> None:
         """Show the state of the step.
@@ -219,27 +258,38 @@ class StepPanel(QWidget):
             State of the step, and the message about it.
         tables : sequence of QualityTable
             Quality tables of its stages.
-        recompute : bool
-            Whether to offer Recompute.
+        remedies : sequence of (str, callable), optional
+            What mends it, the best first.
         finished : bool
-            Whether the step is complete, so that Next becomes the main button.
+            Whether the step is complete.
         """
         self._show_sign(state)
-        if recompute:
-            sentence = tr("{sentence}. Click Recompute.").format(sentence=sentence.rstrip("."))
         self.sentence.setText(sentence)
         self._show_figures(tables)
-        self.recompute.setVisible(recompute)
-        self._show_finished(finished)
+        self._remedies = dict(remedies)
+        self.finished = finished
+        self._show_message()
+
+    def _show_message(self) -> None:
+        """Show what is wrong: an action that was not done, or else the state of the step."""
+        said = self.notice.text()
+        wrong = self._state in ("warn", "fail", "stale", "waiting") and self.sentence.text()
+        self.notice.setVisible(bool(said))
+        self.sentence.setVisible(bool(wrong) and not said)
+        texts = [] if said or not wrong else list(self._remedies)[: len(self.buttons)]
+        for place, button in enumerate(self.buttons):
+            button.setVisible(place < len(texts))
+            button.setText(texts[place] if place < len(texts) else "")
+        role = self._notice_role if said else self._state
+        show_ground(self._message, role if role in ("warn", "fail") else "")
+        self._message.setVisible(bool(said or wrong))
+
+    _state, _notice_role = "empty", "pass"
 
     def _show_figures(self, tables: Sequence[QualityTable]) -> None:
         figures = tuple(figure for table in tables for figure in table.figures)
         self.quality.set_table(QualityTable(figures))
         self.quality.setVisible(bool(figures))
-
-    def _show_finished(self, finished: bool) -> None:
-        self.finished = finished
-        self.next.setStyleSheet("font-weight: bold;" if finished else "")
 
     def show_work(self, title: str, share: float) -> None:
         """Show the running work; an empty title means none."""
@@ -250,26 +300,27 @@ class StepPanel(QWidget):
         self.progress.setValue(round(100 * share))
 
 
-class _QuietBar(QScrollBar):
-    """A scroll bar that is invisible if there is nothing to scroll, but keeps its space.
-
-    The widgets next to it do not move when it appears.
-    """
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Paint the bar, or nothing if there is nothing to scroll."""
-        if self.maximum() > self.minimum():
-            super().paintEvent(event)
+def card(*parts: object) -> QFrame:
+    """Return a card with parts from top to bottom."""
+    frame = QFrame()
+    frame.setObjectName("card")
+    vbox(*parts, of=frame, margins=(12, 8, 12, 8), spacing=4)
+    return frame
 
 
 def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
     """Return a vertical scroll area for a side panel, and the widget in it."""
     inside = QWidget()
     scroll = named(scroll_area(inside), name, accessible)
-    scroll.setVerticalScrollBar(_QuietBar())
-    scroll.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
     scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     return scroll, inside
+
+
+def help_button(name: str) -> QToolButton:
+    """Return the button that opens the guide at a step."""
+    button = named(QToolButton(), name, tr("Help on this step"), tr("Read about this step"))
+    button.setText("?")
+    return button
 
 
 def lay_button(name: str) -> QPushButton:
@@ -284,18 +335,7 @@ def lay_button(name: str) -> QPushButton:
     return button
 
 
-def _wrapped(*, lines: int = 0) -> PlainLabel:
+def _message() -> PlainLabel:
     label = PlainLabel(wrap=True)
-    label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-    if lines:
-        label.setMinimumHeight(lines * label.fontMetrics().lineSpacing() + 4)
     return label
-
-
-def help_button(name: str) -> QToolButton:
-    """Return the button that opens the guide at a step."""
-    button = named(QToolButton(), name, tr("Help on this step"), tr("Read about this step"))
-    button.setText("?")
-    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    return button

@@ -9,8 +9,8 @@ from typing import Any
 
 from app.calibrate.background import BackgroundStep
 from app.calibrate.balls import BallsStep
-from app.calibrate.closed_balls import ClosedBallsStep
 from app.calibrate.image_step import plain_step
+from app.calibrate.in_place_balls import InPlaceBallsStep
 from app.calibrate.lens import LensStep
 from app.calibrate.lights import LightsStep
 from app.calibrate.radiance import RadianceStep
@@ -41,7 +41,7 @@ PANELS: Mapping[Stage[Any], Route] = {
     ball_stage.REFLECTANCE: (ReflectanceStep,),
     in_place.BACKGROUND: (BackgroundStep,),
     in_place.SCALE: (ScaleStep,),
-    in_place.BALLS: (ClosedBallsStep,),
+    in_place.BALLS: (InPlaceBallsStep,),
 }
 """The steps of a stage; another stage with images has one that only captures them."""
 

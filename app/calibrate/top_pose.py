@@ -63,13 +63,12 @@ class TopPoseStep(ImageStep):
 
     step = step_of(
         TOP_POSE,
-        tr(
-            "Mount the housing without the elastomer. Lay the small checkerboard flat on the "
-            "top opening, pattern facing down."
-        ),
+        tr("Lay the small checkerboard flat on the top opening, pattern facing down."),
         "board",
         frames=8,
         wanted=1,
+        advice=tr("Mount the housing without the elastomer."),
+        figure="reprojection_rms",
     )
 
     def detector(self, name: str) -> Detector:

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtWidgets import (
-    QApplication,
-    QMainWindow,
-    QStackedWidget,
-    QWidget,
-)
+from PySide6.QtCore import QEvent, QTimer, Signal
+from PySide6.QtWidgets import QApplication, QStackedWidget, QWidget
 
-from app.calibrate.bench_dock import BenchDock
+from app.calibrate.bench import BenchPart
 from app.calibrate.image_area import ImageArea
 from app.calibrate.model import WizardModel
 from app.calibrate.moving_on import MovingOn
 from app.calibrate.outside_changes import OutsideBar
-from app.calibrate.session_bar import SessionBar, history_dock
 from app.calibrate.session_camera import SessionCamera
 from app.calibrate.states import OPEN, StepState
 from app.calibrate.step import Parts, StepPresenter
-from app.calibrate.step_list import StepList
-from app.calibrate.step_panel import StepPanel
+from app.calibrate.step_list import StepColumn, StepList
+from app.calibrate.step_panel import WIDTH, StepPanel
 from app.calibrate.steps import route_of, steps_of
 from app.context.context import AppContext
 from app.widgets.actions import make_action
@@ -32,7 +26,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
-class Wizard(QMainWindow):
+class Wizard(QWidget):
     """Holds the steps of a session and passes on what concerns the open one.
 
     Parameters
@@ -55,7 +49,6 @@ class Wizard(QMainWindow):
 
     def __init__(self, project: Project, *, context: AppContext) -> None:
         super().__init__()
-        self.setWindowFlags(Qt.WindowType.Widget)
         named(self, "wizard", tr("Calibration wizard"))
         self.context = context
         self.model = WizardModel(project, context=context, parent=self)
@@ -65,6 +58,9 @@ class Wizard(QMainWindow):
         route = route_of(project.recipe.of(project.session))
         steps = steps_of(route, self.model.statuses)
         self.step_list = StepList(steps)
+        self.bench = BenchPart(context.source)
+        self.column = StepColumn(self.step_list, self.bench, model=self.model, window=self)
+        self.column.leave.triggered.connect(self.left)
         self._lay_out()
         parts = Parts(self.model, context, self.area, self.panel, steps)
         self.presenters: tuple[StepPresenter, ...] = tuple(make(parts) for make in route)
@@ -77,7 +73,6 @@ class Wizard(QMainWindow):
         # Not at once: the history may ask for it, and is closed then.
         self._renewal = QTimer(self, singleShot=True, interval=0)
         self._renewal.timeout.connect(lambda: self.renewed.emit(self.open.step.key))
-        self._build_docks()
         self._build_keys()
         self.session_camera = SessionCamera(self.model, context=context, window=self)
         self.moving_on = MovingOn(self.model, self.panel, self.presenters, go_to=self.go_to)
@@ -88,23 +83,12 @@ class Wizard(QMainWindow):
         self.model.compute()
 
     def _lay_out(self) -> None:
-        middle = QWidget()
         self.centre, self.side = QStackedWidget(), QStackedWidget()
         self.centre.addWidget(self.area)
         self.side.addWidget(self.panel)
-        row = hbox(self.step_list, (self.centre, 1), self.side, margins=0, spacing=0)
-        vbox(self.outside, (row, 1), of=middle, margins=0, spacing=0)
-        self.setCentralWidget(middle)
-
-    def _build_docks(self) -> None:
-        self.bench_dock = BenchDock(self.context.source, self)
-        docks = (history_dock(self.model, self), self.bench_dock)
-        for dock in docks:
-            self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
-            dock.hide()
-        bar = SessionBar(self, model=self.model, docks=docks)
-        bar.leave.triggered.connect(self.left)
-        self.addToolBar(bar)
+        self.side.setFixedWidth(WIDTH)
+        row = hbox(self.column, (self.centre, 1), self.side, margins=0, spacing=0)
+        vbox(self.outside, (row, 1), of=self, margins=0, spacing=0)
 
     def _build_keys(self) -> None:
         self._capture_key = make_action(
@@ -130,16 +114,17 @@ class Wizard(QMainWindow):
         panel.automatic.toggled.connect(self._set_automatic)
         panel.cancel.clicked.connect(model.jobs.cancel)
         guide = self.context.requests.guide
-        panel.help.clicked.connect(lambda: guide.emit("guide/calibrate", self.open.step.title))
-        panel.recompute.clicked.connect(self._recompute)
+        panel.help.guide.clicked.connect(
+            lambda: guide.emit("guide/calibrate", self.open.step.title)
+        )
         area.reconnect.clicked.connect(self.live.open)
         area.view.clicked.connect(self._on_clicked)
-        area.view.dragged.connect(self.bench_dock.drag)
+        area.view.dragged.connect(self.bench.drag)
         area.view.refused.connect(self._refuse)
         area.view.saved.connect(
             lambda path: panel.show_notice(tr("Saved as {p}").format(p=path), "pass")
         )
-        self.bench_dock.visibilityChanged.connect(self._follow_bench)
+        self.bench.opened.connect(self._follow_bench)
         for presenter in self.presenters:
             presenter.step_wanted.connect(self.go_to)
             presenter.lay_wanted.connect(self._lay_on_bench)
@@ -159,7 +144,7 @@ class Wizard(QMainWindow):
         """Pass on to the open step what the user does with the shared widgets."""
         panel, area = self.panel, self.area
         panel.capture.clicked.connect(lambda: self.open.capture())
-        panel.import_files.clicked.connect(lambda: self.open.choose_files())
+        panel.import_files.triggered.connect(lambda: self.open.choose_files())
         panel.lay.clicked.connect(self._lay_on_bench)
         area.back_to_live.clicked.connect(lambda: self.open.live())
         area.strip.chosen.connect(self.show_capture)
@@ -249,6 +234,8 @@ class Wizard(QMainWindow):
 
     def _next(self) -> None:
         """Show the next step, or say what is missing in this one."""
+        if self.moving_on.just_moved:
+            return
         obstacle = self.open.obstacle()
         if obstacle:
             self._refuse(obstacle)
@@ -287,10 +274,6 @@ class Wizard(QMainWindow):
         if self.isVisible():
             self.open.focus().setFocus()
 
-    def _recompute(self) -> None:
-        stages = self.open.step.stages
-        self.model.compute(stages[-1] if stages else None)
-
     # State
 
     def refresh(self) -> None:
@@ -308,13 +291,13 @@ class Wizard(QMainWindow):
         """Return state and message of every step; a waiting step names the one it waits for."""
         states: dict[str, StepState] = {}
         first_open = ""
-        for number, presenter in enumerate(self.presenters, start=1):
+        for presenter in self.presenters:
             step, (state, text) = presenter.step, presenter.state()
             empty = state == StageState.EMPTY.value and step.stage is None and bool(step.stages)
             if first_open and (empty or state == StageState.WAITING.value):
                 text = tr("Waiting for {step}. Complete that step first.").format(step=first_open)
             if not first_open and step.stage is not None and state in OPEN:
-                first_open = tr("step {n}, {title}").format(n=number, title=step.title)
+                first_open = step.title
             states[step.key] = state, text
         return states
 
@@ -353,7 +336,7 @@ class Wizard(QMainWindow):
 
     def _on_captured(self, stage: str, name: str) -> None:
         if self.open.step.stage == stage:
-            self.panel.show_notice(tr("Captured {name}.").format(name=name), "pass")
+            self.open.captured(name)
             self.area.strip.show_newest()
 
     def _signal_capture(self, _stage: str) -> None:
@@ -363,27 +346,28 @@ class Wizard(QMainWindow):
             QApplication.beep()
 
     def _on_camera(self) -> None:
-        self.bench_dock.follow()
+        self.bench.follow()
         for presenter in self.presenters:
-            presenter.show_bench(self.bench_dock.in_use)
+            presenter.show_bench(self.bench.in_use)
         self.open.camera_changed()
 
     # The virtual bench
 
     def _lay_on_bench(self) -> None:
-        scene = self.bench_dock.lay(self.open.step, self.project.session)
+        scene = self.bench.lay(self.open.step, self.project.session)
         if scene is not None:
             self.open.on_bench(scene)
+            self.model.live_detection.count_movement()
             self.open.live()
 
     def _follow_bench(self) -> None:
         """Let drags move the object on the bench, if it is visible next to the live image."""
-        live = not self.model.shown and self.bench_dock.in_use
-        self.area.view.image.hand_drags_on(live and not self.bench_dock.isHidden())
+        live = not self.model.shown and self.bench.in_use
+        self.area.view.image.hand_drags_on(live and self.bench.toggle.isChecked())
 
     def _on_clicked(self, u: float, v: float) -> None:
         if not self.model.shown:
-            self.bench_dock.drag_to(u, v)
+            self.bench.drag_to(u, v)
 
 
 def _add(stack: QStackedWidget, widget: QWidget) -> None:

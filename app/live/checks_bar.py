@@ -5,19 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QProgressBar, QSizePolicy, QWidget
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
 from app.live.drawing import ROLE_COLOURS
 from app.live.overlay import Role
 from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from app.widgets.quality_table import SIGNS
 from gelpolight_core.finding import Finding
 from gelpolight_core.translation import tr
-
-# Below this width the advice and the focus bar do not fit side by side.
-NARROW = 620
 
 
 class FocusBar(QProgressBar):
@@ -50,10 +48,7 @@ class FocusBar(QProgressBar):
 
 
 class ChecksBar(QWidget):
-    """Texts and figures about the image above: two lines, or four below a narrow one.
-
-    The number of lines depends only on the width, so that nothing jumps when a text changes.
-    """
+    """A line over the lower edge of the image: the pixel under the pointer, else the exposure."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,39 +56,11 @@ class ChecksBar(QWidget):
         self.focus = FocusBar()
         self._exposure = named(PlainLabel(), "live.exposure", tr("Exposure"))
         self._pixel = named(PlainLabel(), "live.pixel", tr("Pixel under the pointer"))
-        self._rate = named(PlainLabel(), "live.rate", tr("Frame rate"))
-        self._rate.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        # Long texts are cut off instead of widening the window.
-        self._exposure.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self._pixel.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(6, 3, 6, 3)
-        self._grid.setVerticalSpacing(2)
-        self._grid.setColumnStretch(0, 1)
-        self._narrow: bool | None = None
-        self._arrange(narrow=False)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give long advice a second line if one is too short."""
-        super().resizeEvent(event)
-        self._arrange(narrow=event.size().width() < NARROW)
-
-    def _arrange(self, *, narrow: bool) -> None:
-        if narrow == self._narrow:
-            return
-        self._narrow = narrow
-        cells = {
-            self._exposure: (0, 0, 1, 2) if narrow else (0, 0, 1, 1),
-            self.focus: (2, 0, 1, 1) if narrow else (0, 1, 1, 1),
-            self._pixel: (1, 0, 1, 2) if narrow else (1, 0, 1, 1),
-            self._rate: (2, 1, 1, 1) if narrow else (1, 1, 1, 1),
-        }
-        for widget, cell in cells.items():
-            self._grid.removeWidget(widget)
-            self._grid.addWidget(widget, *cell)
-        self._exposure.setWordWrap(narrow)
-        lines = 2 if narrow else 1
-        self._exposure.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
+        # Long texts are cut off instead of widening the window; the tooltip has all of it.
+        for label in (self._exposure, self._pixel):
+            label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._pixel.hide()
+        hbox((self._exposure, 1), (self._pixel, 1), self.focus, of=self, margins=(8, 4, 8, 4))
 
     def show_exposure(self, exposure: Finding | None) -> None:
         """Show the advice about the exposure; None for no text."""
@@ -103,15 +70,11 @@ class ChecksBar(QWidget):
             self._exposure.setToolTip(plain_tip(text))
 
     def show_pixel(self, text: str) -> None:
-        """Show the value under the pointer."""
+        """Show the value under the pointer instead of the exposure."""
         if text != self._pixel.text():
             self._pixel.setText(text)
-
-    def show_rate(self, text: str) -> None:
-        """Show the frame rate and the number of dropped frames."""
-        if text != self._rate.text():
-            self._rate.setText(text)
-            self._rate.setToolTip(plain_tip(text))
+            self._pixel.setVisible(bool(text))
+            self._exposure.setVisible(not text)
 
 
 MARGIN_PX = 6

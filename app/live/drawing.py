@@ -22,6 +22,7 @@ from app.live.overlay import (
     Marker,
     Mask,
     Overlay,
+    Ring,
     Role,
     drag,
     find_grip,
@@ -40,6 +41,7 @@ ROLE_COLOURS: dict[Role, str] = {
     "info": "#e8eef5",
 }
 HALO = QColor(0, 0, 0, 170)
+RING_COLOUR = "#2a7de1"
 PLATE = QColor(0, 0, 0, 150)
 # How near to a handle the pointer must be, in screen pixels.
 REACH_PX = 12.0
@@ -151,6 +153,8 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
             _paint_line(painter, line, to_screen)
         for circle in self._overlay.circles:
             _paint_circle(painter, circle, to_screen, circle.handle == self.selected)
+        for ring in self._overlay.rings:
+            _paint_ring(painter, ring, to_screen)
         for marker in self._overlay.markers:
             _paint_marker(painter, marker, to_screen, marker.handle == self.selected)
         painter.restore()
@@ -211,6 +215,19 @@ def _paint_circle(painter: QPainter, circle: Circle, to_screen: QTransform, sele
     if circle.handle:
         _paint_grip(painter, centre, circle.role, selected)
         _paint_grip(painter, edge, circle.role, selected)
+
+
+def _paint_ring(painter: QPainter, ring: Ring, to_screen: QTransform) -> None:
+    centre = to_screen.map(QPointF(ring.u, ring.v))
+    edge = to_screen.map(QPointF(ring.u + ring.radius_px, ring.v))
+    radius = abs(edge.x() - centre.x())
+    box = QRectF(centre.x() - radius, centre.y() - radius, 2 * radius, 2 * radius)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for colour, share in ((HALO, 1.0), (QColor(RING_COLOUR), ring.share)):
+        pen = QPen(colour, 6.0)
+        pen.setCapStyle(Qt.PenCapStyle.RoundCap)
+        painter.setPen(pen)
+        painter.drawArc(box, 90 * 16, round(-360 * 16 * share))
 
 
 def _paint_grip(painter: QPainter, at: QPointF, role: Role, selected: bool) -> None:

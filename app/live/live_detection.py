@@ -48,14 +48,20 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the detector found in a live frame, whether it is still, and whether anything moved.
+    """What the detector found in a live frame, how long it was held, and whether anything moved.
 
-    `moved` counts from the last :meth:`LiveDetection.forget_movement`.
+    `held` is the share, 0..1, of the time after which an image counts as still. `moved` counts from
+    the last :meth:`LiveDetection.forget_movement`.
     """
 
     detection: Detection
-    still: bool
+    held: float
     moved: bool
+
+    @property
+    def still(self) -> bool:
+        """Whether the image is still."""
+        return self.held >= 1.0
 
 
 class LiveDetection(QObject):
@@ -80,10 +86,14 @@ class LiveDetection(QObject):
 
         def detect_frame(frame: Frame) -> Seen | None:
             # Always checked, so that no movement is missed while the detector changes.
-            quiet = movement.update(frame.rgb, frame.time_s)
-            return None if detect is None else Seen(detect(frame.rgb), quiet, movement.moved)
+            held = movement.update(frame.rgb, frame.time_s)
+            return None if detect is None else Seen(detect(frame.rgb), held, movement.moved)
 
         self._live.process(detect_frame)
+
+    def count_movement(self) -> None:
+        """Note that the scene is another one, even if it looks the same."""
+        self._movement.moved = True
 
     def forget_movement(self) -> None:
         """Reset the movement check: only movements from now on count."""

@@ -29,6 +29,7 @@ from app.live.overlay import Handle, Overlay, move, next_name, resize
 from app.live.tools import ImageTools
 from app.sources.stream import Stream
 from app.widgets.layout import vbox
+from app.widgets.meaning import show_ground
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically
@@ -90,7 +91,6 @@ class LiveView(QWidget):
         self._best_focus = BestFocus()
         self._judges_focus = True
         self._checked_s = -math.inf
-        self._rate_shown_s = -math.inf
         self._pointer = (math.nan, math.nan)
         self.shown_frames = 0
         self.tools = ImageTools(self)
@@ -98,14 +98,17 @@ class LiveView(QWidget):
         self._checks = ChecksBar()
         self._histogram = Histogram(self.image)
         self._histogram.hide()
-        vbox(self.tools, (self.image, 1), self._checks, of=self, margins=0, spacing=0)
+        vbox((self.image, 1), of=self, margins=0, spacing=0)
+        for floating in (self.tools, self._checks):  # over the image: they cost no picture
+            floating.setParent(self.image)
+            show_ground(floating, "image")
         self.tools.pressed.connect(self._on_tool)
         self.tools.switched.connect(self._on_switch)
         self.image.pointed.connect(self._on_pointed)
         self.image.clicked.connect(self.clicked)
         self.image.dragged.connect(self.dragged)
         self.image.zoomed.connect(self.tools.show_zoom)
-        self.image.resized.connect(self._place_histogram)
+        self.image.resized.connect(self._place)
         self.image.overlay.handle_moved.connect(self._on_handle_moved)
         self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=16)
         self._tick.timeout.connect(self._show_newest_frame)
@@ -125,7 +128,6 @@ class LiveView(QWidget):
             self.image.show_rgb(None)
             self._checks.show_exposure(None)
             self._checks.show_pixel("")
-            self._checks.show_rate("")
             self._checks.focus.show_share(0.0)
             self._histogram.show_counts(None)
         elif self.isVisible():
@@ -187,7 +189,6 @@ class LiveView(QWidget):
         frame = self._stream.newest.take()
         if frame is not None:
             self._show(frame.rgb)
-        self._show_rate(self._stream)
 
     def _show(self, rgb: Rgb) -> None:
         resized = self._rgb is None or self._rgb.shape != rgb.shape
@@ -214,16 +215,6 @@ class LiveView(QWidget):
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
-
-    def _show_rate(self, stream: Stream) -> None:
-        """Show the frame rate, or why no more frames arrive."""
-        now_s = time.monotonic()
-        if now_s - self._rate_shown_s < 0.5:
-            return
-        self._rate_shown_s = now_s
-        figures = stream.figures()
-        rate = tr("{r:.0f} frames/s, {d} dropped").format(r=figures.rate_hz, d=figures.dropped)
-        self._checks.show_rate(figures.lost or rate)
 
     def _draw_overlay(self) -> None:
         shown = self._overlay if self.tools.is_on("overlay") else Overlay()
@@ -327,11 +318,14 @@ class LiveView(QWidget):
             self._nudge_end.stop()
             self._end_nudge()
 
-    def _place_histogram(self) -> None:
-        corner = self.image.rect().bottomRight()
+    def _place(self) -> None:
+        """Put the tools into the upper left corner, and the checks along the lower edge."""
+        room, checks = self.image.rect(), self._checks.sizeHint().height()
+        self.tools.adjustSize()
+        self._checks.setGeometry(0, room.height() - checks, room.width(), checks)
         self._histogram.move(
-            corner.x() - self._histogram.width() - CORNER_PX,
-            corner.y() - self._histogram.height() - CORNER_PX,
+            room.width() - self._histogram.width() - CORNER_PX,
+            room.height() - checks - self._histogram.height() - CORNER_PX,
         )
 
 

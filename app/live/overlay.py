@@ -75,6 +75,16 @@ class Mask:
 
 
 @dataclass(frozen=True, slots=True)
+class Ring:
+    """A ring that fills while an object is held still; `share` 0..1."""
+
+    u: float
+    v: float
+    radius_px: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
 class Overlay:
     """Everything that is drawn on one image."""
 
@@ -82,6 +92,26 @@ class Overlay:
     circles: tuple[Circle, ...] = ()
     lines: tuple[Line, ...] = ()
     masks: tuple[Mask, ...] = ()
+    rings: tuple[Ring, ...] = ()
+
+
+RING_OF_HEIGHT = 0.25
+RING_GAP = 1.25
+
+
+def hold_ring(overlay: Overlay, size: tuple[int, int], share: float) -> tuple[Ring, ...]:
+    """Return the ring around what was found, or in the middle of the image; none for `share` 0."""
+    if share <= 0.0:
+        return ()
+    most = RING_OF_HEIGHT * size[1]
+    for circle in overlay.circles:
+        return (Ring(circle.u, circle.v, min(RING_GAP * circle.radius_px, most), share),)
+    for line in overlay.lines:
+        if line.role == "good" and len(line.points):
+            u, v = line.points.mean(axis=0)
+            reach = float(np.hypot(*(line.points - (u, v)).T).max())
+            return (Ring(float(u), float(v), min(RING_GAP * reach, most), share),)
+    return (Ring(0.5 * size[0], 0.5 * size[1], 0.5 * most, share),)
 
 
 # Below this radius a circle could not be distinguished from its centre, or grabbed.

@@ -45,10 +45,10 @@ class ImageTools(QWidget):
         named(self, "live.tools", tr("Image tools"))
         self._buttons: dict[str, QToolButton] = {}
         self._zoom = named(PlainLabel(), "live.zoom", tr("Magnification"))
+        self._zoom.setFixedWidth(self._zoom.fontMetrics().horizontalAdvance("0000 %"))
         row = hbox(of=self, margins=(4, 2, 8, 2), spacing=2)
         for name in TOOLS:
             row.addWidget(self._make_button(name, owner))
-        row.addStretch(1)
         row.addWidget(self._zoom)
         self._buttons["overlay"].setChecked(True)
 

@@ -111,6 +111,13 @@ QComboBox QAbstractItemView {{ background: {base}; border: 1px solid {line};
 QGroupBox {{ border: none; margin-top: 22px; padding: 0; }}
 QGroupBox::title {{ subcontrol-origin: margin; subcontrol-position: top left; color: {muted}; }}
 QFrame#card {{ background: {alternate}; border: 1px solid {line}; border-radius: 8px; }}
+QListWidget[plain="true"] {{ background: transparent; border: none; outline: none; }}
+QListWidget[plain="true"]::item {{ border-radius: 6px; padding-left: 6px; color: {text}; }}
+QListWidget[plain="true"]::item:hover {{ background: {button}; }}
+QListWidget[plain="true"]::item:selected {{ background: {hover}; }}
+QWidget[ground="image"] > * {{ background: {window}; color: {text}; }}
+QWidget[ground="image"] > QToolButton:hover {{ background: {hover}; }}
+QWidget[ground="image"] > QToolButton:checked {{ background: {highlight}; }}
 QTabWidget::pane {{ border: none; }}
 QTabBar::tab {{ background: transparent; border: none; color: {muted}; padding: 8px 14px;
     border-bottom: 2px solid transparent; }}

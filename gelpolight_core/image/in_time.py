@@ -114,14 +114,14 @@ class Lasting:
     def __init__(self) -> None:
         self._since_s: float | None = None
 
-    def update(self, true: bool, time_s: float) -> bool:
-        """Add whether it is true at a time; return whether it lasts."""
+    def update(self, true: bool, time_s: float) -> float:
+        """Add whether it is true at a time; return the share of the time, 1 when it lasts."""
         if not true:
             self._since_s = None
-            return False
+            return 0.0
         if self._since_s is None or time_s < self._since_s:
             self._since_s = time_s
-        return time_s - self._since_s >= LASTS_S
+        return min((time_s - self._since_s) / LASTS_S, 1.0)
 
 
 class Stillness:
@@ -142,8 +142,8 @@ class Stillness:
         self._before: Frame | None = None
         self._still = Lasting()
 
-    def update(self, rgb: Frame, time_s: float) -> bool:
-        """Add a frame and its time; return whether nothing has moved for a while."""
+    def update(self, rgb: Frame, time_s: float) -> float:
+        """Add a frame and its time; return how long nothing moved, 1 for long enough."""
         before, self._before = self._before, rgb
         if before is None or before.shape != rgb.shape or before.dtype != rgb.dtype:
             return self._still.update(False, time_s)

@@ -99,13 +99,13 @@ class Recovery:
             if self._left or size > self._strongest:
                 self._strongest, self._press = size, cells.copy()
             self._limit = max(CONTACT_CHANGE, 0.5 * self._strongest)
-            self._free = self._free_since.update(False, time_s)
+            self._free = self._free_since.update(False, time_s) >= 1.0
             self._left, self._recovers = [], False
             return None
         self._limit = max(CONTACT_CHANGE, min(self._limit, 2.0 * size))
         square = float((self._press**2).sum())
         share = float((cells * self._press).sum()) / square if square else 0.0
-        self._free = self._free_since.update(True, time_s) or share < REPEATABILITY
+        self._free = self._free_since.update(True, time_s) >= 1.0 or share < REPEATABILITY
         self._left = [x for x in self._left if 0.0 <= time_s - x[0] <= HOLD_S]
         self._left.append((time_s, share))
         left = np.array(self._left)

@@ -136,13 +136,7 @@ def find_ball(
     seen = origin + pitch * np.asarray(found.centre)
     contact = pitch * found.contact_radius_px
     if contact >= radius_mm:
-        raise InputError(
-            tr("the contact's radius is {c:.2f} mm, the ball's is stated as {r:.2f} mm").format(
-                c=contact, r=radius_mm
-            ),
-            where=name,
-            advice=Remedy.CHECK_RADIUS,
-        )
+        raise larger_contact(contact, radius_mm, name)
     depth = ball_depth_from_contact(contact, radius_mm)
     ray_slope = _ray_slope_at(table, seen)
     ring = depth - (radius_mm - np.sqrt(radius_mm**2 - contact**2))
@@ -158,6 +152,14 @@ def find_ball(
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
     return BallPress(
         name, pose, contact, sd, misfit, found, _judge(found, contact, radius_mm, moved, misfit)
+    )
+
+
+def larger_contact(contact_mm: float, radius_mm: float, name: str) -> InputError:
+    """Return the error that a contact is larger than the ball that is stated."""
+    text = tr("the contact's radius is {c:.2f} mm, the ball's is stated as {r:.2f} mm")
+    return InputError(
+        text.format(c=contact_mm, r=radius_mm), where=name, advice=Remedy.CHECK_RADIUS
     )
 
 

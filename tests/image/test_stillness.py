@@ -53,7 +53,7 @@ def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz: float, fra
     watch = Stillness()
     for position in (0.0, 20.0):  # the time starts again after a movement
         reported = [
-            watch.update(shot(scene(position), i, noise=0.005), position + i / rate_hz)
+            watch.update(shot(scene(position), i, noise=0.005), position + i / rate_hz) >= 1.0
             for i in range(frames)
         ]
         assert reported == [False] * (frames - 1) + [True]

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QPoint, Qt
+from pytestqt.qtbot import QtBot
 from technician import ScriptedCamera, Technician, read_rgb
 
 from app.calibrate import moving_on
@@ -21,7 +23,7 @@ Made = Callable[[], Project]
 @pytest.fixture
 def automatic(context: AppContext, technician: Technician, monkeypatch: pytest.MonkeyPatch) -> None:
     """Switch automatic captures on, and go on without a pause."""
-    monkeypatch.setattr(moving_on, "LOOK_MS", 10)
+    monkeypatch.setattr(moving_on, "TICK_MS", 10)
     context.settings.prefer(captures_automatically=True)
 
 
@@ -31,7 +33,7 @@ def test_it_is_on_for_a_new_user_and_remembers_a_change(
     assert Settings(tmp_path / "new.ini").preferences.captures_automatically
     technician.begin(computed_project(), "lights")
     assert not technician.wizard.panel.automatic.isChecked()
-    technician.wizard.panel.automatic.click()
+    technician.wizard.panel.automatic.trigger()
     assert context.settings.preferences.captures_automatically
 
 
@@ -62,16 +64,39 @@ def test_what_needs_reading_or_nothing_new_does_not_lead_on(
 ) -> None:
     technician.begin(computed_project(), "background")
     wizard, step = technician.wizard, technician.wizard.open
+    wizard.moving_on.setInterval(60_000)
     for state, leads_on in ((StageState.WARN.value, False), (StageState.PASS.value, True)):
         wizard.moving_on._was_incomplete = True
         wizard.model.states["background"] = (state, "")
         assert step.is_settled(state) is leads_on
         wizard.moving_on.check()
         assert wizard.moving_on.isActive() is leads_on
-    wizard.panel.automatic.setChecked(False)
-    wizard.moving_on.timeout.emit()
-    assert wizard.open is step
     wizard.moving_on.stop()
+    technician.rest()
+
+
+def test_any_action_stops_the_countdown_and_a_moving_mouse_delays_it(
+    automatic: None, technician: Technician, computed_project: Made, qtbot: QtBot
+) -> None:
+    technician.begin(computed_project(), "background")
+    wizard = technician.wizard
+    moving = wizard.moving_on
+    moving.setInterval(60_000)
+    wizard.model.states["background"] = (StageState.PASS.value, "")
+    for stop in (
+        lambda: qtbot.mouseClick(wizard.panel.title, Qt.MouseButton.LeftButton),
+        lambda: qtbot.keyClick(wizard, Qt.Key.Key_Shift),
+    ):
+        moving._was_incomplete = True
+        moving.check()
+        moving.timeout.emit()
+        assert "(2)" in wizard.panel.next.text()
+        qtbot.mouseMove(wizard.panel.title, QPoint(5, 5))
+        qtbot.mouseMove(wizard.panel.title, QPoint(9, 9))
+        technician.until(lambda: "(3)" in wizard.panel.next.text())
+        stop()
+        assert not moving.isActive() and "(" not in wizard.panel.next.text()
+        assert wizard.open.step.key == "background"
     technician.rest()
 
 

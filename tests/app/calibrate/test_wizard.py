@@ -35,7 +35,7 @@ def test_a_reported_capture_is_on_disk_with_its_radius(
     kept = read_session(technician.session)
     assert kept.ball_radii_mm[name] == 2.5
     assert kept.image(technician.session / "balls" / name).size == (320, 240)
-    assert name in technician.wizard.panel.notice.text()
+    technician.until(lambda: Path(name).stem in technician.wizard.area.verdict.title.text())
 
 
 def test_a_typed_radius_is_kept_and_used_without_enter(
@@ -96,8 +96,8 @@ def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
     assert {technician.state(key) for key in ("balls", "reflectance", "result")} == {"stale"}
     assert technician.state("lights") == "warn", "small spots do not show the crosstalk"
     technician.wizard.go_to("balls")
-    assert "Recompute" in technician.wizard.panel.sentence.text()
-    technician.click("calibrate.recompute")
+    assert technician.wizard.panel.buttons[0].text() == "Recompute"
+    technician.click("calibrate.remedy0")
     technician.rest()
     assert technician.state("balls") in ("pass", "warn")
 
@@ -336,7 +336,7 @@ def test_a_step_with_too_few_images_is_incomplete_not_failed(
     technician.capture()
     technician.rest()
     assert technician.state("lens") == "begun"
-    assert technician.wizard.panel.sentence.text().startswith("1 captured. At least 4 are needed")
+    assert technician.wizard.panel.below.text() == "1 of 12 captured"
 
 
 def test_a_file_changed_by_another_program_is_reported_and_reloaded(
@@ -395,7 +395,7 @@ def test_a_waiting_step_names_the_step_it_waits_for(technician: Technician, fres
     assert "captured" in technician.wizard.panel.sentence.text()
     assert "earlier steps" in technician.see("calibrate.maps.none").text()
     technician.wizard.go_to("reflectance")
-    assert "step 2, Lens" in technician.wizard.panel.sentence.text()
+    assert "Lens" in technician.wizard.panel.sentence.text()
 
 
 def test_a_saved_calibration_is_validated_while_stages_are_recomputed(

@@ -1,36 +1,50 @@
-"""The virtual bench next to the wizard, shown when the virtual sensor is the camera."""
+"""The virtual bench below the steps, offered when the virtual sensor is the camera."""
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QDockWidget, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
 
 from app.bench.bench_area import BenchArea
 from app.calibrate.step_data import Step
 from app.context.context import SourceChoice
 from app.sources.bench import Scene
-from app.widgets.layout import scroll_area
+from app.widgets.fold import Fold
+from app.widgets.layout import scroll_area, vbox
 from app.widgets.naming import named
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
+AREA_HEIGHT = 280
 
-class BenchDock(QDockWidget):
-    """Holds the bench panel and places on the bench the object that a step needs.
+
+class BenchPart(QWidget):
+    """Holds the bench panel, folded, and places on the bench the object that a step needs.
 
     Parameters
     ----------
     source : SourceChoice
         The source selection shared by all pages, with its bench.
-    parent : QWidget
-        Parent window.
+
+    Signals
+    -------
+    opened(bool)
+        The panel was opened or folded.
     """
 
-    def __init__(self, source: SourceChoice, parent: QWidget) -> None:
-        super().__init__(tr("Virtual bench"), parent)
+    opened = Signal(bool)
+
+    def __init__(self, source: SourceChoice) -> None:
+        super().__init__()
         named(self, "calibrate.bench", tr("Virtual bench"))
         self._source = source
         self._area = BenchArea(source)
-        self.setWidget(scroll_area(self._area))
+        self._scroll = scroll_area(self._area)
+        self._scroll.setMinimumHeight(AREA_HEIGHT)
+        fold = Fold("calibrate.bench.shown", tr("Virtual bench"), self._scroll)
+        self.toggle = fold.title
+        self.toggle.toggled.connect(self.opened)
+        vbox((fold, 100), None, of=self, margins=0)
         self._tried = 0
         self._grab_offset: tuple[float, float] | None = None
         self.hide()
@@ -41,12 +55,18 @@ class BenchDock(QDockWidget):
         info = self._source.info
         return info is not None and info.kind == "virtual" and self._source.bench is not None
 
+    @property
+    def open_width(self) -> int:
+        """Width that the open panel needs."""
+        bar = self._scroll.verticalScrollBar()
+        return self._area.minimumSizeHint().width() + bar.sizeHint().width()
+
     def follow(self) -> None:
-        """Show the dock's action only if the virtual sensor is the camera."""
+        """Offer the bench only if the virtual sensor is the camera."""
         in_use = self._area.follow()
-        self.toggleViewAction().setVisible(in_use)
+        self.setVisible(in_use)
         if not in_use:
-            self.hide()
+            self.toggle.setChecked(False)
 
     def lay(self, step: Step, session: Session) -> Scene | None:
         """Place the object that a step needs; each call gives the next view or press."""
@@ -62,7 +82,7 @@ class BenchDock(QDockWidget):
 
     def drag_to(self, u: float, v: float) -> None:
         """Move the object on the bench to the clicked point of the live image."""
-        if self._source.bench is not None and self.isVisible():
+        if self._source.bench is not None and self.toggle.isChecked():
             self._source.bench.drag_to(u, v)
 
     def drag(self, phase: str, u: float, v: float) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -81,7 +80,7 @@ class Untouched:
         return read_raw(self.path)
 
 
-def detect_closed_ball(
+def detect_ball_in_place(
     rgb: Rgb,
     untouched: Untouched,
     *,
@@ -111,7 +110,9 @@ def detect_closed_ball(
         seen = grid.reduce(linear_image(rgb, "", response=untouched.response).rgb)
         radius = radius_mm / grid.pitch_mm
         found = contact_in(seen, untouched.base, radius=radius, name=tr("Image")).circle
-        contact = Circle(*astuple(grid.in_image(found)), "good", handle="ball" if editable else "")
+        seen_at = grid.in_image(found)
+        handle = "ball" if editable else ""
+        contact = Circle(seen_at.x, seen_at.y, seen_at.radius, "good", handle)
         text = tr("Ball found: contact radius {c:.2f} mm.")
         return Detection(
             Overlay(markers=marks, circles=(contact,)),
@@ -137,15 +138,12 @@ class Progress:
         Mean error of the normals of presses that were left out.
     gain : float or None
         Relative decrease of the error by one more press; None with too few presses.
-    curve : tuple of (int, float)
-        Numbers of presses, and the typical errors with them, degrees.
     next_mm : (x, y) or None
         Where the next press helps most; None if more presses do not help.
     """
 
     error_deg: float
     gain: float | None
-    curve: tuple[tuple[int, float], ...]
     next_mm: Point | None
 
     @property
@@ -154,19 +152,13 @@ class Progress:
         return self.gain is not None and self.gain < SETTLED
 
     def sentence(self) -> str:
-        """Return the state and what to do next."""
-        text = tr("Expected error of the normals: {e:.1f} degrees.").format(e=self.error_deg)
-        if self.curve:
-            text += " " + tr("With {counts} presses it was about {errors}.").format(
-                counts=", ".join(str(n) for n, _ in self.curve),
-                errors=", ".join(f"{e:.1f}" for _, e in self.curve),
-            )
+        """Return what one more press changes."""
         if self.gain is None:
-            return text + " " + tr("Press more balls. The next one helps most at the ring.")
+            return tr("The next press helps most at the ring.")
         if self.settled:
-            return text + " " + tr("More presses do not help. Go to the next step.")
-        more = tr("One more press lowers the error by about {g:.0f} %, most at the ring.")
-        return text + " " + more.format(g=100.0 * self.gain)
+            return tr("More presses do not help.")
+        more = tr("One more lowers the error by about {g:.0f} %, most at the ring.")
+        return more.format(g=100.0 * self.gain)
 
 
 def progress_of(run: Slopes) -> Progress:
@@ -177,7 +169,6 @@ def progress_of(run: Slopes) -> Progress:
     return Progress(
         float(np.mean(errors)),
         gain,
-        tuple((n, math.degrees(math.atan(error))) for n, error in result.learning),
         None if settled else result.next_position_mm,
     )
 
@@ -219,20 +210,17 @@ ASKED = ("next_ball_gain_percent", "balls_used")
 """Figures whose advice is in the sentence about the next press."""
 
 
-class ClosedBallsStep(BallsStep):
+class InPlaceBallsStep(BallsStep):
     """Asks for presses until more do not help."""
 
     step = step_of(
         BALLS,
-        tr(
-            "Press a ball of known diameter into the membrane, at a different place for each "
-            "image. Its slopes must be as steep as what you want to measure. The ring in the "
-            "image shows where the next press helps most."
-        ),
+        tr("Press the ball where the ring is, and hold it still."),
         "ball",
         frames=4,
         wanted=ENOUGH_BALLS,
         least=LEAST_PRESSES,
+        advice=tr("Its slopes must be as steep as what you want to measure."),
     )
 
     def detector(self, name: str) -> Detector:
@@ -241,14 +229,14 @@ class ClosedBallsStep(BallsStep):
         files = session.found("background")
         if not files:
             return too_early
-        run, stated = self._run(), session.in_place
+        run, stated = self._run(), session.in_place or InPlace()
         if stated.mm_per_px is None:
             scale = self.model.project.results.get(SCALE)
             if scale is None:
                 return too_early
             stated = replace(stated, mm_per_px=scale.mm_per_px)
         detect = partial(
-            detect_closed_ball,
+            detect_ball_in_place,
             untouched=Untouched(files[-1], stated, session.response),
             radius_mm=self.radius.radius_mm,
         )
@@ -293,13 +281,28 @@ class ClosedBallsStep(BallsStep):
         progress = self.progress
         return is_done(state) and progress is not None and progress.settled
 
-    def show_state(self, state: str, sentence: str) -> None:
-        """Show the state, and the benefit of one more press."""
+    def number(self) -> Finding | None:
+        """Return the expected error of the normals."""
         progress = self.progress
-        if progress is not None:
+        if progress is None:
+            return None
+        return Finding(
+            "normal_error_deg", tr("Expected error of the normals"), progress.error_deg, "deg"
+        )
+
+    def progress_line(self) -> str:
+        """Return how many presses there are, and what one more changes."""
+        progress = self.progress
+        if progress is None:
+            return super().progress_line()
+        return tr("{n} captured.").format(n=self.count()) + " " + progress.sentence()
+
+    def show_state(self, state: str, sentence: str) -> None:
+        """Show the state; what one more press changes stands beside the number."""
+        if self.progress is not None:
             figures = self.model.statuses["balls"].quality.figures
             others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
-            sentence = " ".join((progress.sentence(), *(f"{advice}." for advice in others)))
+            sentence = " ".join(f"{advice}." for advice in others)
         super().show_state(state, sentence)
 
     def result_panels(self) -> tuple[Panel, ...]:

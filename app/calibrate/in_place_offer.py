@@ -19,7 +19,7 @@ from gelpolight_core.session.session import (
 from gelpolight_core.session.table import Table
 
 
-def closed_offer(folder: Path) -> Session | None:
+def in_place_offer(folder: Path) -> Session | None:
     """Return what a folder states for a closed sensor's session, with the folder of its images.
 
     None if it has no background and ball presses, if nothing of an open sensor is missing, or if

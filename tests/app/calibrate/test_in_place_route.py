@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
-from app.calibrate.closed_balls import Progress
 from app.calibrate.detection import as_image, read_raw
+from app.calibrate.in_place_balls import Progress
 from app.calibrate.setup_form import SetupForm
 from app.calibrate.setup_values import new_session
 from gelpolight_core.calibration import in_place
@@ -66,7 +66,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert technician.state("balls") in ("pass", "warn")
     progress = wizard.open.progress
     assert progress.error_deg < 4.0
-    assert f"{progress.error_deg:.1f} degrees" in wizard.panel.sentence.text()
+    assert wizard.panel.number.text() == f"{progress.error_deg:.3g} deg"
     captures = wizard.open.captures()
     (refused,) = [capture for capture in captures if capture.state == "fail"]
     assert refused.finding.sentence, "an image that shows no ball keeps its reason"
@@ -248,7 +248,7 @@ def test_a_preset_fills_in_the_scale_and_its_uncertainty(qtbot: QtBot) -> None:
 
 @pytest.mark.parametrize(("gain", "asks"), [(None, True), (2.0 * SETTLED, True), (0.0, False)])
 def test_it_stops_asking_when_more_presses_do_not_help(gain: float | None, asks: bool) -> None:
-    progress = Progress(2.0, gain, (), None)
+    progress = Progress(2.0, gain, None)
     assert progress.settled is not asks
     assert ("ring" in progress.sentence()) is asks
 
