@@ -7,7 +7,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from app.calibrate.balls import BallsStep, Point, press_marks
@@ -19,12 +18,10 @@ from app.calibrate.detection import (
     refuse_size,
     too_early,
 )
-from app.calibrate.maps import Panel
 from app.calibrate.states import is_done
 from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
-from app.view2d.map_view import extent_of
 from gelpolight_core.calibration.in_place import BALLS, SCALE
 from gelpolight_core.calibration.in_place_session import (
     ENOUGH_BALLS,
@@ -122,12 +119,6 @@ def detect_ball_in_place(
     return or_refusal(detect, marks=Overlay(markers=marks))
 
 
-GOOD_DEG, FAIR_DEG = 4.0, 8.0
-"""Residuals of a press up to which its mark is green, and yellow."""
-COLOURS = ((60, 200, 90), (240, 190, 50), (230, 70, 60))
-SHOWN_PX = 640
-
-
 @dataclass(frozen=True, slots=True)
 class Progress:
     """Accuracy of an in-place calibration, and whether more presses help.
@@ -171,39 +162,6 @@ def progress_of(run: Slopes) -> Progress:
         gain,
         None if settled else result.next_position_mm,
     )
-
-
-def residual_panel(run: Slopes) -> Panel:
-    """Return the presses on the background, coloured by their residuals."""
-    grid, progress = run.result.model.grid, progress_of(run)
-    background = run.result.model.background
-    rgb = (255.0 * np.clip(background / max(float(background.max()), 1e-6), 0, 1)).astype(np.uint8)
-    scale = max(1, round(SHOWN_PX / rgb.shape[1]))
-    rgb = cv2.resize(rgb // 2, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR)
-    for press in run.result.presses:
-        at = round(scale * press.ball.x), round(scale * press.ball.y)
-        error = press.held_out.normal_deg
-        colour = COLOURS[(error > GOOD_DEG) + (error > FAIR_DEG)]
-        cv2.circle(rgb, at, round(scale * press.ball.contact), colour, 2, cv2.LINE_AA)
-        _write(rgb, f"{error:.1f}", at, colour)
-    if progress.next_mm is not None:
-        first = grid.x_mm[0], grid.y_mm[0]
-        u, v = scale * np.subtract(progress.next_mm, first) / grid.pitch_mm
-        cv2.circle(rgb, (round(u), round(v)), 12, (255, 255, 255), 2, cv2.LINE_AA)
-        _write(rgb, tr("next"), (round(u), round(v) + 26), (255, 255, 255))
-    return Panel(
-        tr("Presses and their residual"),
-        np.ascontiguousarray(rgb),
-        extent_of(grid),
-        caption=tr("Mean error of the normals of each press, in degrees, found without that press"),
-    )
-
-
-def _write(rgb: np.ndarray, text: str, at: tuple[int, int], colour: tuple[int, ...]) -> None:
-    font = cv2.FONT_HERSHEY_SIMPLEX
-    (width, height), _ = cv2.getTextSize(text, font, 0.45, 1)
-    corner = at[0] - width // 2, at[1] + height // 2
-    cv2.putText(rgb, text, corner, font, 0.45, colour, 1, cv2.LINE_AA)
 
 
 ASKED = ("next_ball_gain_percent", "balls_used")
@@ -304,11 +262,6 @@ class InPlaceBallsStep(BallsStep):
             others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
             sentence = " ".join(f"{advice}." for advice in others)
         super().show_state(state, sentence)
-
-    def result_panels(self) -> tuple[Panel, ...]:
-        """Return the presses with their residuals."""
-        run = self._run()
-        return () if run is None else (residual_panel(run),)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the radius, the scale and the background."""

@@ -20,7 +20,6 @@ from app.widgets.plots import own_plot_menus
 from app.widgets.units import length_text, round_length_mm
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.translation import tr
 
 CURSOR = "#ffffff"
@@ -34,7 +33,7 @@ Extent = tuple[float, float, float, float]
 """Outer edges of an image: (left, top, right, bottom)."""
 
 
-def extent_of(grid: HeightMap | MembraneGrid | WorkingGrid) -> Extent:
+def extent_of(grid: HeightMap | MembraneGrid) -> Extent:
     """Return (left, top, right, bottom) of the outer edges of the grid's cells, mm."""
     half = 0.5 * grid.pitch_mm
     return (

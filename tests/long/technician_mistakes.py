@@ -103,6 +103,6 @@ class MistakenTrial(Trial):
         hand.pause(2.0)
         state, sentence = model.states["lights"]
         self._note("moved centroid", held=state in ("warn", "fail"), answer=f"{state}: {sentence}")
-        hand.click("calibrate.undo.button")
+        QTest.keyClick(wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
         hand.until(lambda: not model.busy, "the undone drag")
         hand.click_item(wizard.step_list, keys.index("radiance"))

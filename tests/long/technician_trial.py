@@ -95,9 +95,7 @@ class Trial:
         hand.until(lambda: self.step == key, f"the {key} step")
         hand.begin(key)
         wizard = self.wizard
-        automatic = hand.see("calibrate.automatic")
-        if automatic is not None and automatic.isChecked() == self.by_hand:
-            hand.click("calibrate.automatic")
+        wizard.panel.automatic.setChecked(not self.by_hand)
         for number in range(wizard.open.step.wanted):
             hand.click("calibrate.lay")
             if self.by_hand:
