@@ -137,7 +137,7 @@ class StepPanel(QWidget):
         self.cancel = named(QToolButton(), "calibrate.stop", tr("Stop the work"))
         self.cancel.setText(tr("Stop"))
         for widget in (self.progress, self.cancel):
-            widget.setFixedHeight(22)
+            widget.setFixedHeight(28)
             keep_space(widget)
         self.capture = named(
             QPushButton(tr("&Capture")), "calibrate.capture", tr("Capture"),

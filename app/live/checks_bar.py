@@ -64,7 +64,10 @@ class ChecksBar(QWidget):
 
     def show_exposure(self, exposure: Finding | None) -> None:
         """Show the advice about the exposure; None for no text."""
-        text = f"{SIGNS[exposure.verdict]} {exposure.text}" if exposure else ""
+        self.show_line(f"{SIGNS[exposure.verdict]} {exposure.text}" if exposure else "")
+
+    def show_line(self, text: str) -> None:
+        """Show a line in place of the exposure, such as why no images arrive."""
         if text != self._exposure.text():
             self._exposure.setText(text)
             self._exposure.setToolTip(plain_tip(text))

@@ -187,8 +187,13 @@ class LiveView(QWidget):
         if self._stream is None or self.tools.is_on("freeze"):
             return
         frame = self._stream.newest.take()
+        now_s = time.monotonic()
         if frame is not None:
             self._show(frame.rgb)
+        elif now_s - self._checked_s >= CHECK_S:
+            self._checked_s = now_s
+            if lost := self._stream.figures().lost:
+                self._checks.show_line(lost)
 
     def _show(self, rgb: Rgb) -> None:
         resized = self._rgb is None or self._rgb.shape != rgb.shape

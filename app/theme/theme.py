@@ -117,7 +117,7 @@ QListWidget[plain="true"]::item:hover {{ background: {button}; }}
 QListWidget[plain="true"]::item:selected {{ background: {hover}; }}
 QWidget[ground="image"] > * {{ background: {window}; color: {text}; }}
 QWidget[ground="image"] > QToolButton:hover {{ background: {hover}; }}
-QWidget[ground="image"] > QToolButton:checked {{ background: {highlight}; }}
+QWidget[ground="image"] > QToolButton:checked {{ background: {hover}; color: {text}; }}
 QTabWidget::pane {{ border: none; }}
 QTabBar::tab {{ background: transparent; border: none; color: {muted}; padding: 8px 14px;
     border-bottom: 2px solid transparent; }}

@@ -35,7 +35,9 @@ def test_nothing_moves_when_a_message_or_a_result_appears(qtbot: QtBot) -> None:
     lens = steps_of(route_of(FULL.stages))[1]
     panel.show_step(lens, following="Top surface")
     panel.resize(panel.width(), 600)
-    panel.show()
+    with qtbot.waitExposed(panel):
+        panel.show()
+    panel.show_state("empty", "", (), finished=False)
     fixed = panel.capture, panel.next, panel.details, panel.number
 
     def places() -> list[QPoint]:
