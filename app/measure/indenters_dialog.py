@@ -1,30 +1,67 @@
-"""Dialog to edit the list of known indenters like a small spreadsheet."""
+"""Dialog to edit the list of known objects."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QComboBox,
-    QHeaderView,
-    QTableWidget,
-    QTableWidgetItem,
-    QWidget,
-)
+from dataclasses import dataclass
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtWidgets import QListWidget, QWidget
 
 from app.measure.placing import INDENTERS, kind_label
 from app.widgets.buttons import push_button
 from app.widgets.dialog import Dialog, Kinds
-from app.widgets.inputs import ComboBox
+from app.widgets.fields import choice, number, text
+from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
-NAME, SHAPE, SIZE, SECOND, HEIGHT = range(5)
+MM, LARGEST_MM = tr(" mm"), 500.0
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """A known object as it is typed. 0: not stated."""
+
+    name: str = text("", tr("Name"))
+    shape: str = choice("cylinder", tr("Shape"), {name: kind_label(name) for name in INDENTERS})
+    size_mm: float = number(5.0, tr("Diameter or side"), 0.0, LARGEST_MM, MM, 3)
+    second_mm: float = number(
+        0.0,
+        tr("Other side"),
+        0.0,
+        LARGEST_MM,
+        MM,
+        3,
+        none=tr("the same"),
+        when=lambda typed: typed.shape == "cuboid",
+    )
+    height_mm: float = number(
+        0.0,
+        tr("Depth"),
+        0.0,
+        LARGEST_MM,
+        MM,
+        3,
+        none=tr("not known"),
+        tip=tr("Height of the object from its face to its base, if it has one"),
+    )
+
+    def indenter(self) -> Indenter:
+        """Return the object.
+
+        Raises
+        ------
+        InputError
+            If it has no name or no size.
+        """
+        second = self.second_mm if self.shape == "cuboid" else 0.0
+        sides = second or None, self.height_mm or None
+        return Indenter(self.name.strip(), self.shape, self.size_mm, *sides)
 
 
 class IndentersDialog(Dialog):
@@ -38,113 +75,65 @@ class IndentersDialog(Dialog):
 
     def __init__(self, indenters: tuple[Indenter, ...], parent: QWidget | None = None) -> None:
         kinds = Kinds.Save | Kinds.Cancel
-        super().__init__(parent, "measure.indenters", tr("Known indenters"), kinds, once=True)
-        self.resize(680, 480)
+        super().__init__(parent, "measure.indenters", tr("Known objects"), kinds, once=True)
+        self.resize(560, 360)
         self.indenters = indenters
-        self.table = self._make_table()
+        self._typed = [
+            Typed(i.name, i.shape, i.size_mm, i.second_mm or 0.0, i.height_mm or 0.0)
+            for i in indenters
+        ]
+        self.names = named(QListWidget(), "measure.indenters.names", tr("Known objects"))
+        self.form = Form(Typed(), "measure.indenters", at_once=True)
         self.problem = named(
             PlainLabel(wrap=True), "measure.indenters.problem", tr("Errors in the list")
         )
         show_meaning(self.problem, "fail")
-        add = push_button(
-            "measure.indenters.add",
-            tr("&Add"),
-            lambda: self.add_row(Indenter(tr("New cylinder"), "cylinder", 5.0)),
-            icon_name="add",
-        )
+        add = push_button("measure.indenters.add", tr("&Add"), self.add, icon_name="add")
         remove = push_button(
-            "measure.indenters.remove", tr("&Remove"), self.remove_rows, icon_name="remove"
+            "measure.indenters.remove", tr("&Remove"), self.remove, icon_name="remove"
         )
         for button in (add, remove):
             button.setAutoDefault(False)
-        text = tr(
-            "All lengths are in mm. Depth is the height of the indenter from its face to "
-            "its base, if it has one."
-        )
-        row = hbox(add, remove, None)
-        self.fill(PlainLabel(text, wrap=True), self.table, row, self.problem)
-        for indenter in indenters:
-            self.add_row(indenter)
-        self.table.setCurrentCell(0, NAME)
+        left = vbox((self.names, 1), hbox(add, remove))
+        self.fill(hbox((left, 1), (vbox(self.form, None), 1), spacing=16), self.problem)
+        self.names.addItems([typed.name for typed in self._typed])
+        self.names.currentRowChanged.connect(self._show)
+        self.form.changed.connect(lambda _name, _value: self._keep())
+        self.names.setCurrentRow(0)
+        self._show(self.names.currentRow())
 
-    def _make_table(self) -> QTableWidget:
-        table = named(QTableWidget(0, 5), "measure.indenters.table", tr("Known indenters"))
-        table.setHorizontalHeaderLabels(
-            [tr("Name"), tr("Shape"), tr("Diameter or side"), tr("Other side"), tr("Depth")]
-        )
-        header = table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
-        table.verticalHeader().hide()
-        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        table.setAlternatingRowColors(True)
-        return table
+    def add(self) -> None:
+        """Add an object at the end."""
+        self._typed.append(Typed(tr("New cylinder")))
+        self.names.addItem(self._typed[-1].name)
+        self.names.setCurrentRow(len(self._typed) - 1)
 
-    def add_row(self, indenter: Indenter) -> None:
-        """Add an indenter at the end."""
-        row = self.table.rowCount()
-        self.table.insertRow(row)
-        texts = {
-            NAME: indenter.name,
-            SIZE: f"{indenter.size_mm:g}",
-            SECOND: "" if indenter.second_mm is None else f"{indenter.second_mm:g}",
-            HEIGHT: "" if indenter.height_mm is None else f"{indenter.height_mm:g}",
-        }
-        for column, text in texts.items():
-            item = QTableWidgetItem(text)
-            if column != NAME:
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            self.table.setItem(row, column, item)
-        shape = named(ComboBox(), f"measure.indenters.shape{row}", tr("Shape"))
-        for name in INDENTERS:
-            shape.addItem(kind_label(name), name)
-        shape.setCurrentIndex(shape.findData(indenter.shape))
-        self.table.setCellWidget(row, SHAPE, shape)
-        self.table.setCurrentCell(row, NAME)
+    def remove(self) -> None:
+        """Remove the chosen object."""
+        row = self.names.currentRow()
+        if row >= 0:
+            del self._typed[row]
+            with QSignalBlocker(self.names):
+                self.names.takeItem(row)
+            self._show(self.names.currentRow())
 
-    def remove_rows(self) -> None:
-        """Remove the selected indenters."""
-        rows = {index.row() for index in self.table.selectedIndexes()}
-        for row in sorted(rows, reverse=True):
-            self.table.removeRow(row)
+    def _show(self, row: int) -> None:
+        self.form.setEnabled(row >= 0)
+        self.form.show_value(self._typed[row] if row >= 0 else Typed())
+
+    def _keep(self) -> None:
+        row = self.names.currentRow()
+        self._typed[row] = self.form.value
+        self.names.item(row).setText(self.form.value.name)
 
     def accept(self) -> None:
-        """Accept the list, or show its errors."""
-        try:
-            found = tuple(self._indenter(row) for row in range(self.table.rowCount()))
-        except InputError as error:
-            self.problem.setText(str(error))
-            return
-        self.indenters = found
+        """Accept the list, or show its first error."""
+        for row, typed in enumerate(self._typed):
+            try:
+                typed.indenter()
+            except InputError as error:
+                self.names.setCurrentRow(row)
+                self.problem.setText(str(error))
+                return
+        self.indenters = tuple(typed.indenter() for typed in self._typed)
         super().accept()
-
-    def _indenter(self, row: int) -> Indenter:
-        name = self._text(row, NAME)
-        shape = self.table.cellWidget(row, SHAPE)
-        assert isinstance(shape, QComboBox)
-        size = self._length(row, SIZE)
-        if size is None:
-            raise InputError(
-                tr("The diameter or side in mm is missing"),
-                where=tr("Indenter {name}").format(name=name),
-                advice=Remedy.CORRECT_VALUE,
-            )
-        second = self._length(row, SECOND) if shape.currentData() == "cuboid" else None
-        return Indenter(name, shape.currentData(), size, second, self._length(row, HEIGHT))
-
-    def _text(self, row: int, column: int) -> str:
-        item = self.table.item(row, column)
-        return "" if item is None else item.text().strip()
-
-    def _length(self, row: int, column: int) -> float | None:
-        text = self._text(row, column)
-        if not text:
-            return None
-        try:
-            return float(text.replace(",", "."))
-        except ValueError as error:
-            raise InputError(
-                tr("'{text}' is not a length in mm such as 5 or 3.5").format(text=text),
-                where=tr("Indenter {name}").format(name=self._text(row, NAME)),
-                advice=Remedy.CORRECT_VALUE,
-            ) from error

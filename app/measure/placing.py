@@ -68,7 +68,7 @@ def kinds() -> tuple[Kind, ...]:
         "features": (
             ("pit", "I", tr("Pit or bump"), tr("Click one corner, beside the pit or bump"),
              tr("Click the opposite corner, on the other side")),
-            ("scratch", "X", tr("Scratch or ridge"),
+            ("scratch", "X", tr("Scratch"),
              tr("Click the surface on one side of the scratch"),
              tr("Click the surface on the other side")),
             ("edge-radius", "E", tr("Edge radius"), tr("Click where the rounding begins"),

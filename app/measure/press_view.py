@@ -2,90 +2,192 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QToolButton, QWidget
 
+from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
-from app.live.frame_results import Shown, Wanted
+from app.live.banner import Banner
+from app.live.depth import LiveDepth
+from app.live.frame_results import Shown
+from app.live.replay_bar import ReplayBar
+from app.live.session import LiveSession
 from app.live.zero import ZeroControl
-from app.measure.advice import measuring_advice
-from app.measure.judging import judge, record_of
+from app.measure.figures_text import figure_text
+from app.measure.inspector import Inspector
+from app.measure.judging import record_of
 from app.measure.measuring import MeasuredImage
-from app.measure.press_view_frame import PressViewFrame
+from app.measure.palette import Palette
+from app.measure.placing import kind_label
+from app.measure.stage import Stage
+from app.measure.state import PressState, advice_of, resolve
 from app.measure.steady import SteadyPress
+from app.measure.tool_map import ToolMap
+from app.measure.work import Work
 from app.services.file_dialogs import ask_open
 from app.services.jobs import Jobs
-from app.view2d.display import Display
+from app.theme.icons import icon
 from app.view3d.saving import ViewSaving
+from app.widgets.actions import action_button, make_action
+from app.widgets.buttons import Slot
+from app.widgets.layout import hbox, vbox
+from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.measurement.proposal import Proposal
+from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 IMAGES = (".png", ".tif", ".tiff")
+TOOLS_WIDTH = 142
+INSPECTOR_SHARE, INSPECTOR_PX = 0.26, (272, 380)
+"""Width of the inspector: a share of the page, and its limits."""
+KEY = Qt.ItemDataRole.UserRole
 
 
-class PressView(PressViewFrame):
+class PressView(QWidget):
     """Measures pressed objects.
 
     Parameters
     ----------
     jobs : Jobs
         For long work.
+    on_save : callable
+        Called with a MeasurementRecord to be saved.
+    on_edit, on_records : callable
+        Called to edit the known objects, and to show the records.
     context : AppContext
         Shared by all pages.
 
-    Signals
-    -------
-    kept(object)
-        A MeasurementRecord to be saved.
+    Attributes
+    ----------
+    state : PressState
+        What is shown.
     """
 
-    kept = Signal(object)
-
-    def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
-        super().__init__(jobs, context=context)
+    def __init__(
+        self,
+        jobs: Jobs,
+        *,
+        on_save: Callable[[MeasurementRecord], object],
+        on_edit: Slot,
+        on_records: Slot,
+        context: AppContext,
+    ) -> None:
+        super().__init__()
+        named(self, "measure.press", tr("Measure a press"))
+        self.context, self._on_save = context, on_save
+        self.work = Work(self)
+        self.live = LiveSession(context=context, name="measure live", parent=self)
+        self.live_depth = LiveDepth(self.live, jobs, self, context=context)
         self.zero = ZeroControl(self.live, jobs, context=context)
         self._steady = SteadyPress()
-        self.saving = ViewSaving(self.details.surface, self, settings=context.settings)
         self._best: Reconstructor | None = None
         self._shown: Shown | None = None
-        self._refused = ""
+        self.map = ToolMap(self.work, self._on_placed)
+        self.stage = Stage(self.map, jobs, self._want, settings=context.settings)
+        self.palette_ = Palette(self, self._place)
+        self._make_actions()
+        self._bench = BenchArea(context.source)
+        self.inspector = Inspector(
+            self.freeze_action,
+            self.save_action,
+            self._bench,
+            on_reference=self._render,
+            on_edit=on_edit,
+            on_records=on_records,
+        )
+        self._saving = ViewSaving(self.stage.surface, self, settings=context.settings)
+        idle = tr("Place a tool, or detect the object. Press Space for the next object.")
+        self.banner = Banner(jobs, idle=idle)
+        self.replay = ReplayBar("measure")
+        self._lay_out()
         self._connect()
-        self.restore()
+        self.state = self._resolved()
+        self._render()
+
+    def _make_actions(self) -> None:
+        stack = self.work.undo
+        self.detect_action = make_action(
+            self, "measure.propose", tr("Detect"), self.propose, keys=("Q",),
+            icon_name="propose", tip=tr("Detect the pressed object"),
+        )  # fmt: skip
+        self.freeze_action = make_action(
+            self, "measure.hold", tr("Freeze"), self.toggle_freeze, keys=("Space",),
+            tip=tr("Freeze the image to measure on it, or continue"),
+        )  # fmt: skip
+        self.save_action = make_action(
+            self, "measure.keep", tr("Save to records"), self.keep, keys=("Ctrl+Return",),
+        )  # fmt: skip
+        self.remove_action = make_action(
+            self, "measure.remove", tr("Remove"), lambda: self.work.remove(self.work.chosen),
+            icon_name="remove", tip=tr("Remove the chosen tool (Del)"),
+        )  # fmt: skip
+        make_action(self, "measure.fit", tr("Whole map"), self.map.view.fit, keys=("F",))
+        open_action = make_action(
+            self, "measure.open", tr("Open image…"), self.choose_file, keys=("Ctrl+P",),
+            tip=tr("Measure on an image from a file"),
+        )  # fmt: skip
+        undo = make_action(
+            self, "measure.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",), icon_name="undo",
+        )  # fmt: skip
+        redo = make_action(
+            self, "measure.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"),
+            icon_name="redo",
+        )  # fmt: skip
+        for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
+            action.setEnabled(False)
+            can.connect(action.setEnabled)
+        for action in (undo, redo):
+            button = named(QToolButton(), f"{action.objectName()}.button", action.text())
+            button.setDefaultAction(action)
+            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
+            self.stage.bar.addWidget(button)
+        self.stage.bar.addWidget(action_button(open_action))
+
+    def _lay_out(self) -> None:
+        self.placed = named(QListWidget(), "measure.tools", tr("Tools on the image"))
+        self.placed.setIconSize(QSize(16, 16))
+        self.placed.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.placed.itemClicked.connect(lambda item: self.work.choose(item.data(KEY)))
+        tools = QWidget()
+        tools.setFixedWidth(TOOLS_WIDTH)
+        vbox(
+            action_button(self.detect_action),
+            self.palette_,
+            (self.placed, 1),
+            action_button(self.remove_action),
+            of=tools,
+            margins=(8, 8, 4, 8),
+            spacing=6,
+        )
+        column = vbox(self.banner, (self.stage, 1), self.replay, margins=0, spacing=0)
+        hbox(tools, (column, 1), self.inspector, of=self, margins=0, spacing=0)
 
     def _connect(self) -> None:
-        self.freeze_pressed.connect(self.toggle_freeze)
-        self.open_pressed.connect(self.choose_file)
-        self.propose_pressed.connect(self.propose)
-        self.keep_pressed.connect(self.keep)
         self.live.source_changed.connect(self._on_source)
         self.live.switched.connect(self._on_switched)
-        self.depth.shown.connect(self._on_live)
-        self.depth.calibration_loaded.connect(self._use)
-        self.depth.changed.connect(self._advise)
+        self.live_depth.shown.connect(self._on_live)
+        self.live_depth.calibration_loaded.connect(self._use)
+        self.live_depth.changed.connect(self._advise)
         self.banner.act_wanted.connect(self._on_act)
-        self.work.changed.connect(self._refresh)
-        self.work.image_changed.connect(self._refresh)
-        self.map.drawn.connect(self.details.show_tools)
-        self.details.wanted_changed.connect(self._want)
-        self.saving.reported.connect(self.context.toasts.show)
+        self.work.changed.connect(self._render)
+        self._saving.reported.connect(self.inspector.say)
         self.replay.moved.connect(self._on_replayed)
-        self.work.busy_changed.connect(self._advise)
-        self.work.refused.connect(self._on_refused)
-        self.work.proposed.connect(self._on_proposed)
-        self.map.freeze_wanted.connect(lambda: self.freeze(True))
-        self.map.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
-        panel = self.panel
-        panel.propose.clicked.connect(self.propose)
-        panel.tool_chosen.connect(self.work.choose)
-        panel.remove.clicked.connect(lambda: self.work.remove(self.work.chosen))
-        panel.keep.clicked.connect(self.keep)
-        panel.truth.changed.connect(self.judge_again)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give the inspector its share of the width."""
+        least, most = INSPECTOR_PX
+        width = round(INSPECTOR_SHARE * event.size().width())
+        self.inspector.set_width(min(max(width, least), most))
+        super().resizeEvent(event)
 
     # Called by the page
 
@@ -97,27 +199,24 @@ class PressView(PressViewFrame):
     def enter(self) -> None:
         """Show the source through the calibration in use."""
         self._want()
-        self.depth.enter()
-        self._refresh()
+        self.live_depth.enter()
+        self._render()
 
     def leave(self) -> None:
         """Release the source. A frozen image stays."""
-        self.keep_layout()
         self.live.enter(False)
 
     def close_work(self) -> None:
         """End every thread. Those of the reconstructors end with them."""
         self.work.close()
         self._best = self._shown = None
-        self.depth.finish()
-        self.details.finish()
+        self.live_depth.finish()
+        self.stage.finish()
 
-    def _want(self) -> None:
-        """Compute from live frames only what is visible."""
-        details = self.details
-        self.depth.want(
-            Wanted(height=True, surface=details.wants_surface, camera=details.wants_camera)
-        )
+    def show_again(self) -> None:
+        """Show the values in another unit, and with other limits."""
+        self.stage.show_frozen()
+        self._render()
 
     def open_file(self, path: Path) -> None:
         """Measure on an image, or play a recording as the camera.
@@ -151,8 +250,14 @@ class PressView(PressViewFrame):
             tr("Images and recordings ({endings})").format(endings=endings),
         )
         if chosen is not None:
-            with self.context.toasts.errors():
-                self.open_file(chosen)
+            self.try_file(chosen)
+
+    def try_file(self, path: Path) -> None:
+        """Measure on an image or play a recording, or show why that is not possible."""
+        try:
+            self.open_file(path)
+        except InputError as error:
+            self.inspector.say(str(error), "fail")
 
     # Live and frozen
 
@@ -160,168 +265,158 @@ class PressView(PressViewFrame):
         """Freeze the image, or continue."""
         (self.freeze if self.work.image is None else self.release)()
 
-    def freeze(self, by_hand: bool = True) -> None:
-        """Freeze the shown image to measure on it."""
-        shown = self._shown
-        if self.work.image is None and shown is not None:
-            now = datetime.now().astimezone()
-            info = self.context.source.info
-            camera = tr("image") if info is None else info.name
-            name = tr("{camera}, {time:%H:%M:%S}").format(camera=camera, time=now)
-            image = MeasuredImage(name, frame=shown.frame, serial=self.live.serial)
-            self._take(image, propose=not by_hand)
-        self._follow_freeze()
+    def freeze(self, *, propose: bool = False) -> None:
+        """Freeze the newest live image to measure on it, and detect the object if wanted."""
+        if (shown := self._shown) is None:
+            return
+        now = datetime.now().astimezone()
+        info = self.context.source.info
+        camera = tr("image") if info is None else info.name
+        name = tr("{camera}, {time:%H:%M:%S}").format(camera=camera, time=now)
+        image = MeasuredImage(name, frame=shown.frame, serial=self.live.serial)
+        self._take(image, propose=propose)
 
     def release(self) -> None:
         """Continue with the live image."""
-        self._steady.hold_off()
+        self._steady.hold(None)
         self.work.take(None)
-        self.live.pause(False)
-        self._follow_freeze()
+        self._want()
         if self.live.stream is None or not self.map.view.has_image:
             self._say_what_comes()
 
     def _take(self, image: MeasuredImage, *, propose: bool = False) -> None:
-        self.live.pause(True)
-        self._refused = ""
-        self.panel.say_kept("")
-        self.panel.truth.new_press()
+        self._steady.hold(image.frame)
+        self.inspector.say("")
+        self.inspector.reference.new_press()
         self.work.take(image, propose=propose)
+        self._want()
         if image.path is not None:
             self._say_what_comes()
-        self._follow_freeze()
+
+    def _want(self) -> None:
+        """Compute from live frames only what is needed, and nothing beside the measurement."""
+        image = self.work.image
+        self.live.pause(image is not None and (image.path is not None or self.work.busy))
+        self.live_depth.want(self.stage.wanted(frozen=image is not None))
 
     def _say_what_comes(self) -> None:
         """Show a text instead of the map."""
         image = self.work.image
         if image is None or self._best is None:
-            self.map.say(tr("No depth yet."))
+            self.stage.say(tr("No depth yet."))
         else:
-            self.map.say(tr("Reconstructing {name}…").format(name=image.name))
-
-    def _follow_freeze(self) -> None:
-        frozen = self.work.image is not None
-        self.freeze_action.setChecked(frozen)
-        self.freeze_action.setText(tr("Frozen") if frozen else tr("Freeze"))
-        self._refresh()
+            self.stage.say(tr("Reconstructing {name}…").format(name=image.name))
 
     def _on_live(self, shown: Shown) -> None:
-        if self.work.image is not None:
+        image, heightmap = self.work.image, shown.heightmap
+        if image is None:
+            self.stage.show_live(shown)
+        elif image.frame is None or self.work.busy:
             return
-        self.map.show_live(shown, Display())
-        self.details.show_live(shown)
-        heightmap = shown.heightmap
         before, self._shown = self._shown, None if heightmap is None else shown
-        if (before is None) != (heightmap is None):
-            self._refresh()
-        if heightmap is None:
-            return
-        frame = shown.frame
-        steady = self._steady.update(heightmap.depth_mm, frame.time_s, settled=frame.settled)
-        if steady and self.auto.isChecked():
-            self.freeze(by_hand=False)
+        earlier = self._steady.other
+        if heightmap is not None and (
+            self._steady.update(shown.frame, heightmap)
+            and self.inspector.auto.isChecked()
+            and (image is None or (self._steady.other and not self.work.placed_by_hand))
+        ):
+            self.freeze(propose=True)
+        elif (before is None) != (heightmap is None) or earlier != self._steady.other:
+            self._render()
 
     # Measuring
 
     def propose(self) -> None:
-        """Detect the pressed object."""
-        if self.work.image is None:
-            self.freeze(by_hand=False)
+        """Detect the object that is pressed in now."""
+        if self.work.image is None or self.state.earlier:
+            self.freeze(propose=True)
         else:
             self.work.propose()
 
     def keep(self) -> None:
         """Save the result of the chosen tool to the records."""
         result, heightmap = self.work.result, self.work.heightmap
-        best = self._best
-        if result is None or heightmap is None or best is None:
+        if result is None or heightmap is None or self._best is None:
             return
         record = record_of(
             result,
-            self.panel.truth.stated,
+            self.inspector.reference.stated,
             heightmap,
             limits=self.context.settings.limits,
-            serial=best.calibration.serial,
-            operator=self.panel.operator.text().strip(),
-            note=self.panel.note.text().strip(),
+            serial=self._best.calibration.serial,
+            operator=self.inspector.operator.text().strip(),
+            note=self.inspector.note.text().strip(),
         )
-        self.kept.emit(record)
+        self._on_save(record)
 
-    def judge_again(self) -> None:
-        """Compare with the true values again after they, the result or the limits changed."""
-        truth, result = self.panel.truth, self.work.result
-        if result is None:
-            truth.say("")
-            return
-        try:
-            truth.show_verdict(judge(result, truth.stated, self.context.settings.limits))
-        except InputError as error:
-            truth.say(str(error), "fail")
+    def _place(self, kind: str) -> None:
+        """Let the user place a tool on the frozen image. Empty: none."""
+        if kind:
+            self.stage.show_view("map")
+            if self.work.image is None:
+                self.freeze()
+        self.map.place(kind)
 
-    def _refresh(self) -> None:
-        can_freeze = self._shown is not None
-        known = self.work.heightmap is not None or can_freeze
-        self.panel.show_work(self.work, known=known)
-        self.details.show_results(self.work.image_results)
-        self.details.show_result(self.work.tool, self.work.result)
-        self.map.tools.setEnabled(known)
-        self.freeze_action.setEnabled(self.work.image is not None or can_freeze)
-        self.judge_again()
+    def _on_placed(self, problem: str) -> None:
+        self.palette_.choose("")
+        self.inspector.say(problem, "warn")
+
+    # What is shown
+
+    def _resolved(self) -> PressState:
+        tool = self.work.tool
+        return resolve(
+            self.work,
+            self.inspector.reference.stated_for("" if tool is None else tool.name),
+            self.context.settings.limits,
+            freezable=self._shown is not None,
+            earlier=self.work.image is not None and self._steady.other,
+        )
+
+    def _render(self) -> None:
+        """Show the present state."""
+        state = self.state = self._resolved()
+        self._want()
+        self.stage.show_work(self.work)
+        if self.work.refused:
+            self.stage.say(tr("This image cannot be measured."))
+        self.inspector.show_state(state)
+        if self.work.answer:
+            self.inspector.say(self.work.answer, "warn")
+        self.palette_.setEnabled(state.measurable)
+        self.detect_action.setEnabled(state.measurable and not state.detecting)
+        self.detect_action.setText(tr("Detecting…") if state.detecting else tr("Detect"))
+        self.freeze_action.setEnabled(state.frozen or state.freezable)
+        self.freeze_action.setText(tr("Next object") if state.frozen else tr("Freeze"))
+        self.save_action.setEnabled(state.savable)
+        earlier = tr("Save the earlier press")
+        self.save_action.setText(earlier if state.earlier else tr("Save to records"))
+        self.remove_action.setEnabled(bool(state.kind))
+        if not state.frozen:
+            self.palette_.choose("")
+        self._show_placed()
         self._advise()
 
-    def _on_switched(self) -> None:
-        self.replay.follow(self.live.source)
-        self.follow_bench()
-
-    def _on_replayed(self) -> None:
-        """Show another frame of the recording instead of the frozen one."""
-        if self.work.image is not None:
-            self.release()
-
-    def _on_proposed(self, proposal: Proposal | None) -> None:
-        if proposal is None:
-            text = tr("No ball, cylinder or cuboid was found. Press one, or use the other tools.")
-            self.context.toasts.show(text)
-        elif len(proposal.candidates) > 1:
-            names = tr(" and ").join(proposal.candidates)
-            text = tr(
-                "The object is not unique: {names} fit equally well. Choose the correct tool."
-            )
-            self.context.toasts.show(text.format(names=names), "warn")
-
-    def _on_refused(self, sentence: str) -> None:
-        self._refused = sentence
-        self.map.say(tr("This image cannot be measured."))
-        self._advise()
-
-    # The calibration and the source
-
-    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
-        """Measure with another calibration. Live only if it fits the images."""
-        self._best = best
-        self._refused, self._shown = "", None
-        # Before the tools are redrawn: it gives their position in the camera image.
-        self.details.use(None if best is None else best.calibration)
-        self.work.use(best)
-        self._say_what_comes()
-        self.depth.choose(live, best)
-        self._refresh()
-
-    def _on_source(self) -> None:
-        self._shown = None
-        if self.work.image is None:
-            self.map.say(tr("No depth yet."))
-
-    # Advice
+    def _show_placed(self) -> None:
+        self.placed.clear()
+        for key, tool in self.work.sheet.items():
+            found = self.work.results.get(key)
+            value = "" if isinstance(found, str) else "…"
+            if isinstance(found, ToolResult):
+                value = figure_text(found.figures[0]).partition(" ")[0]
+            item = QListWidgetItem(icon(f"tool-{tool.name}"), f"{kind_label(tool.name)} {value}")
+            item.setData(KEY, key)
+            self.placed.addItem(item)
+            if key == self.work.chosen:
+                self.placed.setCurrentItem(item)
 
     def _advise(self) -> None:
         """Show what to do next."""
-        frozen = self.work.image is not None
-        heightmap = self.work.heightmap if frozen else None
+        heightmap = self.work.heightmap
         findings = () if heightmap is None else heightmap.findings
         self.banner.advise(
-            measuring_advice(
-                self.depth.state, frozen=frozen, refused=self._refused, findings=findings
+            advice_of(
+                self.live_depth.state, self.state, refused=self.work.refused, findings=findings
             )
         )
 
@@ -332,4 +427,30 @@ class PressView(PressViewFrame):
             case "zero":
                 self.zero.set_zero()
             case _:
-                self.depth.act(name)
+                self.live_depth.act(name)
+
+    # The calibration and the source
+
+    def _on_switched(self) -> None:
+        self.replay.follow(self.live.source)
+        self.inspector.bench.setVisible(self._bench.follow())
+
+    def _on_replayed(self) -> None:
+        """Show another frame of the recording instead of the frozen one."""
+        if self.work.image is not None:
+            self.release()
+
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Measure with another calibration. Live only if it fits the images."""
+        self._best, self._shown = best, None
+        # Before the tools are redrawn: it gives their position in the camera image.
+        self.stage.use(None if best is None else best.calibration)
+        self._say_what_comes()
+        self.work.use(best)
+        self.live_depth.choose(live, best)
+
+    def _on_source(self) -> None:
+        self._shown = None
+        self._steady.restart()
+        if self.work.image is None:
+            self.stage.say(tr("No depth yet."))

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QCheckBox,
-    QHeaderView,
-    QProgressBar,
-    QTableWidget,
-    QTableWidgetItem,
-    QWidget,
-)
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QProgressBar, QWidget
 
 from app.measure.placing import kind_label
 from app.measure.press_check import object_name
-from app.theme import theme
 from app.widgets.buttons import Slot, push_button
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.cells_table import Cell, CellsTable
+from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
+from gelpolight_core.measurement.evaluation_run import Outcome
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.protocol import SAME_REGION
 from gelpolight_core.measurement.protocol_run import RunProgress
-from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.measurement.result import compare
 from gelpolight_core.translation import tr
 
-WIDTH = 372
+WIDTH = 340
 LIVE_LINES = 3
-DOUBTFUL = Qt.ItemDataRole.UserRole
-MOST_ROWS = 200
+Measured = tuple[int, Press, Outcome]
+"""Number of a press in the order of the run, and what was measured."""
 
 
 class RunPanel(QWidget):
@@ -58,13 +53,10 @@ class RunPanel(QWidget):
         make_bold(self.title, size=1.35)
         self.where = named(PlainLabel(wrap=True), "protocol.where", tr("Position"))
         self.live = named(PlainLabel(wrap=True), "protocol.live", tr("State of the live image"))
-        font = self.live.font()
-        font.setPixelSize(15)
-        self.live.setFont(font)
         # Reserved space, so that nothing below moves when a text changes.
-        self.live.setMinimumHeight(LIVE_LINES * self.live.fontMetrics().lineSpacing() + 12)
-        self.where.setMinimumHeight(2 * self.where.fontMetrics().lineSpacing() + 2)
-        for label in (self.where, self.live):
+        line = self.live.fontMetrics().lineSpacing()
+        for label, lines in ((self.where, 2), (self.live, LIVE_LINES)):
+            label.setMinimumHeight(lines * line + 2)
             label.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.bare = push_button(
             "protocol.bare",
@@ -72,12 +64,10 @@ class RunPanel(QWidget):
             on_bare,
             accessible=tr("Capture the bare membrane and start"),
         )
-        self.bare.setMinimumHeight(38)
         self.capture = push_button(
             "protocol.capture",
             tr("&Capture now"),
             on_capture,
-            accessible=tr("Capture this press now"),
             tip=tr("A steady press is captured automatically. A press that moves is refused"),
         )
         self.take_back = push_button(
@@ -96,12 +86,18 @@ class RunPanel(QWidget):
         self.counts = named(
             PlainLabel(wrap=True), "protocol.counts", tr("Presses done, refused and measured")
         )
-        self.last = self._make_table()
+        self.last = CellsTable[Measured](
+            "protocol.last",
+            tr("Presses measured, newest first"),
+            (tr("Press"), tr("Size"), tr("Height")),
+            _cells,
+            lambda measured: measured[0],
+        )
+        self.last.sortByColumn(0, Qt.SortOrder.DescendingOrder)
         self.leave = push_button(
             "protocol.leave",
             tr("Lea&ve"),
             on_leave,
-            accessible=tr("Leave the run"),
             tip=tr("Every press is saved. You can continue here later"),
         )
         self.evaluate = push_button(
@@ -111,34 +107,14 @@ class RunPanel(QWidget):
             accessible=tr("Evaluate the presses so far"),
         )
         vbox(
-            self.title,
-            self.where,
-            self.live,
-            self.bare,
+            *(self.title, self.where, self.live, self.bare),
             hbox(self.capture, self.take_back),
-            self.bench,
-            self.progress,
-            self.counts,
-            (self.last, 1),
+            *(self.bench, self.progress, self.counts, (self.last, 1)),
             hbox(self.leave, (self.evaluate, 1)),
             of=self,
-            margins=(12, 10, 12, 10),
+            margins=(16, 12, 16, 12),
             spacing=8,
         )
-
-    @staticmethod
-    def _make_table() -> QTableWidget:
-        table = named(QTableWidget(0, 3), "protocol.last", tr("Presses measured, newest first"))
-        table.setHorizontalHeaderLabels([tr("Press"), tr("Size"), tr("Height")])
-        table.verticalHeader().hide()
-        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        table.setShowGrid(False)
-        table.setTabKeyNavigation(False)
-        header = table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        return table
 
     def show_press(self, press: Press | None, repeats: int) -> None:
         """Show the next press. None: all are done."""
@@ -163,12 +139,12 @@ class RunPanel(QWidget):
         self.live.setText(sentence)
         show_meaning(self.live, "pass" if good else "")
 
-    def show_progress(self, progress: RunProgress, measured: int) -> None:
-        """Show the progress of the run."""
+    def show_progress(self, progress: RunProgress, measured: Mapping[Press, Outcome]) -> None:
+        """Show the progress of the run, and what was measured."""
         self.progress.setRange(0, progress.total)
         self.progress.setValue(progress.done)
         text = tr("{done} of {total} presses, {measured} measured").format(
-            done=progress.done, total=progress.total, measured=measured
+            done=progress.done, total=progress.total, measured=len(measured)
         )
         if progress.refused:
             text += tr(", {n} refused").format(n=progress.refused)
@@ -176,37 +152,29 @@ class RunPanel(QWidget):
             text += tr("\nThis object: {done} of {total}").format(
                 done=progress.object_done, total=progress.object_total
             )
-        else:
-            text += "\n"
         self.counts.setText(text)
         self.take_back.setEnabled(progress.done > 0)
         self.evaluate.setEnabled(progress.done > 0)
+        rows = [(number, *item) for number, item in enumerate(measured.items())]
+        self.last.show_items(rows)
 
-    def show_measured(self, press: Press, outcome: Measurement | str) -> None:
-        """Add a measured press to the top of the list."""
-        texts = [_press_name(press), tr("not measured"), ""]
-        tip = outcome if isinstance(outcome, str) else outcome.reason
-        if not isinstance(outcome, str):
-            texts[1:] = (f"{q.error_percent:+.1f} %" for q in compare(outcome, press.truth))
-        self.last.insertRow(0)
-        for column, text in enumerate(texts):
-            item = QTableWidgetItem(text)
-            item.setToolTip(plain_tip(tip or texts[0]))
-            if column:
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            if isinstance(outcome, str) or outcome.reason:
-                item.setData(DOUBTFUL, True)
-                item.setForeground(theme.colour("warn"))
-            self.last.setItem(0, column, item)
-        self.last.setRowCount(min(self.last.rowCount(), MOST_ROWS))
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Apply the colours of a new theme."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "last"):
-            for item in self.last.findItems("", Qt.MatchFlag.MatchContains):
-                if item.data(DOUBTFUL):
-                    item.setForeground(theme.colour("warn"))
+def _cells(measured: Measured) -> tuple[Cell, ...]:
+    number, press, outcome = measured
+    name = tr("{shape} {size:g} x {height:g}, {region}").format(
+        shape=kind_label(press.truth.shape),
+        size=press.truth.size_mm,
+        height=press.truth.height_mm,
+        region=region_name(press).lower(),
+    )
+    if isinstance(outcome, str):
+        doubt, texts = outcome, [tr("not measured"), ""]
+    else:
+        doubt = outcome.reason
+        texts = [f"{q.error_percent:+.1f} %" for q in compare(outcome, press.truth)]
+    role = "warn" if doubt else ""
+    cells = (Cell(text, role=role, tip=doubt, key=number, right=True) for text in texts)
+    return (Cell(name, role=role, tip=doubt or name, key=number), *cells)
 
 
 def region_name(press: Press) -> str:
@@ -214,13 +182,3 @@ def region_name(press: Press) -> str:
     if press.region == SAME_REGION:
         return tr("Same region")
     return tr("Random region {n}").format(n=press.region.removeprefix("r").lstrip("0"))
-
-
-def _press_name(press: Press) -> str:
-    truth = press.truth
-    return tr("{shape} {size:g} x {height:g}, {region}").format(
-        shape=kind_label(truth.shape),
-        size=truth.size_mm,
-        height=truth.height_mm,
-        region=region_name(press).lower(),
-    )

@@ -119,7 +119,6 @@ class PressingView(QWidget):
         self.live.switched.connect(self._on_switched)
         self.live.lost.connect(self._on_lost)
         self.live.source_changed.connect(self._on_source)
-        work.measured.connect(self.panel.show_measured)
         work.changed.connect(self._show_progress)
         self._follow_source()
         self._show_next()
@@ -262,7 +261,7 @@ class PressingView(QWidget):
             )
 
     def _show_progress(self) -> None:
-        self.panel.show_progress(self._work.run.progress, self._work.measured_count)
+        self.panel.show_progress(self._work.run.progress, self._work.outcomes)
 
     # Camera and bench
 

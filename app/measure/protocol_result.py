@@ -7,21 +7,14 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QPainter, QPaintEvent
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHeaderView,
-    QProgressBar,
-    QTableWidget,
-    QTableWidgetItem,
-    QTabWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QProgressBar, QTabWidget, QWidget
 
 from app.context.context import AppContext
 from app.measure.protocol_work import REPORT, ProtocolWork
 from app.services.file_dialogs import ask_folder
 from app.widgets.buttons import Slot, push_button
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.cells_table import Cell, CellsTable
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, keep_space, splitter, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
@@ -31,8 +24,6 @@ from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.report.document import Listing, Report
 from gelpolight_core.report.evaluation import evaluation_document, evaluation_sentence
 from gelpolight_core.translation import tr
-
-ROW_HEIGHT = 24
 
 
 class Drawing(QWidget):
@@ -72,6 +63,7 @@ class ResultView(QWidget):
         self._work, self._context = work, context
         self._evaluation: Evaluation | None = None
         self._limits_percent = (0.0, 0.0)
+        self._folder = work.run.folder / REPORT
         self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
         make_bold(self.verdict, size=1.45)
         self._back = push_button(
@@ -83,6 +75,7 @@ class ResultView(QWidget):
             lambda: self.save(work.run.folder / REPORT),
             tip=tr("Write CSV and PDF next to the run"),
         )
+        save.setProperty("primary", True)
         save_as = push_button(
             "protocol.save_as",
             tr("Save &as…"),
@@ -103,15 +96,20 @@ class ResultView(QWidget):
         split = splitter(Qt.Orientation.Vertical, (self.figure, 3), (self._tabs, 2))
         self.progress = named(QProgressBar(), "protocol.result.progress", tr("Running work"))
         keep_space(self.progress)
+        self.message = named(MarkupLabel(), "protocol.message", tr("Last answer"))
+        self.message.linkActivated.connect(
+            lambda _link: QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._folder)))
+        )
         vbox(
-            hbox((self.verdict, 1), self._back, save, save_as, leave),
+            hbox((self.verdict, 1), self._back, save_as, leave, save),
             self.sentence,
             (split, 1),
-            self.progress,
+            hbox((self.message, 1), self.progress),
             of=self,
-            margins=(12, 10, 12, 10),
+            margins=(16, 12, 16, 12),
             spacing=8,
         )
+        work.jobs.progressed.connect(self.show_work)
         self.show_work("", 0.0)
 
     def wait(self) -> None:
@@ -141,32 +139,30 @@ class ResultView(QWidget):
 
     def _show_tables(self, document: Report) -> None:
         chosen = self._tabs.currentIndex()
-        while self._tabs.count():
-            old = self._tabs.widget(0)
-            self._tabs.removeTab(0)
-            old.deleteLater()
+        old = [self._tabs.widget(index) for index in range(self._tabs.count())]
+        self._tabs.clear()
+        for widget in filter(None, old):
+            widget.deleteLater()
+        first, *more = document.sections
         quality = QualityTableWidget("protocol.errors", tr("Errors and their limits"))
-        quality.set_table(document.sections[0].quality)
-        holder = QWidget()
-        vbox(quality, None, of=holder)
-        self._tabs.addTab(holder, tr("Summary"))
-        groups = document.sections[0].listings[0]
-        self._tabs.addTab(listing_table("protocol.groups", groups), tr("By size and height"))
-        if len(document.sections) > 1:
-            gauge = document.sections[1]
+        quality.set_table(first.quality)
+        self._add_tab(tr("Summary"), quality, None)
+        groups = listing_table("protocol.groups", first.listings[0])
+        self._add_tab(tr("By size and height"), groups)
+        for gauge in more:
             text = "      ".join(f"{label}: {value}" for label, value in gauge.facts)
-            pooled = named(
-                PlainLabel(text, wrap=True),
-                "protocol.pooled",
-                tr("Repeatability over all objects"),
-            )
-            holder = QWidget()
-            vbox(pooled, (listing_table("protocol.gauge", gauge.listings[0]), 1), of=holder)
-            self._tabs.addTab(holder, tr("Repeatability"))
-        self._tabs.addTab(
-            listing_table("protocol.presses", document.listings[0]), tr("Every press")
-        )
+            words = tr("Repeatability over all objects")
+            pooled = named(PlainLabel(text, wrap=True), "protocol.pooled", words)
+            table = listing_table("protocol.gauge", gauge.listings[0])
+            self._add_tab(tr("Repeatability"), pooled, table)
+        presses = listing_table("protocol.presses", document.listings[0])
+        self._add_tab(tr("Every press"), presses)
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))
+
+    def _add_tab(self, title: str, *parts: QWidget | None) -> None:
+        holder = QWidget()
+        vbox(*parts, of=holder, margins=(0, 4, 0, 0))
+        self._tabs.addTab(holder, title)
 
     def show_work(self, title: str, share: float) -> None:
         """Show the running work. An empty title: none."""
@@ -182,11 +178,11 @@ class ResultView(QWidget):
             return
 
         def done(written: tuple[Path, ...]) -> None:
-            url = QUrl.fromLocalFile(str(folder))
-            self._context.toasts.show(
-                tr("Report saved: {n} files in {folder}").format(n=len(written), folder=folder),
-                "pass",
-                actions=((tr("Open the folder"), lambda: QDesktopServices.openUrl(url)),),
+            self._folder = folder
+            text = tr("Report saved: {n} files in {folder}").format(n=len(written), folder=folder)
+            link = escaped(tr("Open the folder"))
+            self.message.setText(
+                f"<span style='color:@pass'>{escaped(text)}</span> <a href='#'>{link}</a>"
             )
 
         self._work.write_report(self._evaluation, folder, done, limits_percent=self._limits_percent)
@@ -198,34 +194,16 @@ class ResultView(QWidget):
             self.save(chosen)
 
 
-def listing_table(name: str, listing: Listing) -> QTableWidget:
-    """Return a table of the report as a widget.
+def listing_table(name: str, listing: Listing) -> CellsTable[tuple[str, ...]]:
+    """Return a table of the report as a widget."""
 
-    Parameters
-    ----------
-    name : str
-        Object name.
-    listing : Listing
-        The table.
-    """
-    table = named(QTableWidget(len(listing.rows), len(listing.heads)), name, listing.title)
-    table.setHorizontalHeaderLabels(list(listing.heads))
-    table.verticalHeader().hide()
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    table.setAlternatingRowColors(True)
-    table.setTabKeyNavigation(False)
-    for i, row in enumerate(listing.rows):
-        for j, cell in enumerate(row):
-            item = QTableWidgetItem(cell)
-            item.setToolTip(plain_tip(cell))
-            if _is_number(cell):
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            table.setItem(i, j, item)
-    table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    table.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
-    numbers = listing.rows and _is_number(listing.rows[0][-1])
-    table.horizontalHeader().setStretchLastSection(not numbers)
+    def cells(row: tuple[str, ...]) -> tuple[Cell, ...]:
+        return tuple(Cell(text, tip=text, right=_is_number(text)) for text in row)
+
+    table = CellsTable[tuple[str, ...]](name, listing.title, listing.heads, cells, lambda row: row)
+    table.setSortingEnabled(False)
+    table.sorted.sort(-1)  # in the order of the report
+    table.show_items(listing.rows)
     return table
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QCheckBox,
+    QAbstractItemView,
     QComboBox,
     QFormLayout,
-    QGroupBox,
+    QListWidget,
+    QListWidgetItem,
     QScrollArea,
     QVBoxLayout,
     QWidget,
@@ -19,22 +21,35 @@ from PySide6.QtWidgets import (
 
 from app.measure.placing import kind_label
 from app.widgets.buttons import push_button
-from app.widgets.inputs import ComboBox, SpinBox
+from app.widgets.fields import choice, number
+from app.widgets.forms import Form
+from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
-from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol import SHAPES, Protocol
 from gelpolight_core.translation import tr
 
-T = TypeVar("T")
-
-WIDTH = 520
+WIDTH = 480
+RUNS_WIDTH = 300
 MOST_RUNS = 8
 SECONDS_A_PRESS = 20
 """Time of a practised user per press, including lifting and positioning."""
 PAPER = Protocol()
+OBJECT = Qt.ItemDataRole.UserRole
+
+
+@dataclass(frozen=True, slots=True)
+class Presses:
+    """How often the objects are pressed."""
+
+    shape: str = choice(
+        "", tr("Shapes"), {"": tr("Cylinders and cuboids"), **{s: kind_label(s) for s in SHAPES}}
+    )
+    repeats: int = number(PAPER.repeats, tr("Presses in the same region"), 0, 99)
+    regions: int = number(PAPER.regions, tr("Random regions, one press each"), 0, 99)
 
 
 class ProtocolSetup(QScrollArea):
@@ -58,11 +73,18 @@ class ProtocolSetup(QScrollArea):
         self._no_runs = PlainLabel(
             tr("None yet. You can leave a run at any press and continue it later."), wrap=True
         )
-        self._no_runs.setFixedWidth(320)
-        self._runs = vbox()
-        runs = vbox(_heading(tr("Runs so far")), self._no_runs, self._runs, None)
+        self._no_runs.setFixedWidth(RUNS_WIDTH)
+        self._runs = [
+            push_button(f"protocol.run.{number}", "", partial(self._open, number))
+            for number in range(MOST_RUNS)
+        ]
+        self._folders: list[Path] = []
+        for button in self._runs:
+            button.setFixedWidth(RUNS_WIDTH)
+            button.setStyleSheet("text-align: left")
+        runs = vbox(_heading(tr("Runs so far")), self._no_runs, *self._runs, None)
         inside = QWidget()
-        hbox(None, self._build_form(), runs, None, of=inside, margins=(24, 20, 24, 20), spacing=36)
+        hbox(None, self._build_form(), runs, None, of=inside, margins=(24, 16, 24, 16), spacing=32)
         self.setWidget(inside)
         self._count()
 
@@ -82,30 +104,26 @@ class ProtocolSetup(QScrollArea):
         self.calibration.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
-        self.calibration.setMinimumContentsLength(36)
         top = QFormLayout()
+        top.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         top.addRow(tr("Sensor, calibration"), self.calibration)
-        shapes, self.shapes = self._choices(
-            "shape", tr("Shapes"), {name: kind_label(name) for name in PAPER.shapes}
+        self.objects = named(QListWidget(), "protocol.objects", tr("Objects"))
+        self.objects.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        for truth in PAPER.objects[: len(PAPER.objects) // len(PAPER.shapes)]:
+            text = tr("{size:g} mm, height {height:g} mm")
+            item = QListWidgetItem(text.format(size=truth.size_mm, height=truth.height_mm))
+            item.setData(OBJECT, [truth.size_mm, truth.height_mm])
+            self.objects.addItem(item)
+        self.objects.selectAll()
+        self.objects.setFixedHeight(
+            self.objects.count() * self.objects.sizeHintForRow(0) + 2 * self.objects.frameWidth()
         )
-        sizes, self.sizes = self._choices(
-            "size",
-            tr("Diameters or sides, at a height of {h:g} mm").format(h=PAPER.at_height_mm),
-            {size: tr("{x:g} mm").format(x=size) for size in PAPER.sizes_mm},
-        )
-        heights, self.heights = self._choices(
-            "height",
-            tr("Heights, at a diameter or side of {s:g} mm").format(s=PAPER.at_size_mm),
-            {height: tr("{x:g} mm").format(x=height) for height in PAPER.heights_mm},
-        )
-        counts = QFormLayout()
-        self.repeats, self.regions = (
-            self._number(counts, name, label, value)
-            for name, label, value in (
-                ("repeats", tr("Presses in the same region"), PAPER.repeats),
-                ("regions", tr("Random regions, one press each"), PAPER.regions),
-            )
-        )
+        self.objects.itemSelectionChanged.connect(self._count)
+        hint = PlainLabel(tr("Click one, or several with Ctrl. Ctrl+A chooses all."))
+        show_meaning(hint, "muted")
+        top.addRow(tr("Diameter or side"), vbox(self.objects, hint, spacing=2))
+        self.presses = Form(Presses(), "protocol", at_once=True)
+        self.presses.changed.connect(lambda _name, _value: self._count())
         self.summary = named(
             PlainLabel(wrap=True), "protocol.summary", tr("Number of objects and presses, and time")
         )
@@ -115,7 +133,7 @@ class ProtocolSetup(QScrollArea):
             lambda: self._on_begin(Path(self.calibration.currentData())),
             accessible=tr("Start the run"),
         )
-        self.begin.setMinimumHeight(40)
+        self.begin.setProperty("primary", True)
         self.problem = named(
             PlainLabel(wrap=True), "protocol.problem", tr("Why the run was not started")
         )
@@ -126,48 +144,24 @@ class ProtocolSetup(QScrollArea):
             _heading(tr("Evaluate a sensor")),
             explanation,
             top,
-            shapes,
-            sizes,
-            heights,
-            counts,
+            self.presses,
             self.summary,
             self.begin,
             self.problem,
             None,
-            spacing=10,
+            spacing=8,
         )
-
-    def _choices(
-        self, kind: str, title: str, choices: Mapping[T, str]
-    ) -> tuple[QGroupBox, dict[T, QCheckBox]]:
-        """Return a group of check boxes, one for each choice."""
-        boxes = {
-            value: named(QCheckBox(text), f"protocol.{kind}.{value}", f"{title}: {text}")
-            for value, text in choices.items()
-        }
-        for box in boxes.values():
-            box.setChecked(True)
-            box.toggled.connect(self._count)
-        group = named(QGroupBox(title), f"protocol.{kind}s", title)
-        hbox(*boxes.values(), None, of=group)
-        return group, boxes
-
-    def _number(self, form: QFormLayout, name: str, label: str, value: int) -> SpinBox:
-        box = named(SpinBox(maximum=99, value=value), f"protocol.{name}", label)
-        box.setAlignment(Qt.AlignmentFlag.AlignRight)
-        box.setFixedWidth(90)
-        box.valueChanged.connect(self._count)
-        form.addRow(label, box)
-        return box
 
     def protocol(self) -> Protocol:
         """Return the chosen settings."""
+        chosen = [item.data(OBJECT) for item in self.objects.selectedItems()]
+        presses = self.presses.value
         return Protocol(
-            shapes=_chosen(self.shapes),
-            sizes_mm=_chosen(self.sizes),
-            heights_mm=_chosen(self.heights),
-            repeats=self.repeats.value(),
-            regions=self.regions.value(),
+            shapes=(presses.shape,) if presses.shape else PAPER.shapes,
+            sizes_mm=tuple(sorted(size for size, h in chosen if h == PAPER.at_height_mm)),
+            heights_mm=tuple(sorted(height for s, height in chosen if s == PAPER.at_size_mm)),
+            repeats=presses.repeats,
+            regions=presses.regions,
         )
 
     def show_entries(self, entries: Sequence[Entry]) -> None:
@@ -183,23 +177,17 @@ class ProtocolSetup(QScrollArea):
 
     def show_runs(self, runs: Mapping[Path, str]) -> None:
         """Offer these runs: their folders, and what they are."""
-        while self._runs.count():
-            old = self._runs.takeAt(0).widget()
-            if old is not None:
-                old.setObjectName("")
-                old.deleteLater()
+        self._folders = list(runs)
         self._no_runs.setVisible(not runs)
-        for number, (folder, text) in enumerate(list(runs.items())[:MOST_RUNS]):
-            button = push_button(
-                f"protocol.run.{number}",
-                text,
-                lambda folder=folder: self._on_run(folder),
-                accessible=tr("Continue {run}").format(run=text.replace("\n", ", ")),
-                tip=str(folder),
-            )
-            button.setFixedWidth(320)
-            button.setStyleSheet("text-align: left; padding: 6px;")
-            self._runs.addWidget(button)
+        texts = [*runs.values(), *([""] * MOST_RUNS)]
+        for button, text in zip(self._runs, texts, strict=False):
+            button.setVisible(bool(text))
+            button.setText(text)
+            run = text.replace("\n", ", ")
+            button.setAccessibleName(tr("Continue {run}").format(run=run))
+
+    def _open(self, number: int) -> None:
+        self._on_run(self._folders[number])
 
     def show_problem(self, sentence: str) -> None:
         """Show why the run was not started. Empty: no error."""
@@ -212,7 +200,7 @@ class ProtocolSetup(QScrollArea):
         if not self.calibration.count():
             text = tr("There is no calibration in the library. Calibrate a sensor first.")
         elif not count:
-            text = tr("Choose a shape, a size or height, and the number of presses.")
+            text = tr("Choose an object and the number of presses.")
         else:
             text = tr("Objects: {objects}. Presses: {n}, about {time} by hand.").format(
                 objects=len(protocol.objects), n=count, time=_duration(count * SECONDS_A_PRESS)
@@ -231,7 +219,3 @@ def _heading(text: str) -> PlainLabel:
     label = PlainLabel(text)
     make_bold(label, size=1.45)
     return label
-
-
-def _chosen(boxes: Mapping[T, QCheckBox]) -> tuple[T, ...]:
-    return tuple(value for value, box in boxes.items() if box.isChecked())

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from app.context.context import AppContext
@@ -19,6 +19,7 @@ from app.measure.protocol_work import Equipped, ProtocolWork, equip
 from app.services.jobs import Job, Jobs
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
@@ -26,10 +27,20 @@ from gelpolight_core.io.user import user_name
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.protocol import Protocol, check_protocol, protocol_reach_mm
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import evaluation_record
 from gelpolight_core.translation import tr
 
 NAME_FORMAT = "%Y-%m-%d-%H%M%S"
+
+
+@dataclass(frozen=True, slots=True)
+class OpenRun:
+    """The run that is shown, and its views."""
+
+    work: ProtocolWork
+    pressing: PressingView
+    result: ResultView
 
 
 class ProtocolView(QWidget):
@@ -37,33 +48,37 @@ class ProtocolView(QWidget):
 
     Parameters
     ----------
+    on_completed : callable
+        Called with the MeasurementRecord of a run that is completely evaluated.
     context : AppContext
         Shared by all pages.
 
-    Signals
-    -------
-    completed(object)
-        A run is completely evaluated: the MeasurementRecord to be saved.
+    Attributes
+    ----------
+    run : OpenRun or None
+        The run that is shown. None during the set-up.
     """
 
-    completed = Signal(object)
-
-    def __init__(self, *, context: AppContext) -> None:
+    def __init__(
+        self, on_completed: Callable[[MeasurementRecord], object], *, context: AppContext
+    ) -> None:
         super().__init__()
         named(self, "protocol", tr("Evaluation protocol"))
-        self.context = context
-        self.work: ProtocolWork | None = None
-        self.pressing: PressingView | None = None
-        self.result: ResultView | None = None
+        self.context, self._on_completed = context, on_completed
+        self.run: OpenRun | None = None
         self._shown = False
         self._retiring: list[ProtocolWork] = []
         self._jobs = Jobs("protocol set-up", self)
         self._jobs.refused.connect(self._on_refused)
         self.heading = named(PlainLabel(), "protocol.heading", tr("Current run"))
+        self.heading.setMargin(8)
+        self.problem = named(PlainLabel(wrap=True), "protocol.refused", tr("What failed"))
+        show_meaning(self.problem, "fail")
         self.setup = ProtocolSetup(on_begin=self.begin, on_run=self.open_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self.setup)
-        vbox(self.heading, (self._stack, 1), of=self, margins=0, spacing=0)
+        vbox(self.heading, self.problem, (self._stack, 1), of=self, margins=0, spacing=0)
+        self._say_run("")
         context.requests.calibrations_changed.connect(self._refresh)
 
     # Called by the parent page
@@ -72,14 +87,14 @@ class ProtocolView(QWidget):
         """Update, and start using the camera."""
         self._shown = True
         self._refresh()
-        if self.pressing is not None and self._stack.currentWidget() is self.pressing:
-            self.pressing.enter()
+        if self.run is not None and self._stack.currentWidget() is self.run.pressing:
+            self.run.pressing.enter()
 
     def leave(self) -> None:
         """Release the camera."""
         self._shown = False
-        if self.pressing is not None:
-            self.pressing.leave()
+        if self.run is not None:
+            self.run.pressing.leave()
 
     def may_close(self) -> bool:
         """Return True: everything is on disk. Running work is stopped."""
@@ -122,67 +137,59 @@ class ProtocolView(QWidget):
 
     def _calibration_of(self, identity: str) -> Path:
         """Return the calibration file of a run."""
-        for entry in self.context.workspace.entries():
-            if entry.summary is not None and entry.summary.identity == identity:
-                return entry.path
-        raise InputError(
-            tr("The calibration {id} of this run is not in the library").format(id=identity),
-            where=self.context.workspace.sensors_folder,
-            advice=Remedy.IMPORT_CALIBRATION,
-        )
+        entry = self.context.workspace.entry_of(identity)
+        if entry is None:
+            raise InputError(
+                tr("The calibration {id} of this run is not in the library").format(id=identity),
+                where=self.context.workspace.sensors_folder,
+                advice=Remedy.IMPORT_CALIBRATION,
+            )
+        return entry.path
 
     # The run
 
     def _show_run(self, equipped: Equipped) -> None:
         self._close_run()
         self._refresh()
-        run = equipped.run
-        self.heading.setText(
-            tr("{serial}, run {name}").format(serial=run.content.serial, name=run.folder.name)
-        )
-        self.work = ProtocolWork(equipped, self)
-        self.work.refused.connect(lambda text: self.context.toasts.show(text, "fail"))
-        self.work.evaluated.connect(self._show_result)
-        self.pressing = PressingView(
-            self.work,
-            context=self.context,
-            on_leave=self._leave_run,
-            on_result=self._want_result,
-        )
-        self.result = ResultView(
-            self.work,
-            context=self.context,
-            on_back=self._show_pressing,
-            on_leave=self._leave_run,
-        )
-        self.work.busy.connect(self.result.show_work)
-        self._stack.addWidget(self.pressing)
-        self._stack.addWidget(self.result)
-        self.work.catch_up()
-        if run.next() is None:
-            self._want_result()
+        content, folder = equipped.run.content, equipped.run.folder
+        self._say_run(tr("{serial}, run {name}").format(serial=content.serial, name=folder.name))
+        work = ProtocolWork(equipped, self)
+        work.jobs.refused.connect(self.problem.setText)
+        leave, context = self._leave_run, self.context
+        pressing = PressingView(work, context=context, on_leave=leave, on_result=self._show_result)
+        result = ResultView(work, context=context, on_back=self._show_pressing, on_leave=leave)
+        self.run = OpenRun(work, pressing, result)
+        self._stack.addWidget(pressing)
+        self._stack.addWidget(result)
+        work.catch_up()
+        if work.run.next() is None:
+            self._show_result()
         else:
             self._show_pressing()
 
+    def _say_run(self, text: str) -> None:
+        self.heading.setText(text)
+        self.heading.setVisible(bool(text))
+        self.problem.clear()
+
     def _show_pressing(self) -> None:
-        if self.pressing is not None:
-            self._stack.setCurrentWidget(self.pressing)
+        if self.run is not None:
+            self._stack.setCurrentWidget(self.run.pressing)
             if self._shown:
-                self.pressing.enter()
+                self.run.pressing.enter()
 
-    def _want_result(self) -> None:
-        if self.work is None or self.result is None or self.pressing is None:
-            return
-        self.pressing.leave()
-        self._stack.setCurrentWidget(self.result)
-        self.result.wait()
-        self.work.evaluate()
+    def _show_result(self) -> None:
+        if (run := self.run) is not None:
+            run.pressing.leave()
+            self._stack.setCurrentWidget(run.result)
+            run.result.wait()
+            run.work.evaluate(partial(self._on_evaluated, run))
 
-    def _show_result(self, evaluation: Evaluation) -> None:
-        if self.result is None or self.work is None:
+    def _on_evaluated(self, shown: OpenRun, evaluation: Evaluation) -> None:
+        if shown is not self.run:
             return
-        self.result.show_evaluation(evaluation)
-        run = self.work.run
+        shown.result.show_evaluation(evaluation)
+        run = shown.work.run
         if run.next() is None:
             record = evaluation_record(
                 evaluation,
@@ -193,7 +200,7 @@ class ProtocolView(QWidget):
                 folder=str(run.folder),
             )
             if record is not None:
-                self.completed.emit(record)
+                self._on_completed(record)
 
     def _leave_run(self) -> None:
         self._close_run()
@@ -201,23 +208,23 @@ class ProtocolView(QWidget):
         self._stack.setCurrentWidget(self.setup)
 
     def _close_run(self) -> None:
-        if self.work is None or self.pressing is None or self.result is None:
+        if (run := self.run) is None:
             return
-        self.pressing.close_run()
-        self.work.busy.disconnect(self.result.show_work)
-        work = self.work
-        self._retiring.append(work)
-        work.gone.connect(lambda: self._forget(work))
-        work.retire()
-        for view in (self.pressing, self.result):
+        self.run = None
+        run.pressing.close_run()
+        run.work.jobs.progressed.disconnect(run.result.show_work)
+        self._retiring.append(run.work)
+        run.work.retire(lambda: self._forget(run.work))
+        for view in (run.pressing, run.result):
             self._stack.removeWidget(view)
             view.deleteLater()
-        self.work = self.pressing = self.result = None
-        self.heading.setText("")
+        self._say_run("")
 
     def _forget(self, work: ProtocolWork) -> None:
-        self._retiring.remove(work)
-        work.deleteLater()
+        if work in self._retiring:
+            self._retiring.remove(work)
+            work.jobs.close()
+            work.deleteLater()
 
     # The set-up
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
@@ -24,9 +24,9 @@ from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.evaluation import write_evaluation_files
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
-T = TypeVar("T")
 REPORT, LEDGER = "report", "measurements.jsonl"
 
 
@@ -84,89 +84,70 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
 class ProtocolWork(QObject):
     """Saves and measures the presses of one run.
 
+    Attributes
+    ----------
+    run : ProtocolRun
+        The run.
+    outcomes : dict of Press to Measurement or str
+        What was measured, or the sentence why nothing was.
+    jobs : Jobs
+        Its work in the background, with progress and refusals.
+
     Signals
     -------
-    measured(object, object)
-        A Press, and its Measurement or the sentence why there is none.
     changed()
-        The next press or the number of measured ones changed.
-    evaluated(object)
-        An Evaluation of all presses so far.
-    refused(str)
-        A sentence: what failed.
-    busy(str, float)
-        Title and progress (0 to 1) of the running work. An empty title: none.
-    gone()
-        It was retired, and no work is running any more.
+        The next press or what was measured changed.
     """
 
-    measured = Signal(object, object)
     changed = Signal()
-    evaluated = Signal(object)
-    refused = Signal(str)
-    busy = Signal(str, float)
-    gone = Signal()
 
     def __init__(self, equipped: Equipped, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._equipped = equipped
         self.run = equipped.run
+        self.outcomes: dict[Press, Outcome] = {}
         self._outcome_of = partial(
             equipped.ledger.outcome, measure=press_measurement(equipped.reconstructor)
         )
-        self._outcomes: dict[str, Outcome] = {}
-        self._jobs = Jobs("protocol", self)
-        self._jobs.progressed.connect(self.busy)
-        self._jobs.refused.connect(self.refused)
+        self.jobs = Jobs("protocol", self)
 
     @property
-    def calibration(self) -> Any:
-        """The settings of the evaluation."""
+    def calibration(self) -> Calibration:
+        """The calibration of the run."""
         return self._equipped.reconstructor.calibration
-
-    @property
-    def measured_count(self) -> int:
-        """Number of measured presses."""
-        return len(self._outcomes)
 
     def catch_up(self) -> None:
         """Measure the presses that are not yet measured, or report why this is not possible."""
         for press in self.run.done:
-            if press.file not in self._outcomes:
+            if press not in self.outcomes:
                 self._measure(press)
 
     def accept(self, press: Press, frames: Sequence[NDArray[Any]]) -> bool:
         """Save a press and measure it. Return whether it was written to disk."""
-        if not self._on_disk(lambda: self.run.accept(press, frames)):
-            return False
-        self._measure(press)
-        self.changed.emit()
-        return True
+        if accepted := self._change(lambda: self.run.accept(press, frames)):
+            self._measure(press)
+        return accepted
 
     def refuse(self, press: Press, reason: str) -> None:
         """Count a refused press."""
-        self._on_disk(lambda: self.run.refuse(press, reason))
-        self.changed.emit()
+        self._change(lambda: self.run.refuse(press, reason))
 
     def take_back(self) -> None:
         """Repeat the previous press. Its old image is kept in another folder."""
-        done = self.run.done
-        if done:
-            self._on_disk(lambda: self.run.take_back(done[-1]))
-            self._outcomes.pop(done[-1].file, None)
-            self.changed.emit()
+        if self.run.done:
+            last = self.run.done[-1]
+            self.outcomes.pop(last, None)
+            self._change(lambda: self.run.take_back(last))
 
-    def evaluate(self) -> None:
+    def evaluate(self, done: Callable[[Evaluation], None]) -> None:
         """Compare all presses with their true values, after the running measurements."""
         self._do(
-            tr("Evaluating"),
-            lambda: evaluate_presses(self.run.presses, self._outcome_of),
-            self.evaluated.emit,
+            tr("Evaluating"), lambda: evaluate_presses(self.run.presses, self._outcome_of), done
         )
 
-    def _do(self, title: str, work: Callable[[], T], done: Callable[[T], object]) -> None:
+    def _do(self, title: str, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         """Work in the background."""
-        self._jobs.submit(Job(title, lambda _progress: work(), done))
+        self.jobs.submit(Job(title, lambda _progress: work(), done))
 
     def write_report(
         self,
@@ -198,24 +179,19 @@ class ProtocolWork(QObject):
 
         self._do(tr("Writing the report"), write, done)
 
-    def retire(self) -> None:
-        """Stop measuring after the current press, and close. The run can be continued."""
+    def retire(self, gone: Callable[[], object]) -> None:
+        """Stop measuring after the current press. Call `gone` when no work is running any more."""
         self._equipped.lock.release()
-        self._jobs.cancel()
-        if self._jobs.busy:
-            self._jobs.progressed.connect(self._go_when_done)
-        else:
-            self._go_when_done("", 0.0)
+        self.jobs.cancel()
+        if not self.jobs.busy:
+            gone()
+            return
+        self.jobs.progressed.connect(lambda title, _share: None if title else gone())
 
     def close(self) -> None:
         """Stop measuring and wait for the current press. Nothing runs afterwards."""
         self._equipped.lock.release()
-        self._jobs.close()
-
-    def _go_when_done(self, title: str, _share: float) -> None:
-        if not title:
-            self._jobs.close()
-            self.gone.emit()
+        self.jobs.close()
 
     def _measure(self, press: Press) -> None:
         image, shape = self.run.image(press), press.truth.shape
@@ -223,17 +199,18 @@ class ProtocolWork(QObject):
         def done(outcome: Outcome) -> None:
             # It may have been discarded meanwhile.
             if press in self.run.done:
-                self._outcomes[press.file] = outcome
-                self.measured.emit(press, outcome)
+                self.outcomes[press] = outcome
                 self.changed.emit()
 
         self._do(tr("Measuring"), lambda: self._outcome_of(image, shape), done)
 
-    def _on_disk(self, change: Callable[[], object]) -> bool:
+    def _change(self, change: Callable[[], object]) -> bool:
         """Change the run. Return whether it was written to disk."""
         try:
             change()
         except InputError as refusal:
-            self.refused.emit(str(refusal))
+            self.jobs.refused.emit(str(refusal))
             return False
+        finally:
+            self.changed.emit()
         return True

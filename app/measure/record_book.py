@@ -34,14 +34,11 @@ class RecordBook(QObject):
     -------
     changed()
         `records` changed.
-    refused(str)
-        A sentence: why something could not be read or written.
     noticed(str)
-        Information about the file for the user.
+        Why something could not be read or written, or what happened to the file.
     """
 
     changed = Signal()
-    refused = Signal(str)
     noticed = Signal(str)
 
     def __init__(self, *, context: AppContext, parent: QObject) -> None:
@@ -50,7 +47,7 @@ class RecordBook(QObject):
         self.records: tuple[MeasurementRecord, ...] = ()
         self._context = context
         self._jobs = Jobs("records", self)
-        self._jobs.refused.connect(self.refused)
+        self._jobs.refused.connect(self.noticed)
         self._folder: Path | None = None
         self._reported = ""
         context.requests.calibrations_changed.connect(self._on_workspace)
@@ -110,7 +107,11 @@ class RecordBook(QObject):
         """Remove measurements. This can be undone."""
 
         def each(change: Callable[[Records, int], None]) -> Change:
-            return lambda records: [change(records, number) for number in numbers]
+            def run(records: Records) -> None:
+                for number in numbers:
+                    change(records, number)
+
+            return run
 
         if numbers:
             text = tr("remove {n} measurements").format(n=len(numbers))

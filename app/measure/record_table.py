@@ -14,7 +14,7 @@ from gelpolight_core.translation import tr
 
 NOTE, IMAGE = 9, 10
 """Columns."""
-_VERDICTS = {PASSED: "pass", FAILED: "fail", DOUBTFUL: "warn"}
+VERDICTS = {PASSED: "pass", FAILED: "fail", DOUBTFUL: "warn"}
 
 
 def verdict_word(verdict: str) -> str:
@@ -64,7 +64,7 @@ def record_titles() -> tuple[str, ...]:
 
 def record_cells(record: MeasurementRecord) -> tuple[Cell, ...]:
     """Return the cells of a measurement."""
-    role = _VERDICTS.get(record.verdict, "")
+    role = VERDICTS.get(record.verdict, "")
     sign = "report" if record.shape == EVALUATION else f"tool-{record.shape.replace('_', '-')}"
     time = f"{record.time.astimezone():%Y-%m-%d %H:%M}"
     cells = (

@@ -7,32 +7,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QComboBox,
-    QHeaderView,
-    QStackedWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
 
 from app.context.context import AppContext
 from app.measure.error_plot import ErrorPlot
 from app.measure.figures_text import unit_behind, unit_of
 from app.measure.record_book import RecordBook
-from app.measure.record_table import (
-    IMAGE,
-    NOTE,
-    record_cells,
-    record_titles,
-    shape_label,
-)
+from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
 from app.services.file_dialogs import ask_save
-from app.widgets.actions import make_action
-from app.widgets.buttons import push_button
+from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.statistics import Statistics, statistics_of
 from gelpolight_core.records.entry import MeasurementRecord
@@ -61,23 +49,24 @@ class ResultsView(QWidget):
         for box in (self.sensor, self.shape):
             box.activated.connect(self._on_filter)
         self.export_action = make_action(
-            self, "records.export", tr("Records as CSV…"), self.choose_export
+            self, "records.export", tr("Records as CSV…"), self.choose_export, icon_name="copy"
         )
-        self.export = push_button(
-            "measure.results.export", tr("&Export as CSV…"), self.choose_export, icon_name="copy"
+        self.remove = make_action(
+            self,
+            "records.delete",
+            tr("Delete"),
+            self.remove_selected,
+            keys=("Delete",),
+            icon_name="remove",
+            tip=tr("Delete measurements"),
         )
-        self.remove = push_button(
-            "measure.results.remove", tr("&Delete"), self.remove_selected, icon_name="remove"
-        )
-        for button in (self.export, self.remove):
-            button.setAutoDefault(False)
-        for name, text, slot, keys in (
-            ("undo", tr("Undo in the records"), book.undo.undo, ("Ctrl+Z",)),
-            ("redo", tr("Redo in the records"), book.undo.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
-            ("delete", tr("Delete measurements"), self.remove_selected, ("Delete",)),
-        ):
-            make_action(self, f"records.{name}", text, slot, keys=keys)
+        undo = book.undo
+        make_action(self, "records.undo", tr("Undo in the records"), undo.undo, keys=("Ctrl+Z",))
+        redo_keys = "Ctrl+Shift+Z", "Ctrl+Y"
+        make_action(self, "records.redo", tr("Redo in the records"), undo.redo, keys=redo_keys)
         self.count = named(PlainLabel(), "measure.results.count", tr("Number of records shown"))
+        self.message = named(PlainLabel(wrap=True), "measure.results.message", tr("Last answer"))
+        show_meaning(self.message, "muted")
         self.table = self._make_table()
         self.statistics = named(
             MarkupLabel(wrap=True), "measure.results.statistics", tr("Statistics")
@@ -112,34 +101,21 @@ class ResultsView(QWidget):
         return table
 
     def _lay_out(self) -> None:
-        left, right = QWidget(), QWidget()
-        vbox((self.statistics, 1), of=left, margins=(10, 4, 10, 4))
-        vbox(self.drift_title, (self.drift, 1), of=right, margins=(0, 0, 8, 4))
+        right = QWidget()
+        vbox(self.drift_title, (self.drift, 1), of=right, margins=(8, 8, 0, 0))
+        self.statistics.setMargin(8)
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
-        below = splitter(across, (left, 0), (right, 0), sizes=(470, 700))
-        self.split = splitter(down, (self.table, 0), (below, 0), sizes=(420, 260))
-        empty = named(
-            PlainLabel(tr("No records yet. Measure a press and save it to the records.")),
-            "measure.results.empty",
-            tr("No records"),
-        )
+        below = splitter(across, (self.statistics, 0), (right, 0), sizes=(470, 700))
+        split = splitter(down, (self.table, 0), (below, 0), sizes=(420, 260))
+        empty = PlainLabel(tr("No records yet. Measure a press and save it to the records."))
         empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.stack = QStackedWidget()
-        self.stack.addWidget(empty)
-        self.stack.addWidget(self.split)
-        bar = hbox(
-            PlainLabel(tr("Sensor")),
-            self.sensor,
-            PlainLabel(tr("Object")),
-            self.shape,
-            self.count,
-            None,
-            self.remove,
-            self.export,
-            margins=(8, 6, 8, 6),
-            spacing=8,
-        )
-        vbox(bar, (self.stack, 1), of=self, margins=0, spacing=0)
+        self.stack.addWidget(named(empty, "measure.results.empty", tr("No records")))
+        self.stack.addWidget(split)
+        filters = PlainLabel(tr("Sensor")), self.sensor, PlainLabel(tr("Object")), self.shape
+        buttons = action_button(self.remove), action_button(self.export_action)
+        bar = hbox(*filters, self.count, (self.message, 1), *buttons, spacing=8)
+        vbox(bar, (self.stack, 1), of=self, margins=(16, 8, 16, 8), spacing=8)
 
     # What is shown
 
@@ -150,8 +126,7 @@ class ResultsView(QWidget):
         self._fill(self.shape, tr("All objects"), {r.shape: shape_label(r.shape) for r in records})
         self._on_filter()
         self.stack.setCurrentIndex(1 if records else 0)
-        for control in (self.export, self.export_action):
-            control.setEnabled(bool(records))
+        self.export_action.setEnabled(bool(records))
 
     @staticmethod
     def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:
@@ -174,8 +149,7 @@ class ResultsView(QWidget):
         """Return the records for the statistics.
 
         These are the selected ones if there are several. Otherwise all visible ones with the same
-        sensor,
-        shape and true size as the selected one or, if none is selected, as the first row.
+        sensor, shape and true size as the selected one or, if none is selected, as the first row.
         """
         selected, shown = self.table.selected, self.table.shown
         if len(selected) > 1:
@@ -215,12 +189,13 @@ class ResultsView(QWidget):
 
     def export_to(self, path: Path) -> None:
         """Write the table: all measurements, or those of the selected sensor."""
-
-        def done(count: int) -> None:
-            text = tr("{n} measurements saved to {path}").format(n=count, path=path)
-            self._context.toasts.show(text)
-
-        self._book.export(path, self.sensor.currentData() or None, done)
+        self.message.setText(tr("Writing the table"))
+        text = tr("{n} measurements saved to {path}")
+        self._book.export(
+            path,
+            self.sensor.currentData() or None,
+            lambda count: self.message.setText(text.format(n=count, path=path)),
+        )
 
 
 def _thing(record: MeasurementRecord) -> tuple[str, tuple[object, ...]]:

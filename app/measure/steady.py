@@ -1,66 +1,65 @@
-"""Detects a steady press: something is pressed in, and its depth has not changed for a while."""
+"""Detects a steady press, and whether the sensor shows another one than the frozen image."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numpy.typing import NDArray
+
+from app.sources.source import Frame
+from gelpolight_core.image.in_time import Stillness
+from gelpolight_core.measurement.steadiness import find_contact
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 STRIDE = 12
 PRESSED_MM = 0.08
 """On a calibrated sensor the bare membrane stays below a third of it."""
-STILL_MM = 0.008
-STILL_SHARE = 0.01
-"""Relative to the depth: normal variation of a hand that holds still."""
-STILL_S = 0.4
-LEAST_FRAMES = 3
+WATCH_S = 0.1
+"""Interval of the checks: several within the time that something must be still."""
 
 
 class SteadyPress:
-    """Watches live depth maps, and reports once per press that it is steady."""
+    """Watches live images, and reports once per press that it is steady.
+
+    Attributes
+    ----------
+    other : bool
+        Whether the held press was lifted, or another one is pressed in.
+    """
 
     def __init__(self) -> None:
-        self._before: NDArray[np.float32] | None = None
-        self._since_s = math.nan
-        self._frames = 0
-        self._armed = True
+        self._stillness = Stillness()
+        self.restart()
+        self._last_s = -np.inf
+        self._held: Frame | None = None
+        self.other = False
 
-    def update(self, depth_mm: NDArray[np.float32], time_s: float, *, settled: bool = True) -> bool:
-        """Process the next map. Return whether it shows a press that may be frozen now.
+    def restart(self) -> None:
+        """Begin again, with another camera or after its settings changed."""
+        self._stillness.restart()
+        self._stillness.moved = True
 
-        Parameters
-        ----------
-        depth_mm : (rows, columns)
-            Depth.
-        time_s : float
-            Time of its image.
-        settled : bool, optional
-            Whether the image already shows the latest commands to the source.
-        """
-        coarse = depth_mm[::STRIDE, ::STRIDE]
-        before, self._before = self._before, coarse
-        depth = float(np.percentile(coarse, 99.5))
-        if before is None or before.shape != coarse.shape:
+    def update(self, frame: Frame, heightmap: HeightMap) -> bool:
+        """Process the next image and its depth. Return whether it may be frozen now."""
+        if 0.0 <= frame.time_s - self._last_s < WATCH_S:
             return False
-        if not settled or depth < PRESSED_MM:
-            return self._moved()
-        if float(np.abs(coarse - before).max()) > STILL_MM + STILL_SHARE * depth:
-            return self._moved()
-        self._frames += 1
-        if math.isnan(self._since_s):
-            self._since_s = time_s
-        still = time_s - self._since_s >= STILL_S and self._frames >= LEAST_FRAMES
-        if not (still and self._armed):
+        self._last_s = frame.time_s
+        if not frame.settled:  # it does not yet show the latest commands to the source
+            self.restart()
             return False
-        self._armed = False
+        still = self._stillness.update(frame.rgb, frame.time_s)
+        held = self._held
+        if held is not None and not self.other:
+            same = (held.rgb.shape, held.rgb.dtype) == (frame.rgb.shape, frame.rgb.dtype)
+            self.other = not same or find_contact(held.rgb, frame.rgb).pressed
+        depth_mm = float(np.percentile(heightmap.depth_mm[::STRIDE, ::STRIDE], 99.5))
+        if not (still and self._stillness.moved and depth_mm >= PRESSED_MM):
+            return False
+        self._stillness.moved = False
         return True
 
-    def hold_off(self) -> None:
-        """Do not report the current press before it has moved."""
-        self._armed = False
+    def hold(self, frame: Frame | None) -> None:
+        """Watch whether the press of a frozen image stays. None: there is none.
 
-    def _moved(self) -> bool:
-        self._armed = True
-        self._since_s, self._frames = math.nan, 0
-        return False
+        The current press is not reported before it has moved.
+        """
+        self._held, self.other = frame, False
+        self._stillness.moved = False

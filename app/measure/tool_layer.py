@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen, QPolygonF, QTransform
 
 from app.measure.grips import Grip, Point, nearest_grip
@@ -43,31 +43,34 @@ class DrawnTool:
     text: str = ""
 
 
+class LayerUser(Protocol):
+    """What the owner of the layer does."""
+
+    def on_point(self, at_mm: Point) -> None:
+        """Use a click on the map during placement."""
+
+    def on_tool(self, key: int) -> None:
+        """Choose a tool that was clicked."""
+
+    def on_grip(self, name: str) -> None:
+        """Choose a grip of the chosen tool."""
+
+    def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
+        """Move a grip of the chosen tool."""
+
+
 class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
     """The tools; in mm, x right and y down.
 
-    Signals
-    -------
-    clicked(float, float)
-        A click on the map during placement.
-    chosen(int)
-        A click on a tool: its key.
-    grip_chosen(str)
-        A grip was pressed.
-    dragged(str, float, float)
-        The chosen tool's grip is being dragged to (x, y).
-    dropped(str, float, float)
-        The drag has ended.
+    Parameters
+    ----------
+    user : LayerUser
+        Called when the layer is clicked or dragged.
     """
 
-    clicked = Signal(float, float)
-    chosen = Signal(int)
-    grip_chosen = Signal(str)
-    dragged = Signal(str, float, float)
-    dropped = Signal(str, float, float)
-
-    def __init__(self) -> None:
+    def __init__(self, user: LayerUser) -> None:
         super().__init__()
+        self._user = user
         self.placing = False
         self._tools: tuple[DrawnTool, ...] = ()
         self._key = 0
@@ -114,11 +117,11 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
         grip, tool = self._grip_at(event.pos()), self._tool_at(at)
         event.accept()
         if self.placing:
-            self.clicked.emit(*at)
+            self._user.on_point(at)
         elif grip is not None:
-            self.grip_chosen.emit(grip.name)
+            self._user.on_grip(grip.name)
         elif tool:
-            self.chosen.emit(tool)
+            self._user.on_tool(tool)
         else:
             event.ignore()
 
@@ -129,17 +132,15 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
                 event.ignore()
                 return
             self._dragged = grip.name
-            self.grip_chosen.emit(grip.name)
+            self._user.on_grip(grip.name)
         if not self._dragged:
             event.ignore()
             return
         event.accept()
-        name, at = self._dragged, event.pos()
+        name, at = self._dragged, (float(event.pos().x()), float(event.pos().y()))
         if event.isFinish():
             self._dragged = ""
-            self.dropped.emit(name, float(at.x()), float(at.y()))
-        else:
-            self.dragged.emit(name, float(at.x()), float(at.y()))
+        self._user.on_drag(name, at, ended=event.isFinish())
 
     def _reach_mm(self) -> float:
         return REACH_PX * float(self.pixelLength(pg.Point(1.0, 0.0)) or 0.01)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget
 
@@ -12,7 +13,7 @@ from app.live.frame_results import Shown
 from app.live.height_panel import HeightPanel
 from app.measure.figures_text import figure_text
 from app.measure.grips import Point, grips_of, outline_of
-from app.measure.palette import Palette
+from app.measure.measuring import ImageResults
 from app.measure.placing import first_points, kinds, make_tool
 from app.measure.tool_layer import DrawnTool, ToolLayer
 from app.measure.work import Work
@@ -38,89 +39,62 @@ _ARROWS = {
 
 
 class ToolMap(QWidget):
-    """The map, the palette next to it and a line of text below.
+    """The map, and a line of text below it.
 
     Parameters
     ----------
     work : Work
         Holds the tools and results.
+    on_placed : callable
+        Called when no tool is placed any more: with why not, or an empty text.
 
-    Signals
-    -------
-    freeze_wanted()
-        A tool was chosen: the image must be frozen.
-    refused(str)
-        A sentence: why a tool cannot be placed like this.
-    drawn(object, int)
-        The tools as they are drawn now (tuple of DrawnTool), and the key of the chosen one.
+    Attributes
+    ----------
+    drawn : tuple of DrawnTool
+        The tools as they are drawn.
     """
 
-    freeze_wanted = Signal()
-    refused = Signal(str)
-    drawn = Signal(object, int)
-
-    def __init__(self, work: Work) -> None:
+    def __init__(self, work: Work, on_placed: Callable[[str], object]) -> None:
         super().__init__()
         named(self, "measure.map", tr("Height map with tools"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self._work = work
+        self._work, self._on_placed = work, on_placed
         self._kind = ""
         self._points: list[Point] = []
-        self._live: HeightMap | None = None
+        self._heightmap: HeightMap | None = None
+        self.drawn: tuple[DrawnTool, ...] = ()
         self.panel = HeightPanel()
         self.view = self.panel.map
-        self.layer = ToolLayer()
+        self.layer = ToolLayer(self)
         self.view.box.addItem(self.layer, ignoreBounds=True)
-        self.tools = Palette(self)
         self.hint = named(PlainLabel(), "measure.hint", tr("What to do next on the map"))
         self.readout = named(PlainLabel(), "measure.readout", tr("Values under the pointer"))
-        foot = hbox((self.hint, 1), self.readout, margins=(8, 2, 8, 2))
-        right = vbox((self.panel, 1), foot, spacing=0)
-        hbox(self.tools, (right, 1), of=self, margins=0, spacing=0)
-        self.tools.chosen.connect(self._place)
-        self.layer.clicked.connect(self._on_point)
-        self.layer.chosen.connect(self._work.choose)
-        self.layer.grip_chosen.connect(self._on_grip)
-        self.layer.dragged.connect(lambda name, x, y: self._work.drag(name, (x, y)))
-        self.layer.dropped.connect(lambda name, x, y: self._work.drop(name, (x, y)))
+        foot = hbox((self.hint, 1), self.readout, margins=(12, 4, 12, 4))
+        vbox((self.panel, 1), foot, of=self, margins=0, spacing=0)
         self.view.pointed.connect(self._on_pointed)
-        self._work.changed.connect(self._draw)
-        self._work.image_changed.connect(self._show_results)
 
     # The image
 
     def show_live(self, shown: Shown, display: Display) -> None:
         """Show the depth of a live frame while no image is frozen."""
         if shown.heightmap is not None:
-            self._live = shown.heightmap
+            self._heightmap = shown.heightmap
             self.panel.show_frame(shown, display.colours, still=False)
 
     def say(self, text: str) -> None:
         """Show a text instead of the map."""
-        self._live = None
+        self._heightmap = None
         self.view.say(text)
 
-    def _show_results(self) -> None:
-        image_results = self._work.image_results
-        if image_results is not None:
-            rgb, shown = image_results.map_image.rgb, image_results.map_image.range_mm
-            self.panel.show_image(rgb, image_results.heightmap, Display().colours, shown)
-        elif self._work.image is None:
-            self.cancel_placing()
-
-    @property
-    def heightmap(self) -> HeightMap | None:
-        """The height map shown."""
-        return self._live if self._work.image is None else self._work.heightmap
+    def show_results(self, shown: ImageResults) -> None:
+        """Show the depth of the frozen image."""
+        self._heightmap = shown.heightmap
+        image = shown.map_image
+        self.panel.show_image(image.rgb, shown.heightmap, Display().colours, image.range_mm)
 
     # Placing
 
-    def cancel_placing(self) -> None:
-        """Stop placing a tool."""
-        self._place("")
-        self.tools.deselect()
-
-    def _place(self, name: str) -> None:
+    def place(self, name: str) -> None:
         """Begin to place a tool. Empty: none."""
         self._kind, self._points = name, []
         self.layer.placing = bool(name)
@@ -128,25 +102,23 @@ class ToolMap(QWidget):
         self._report()
         if name:
             self.setFocus()
-            self.freeze_wanted.emit()
 
-    def _on_point(self, x_mm: float, y_mm: float) -> None:
+    def on_point(self, at_mm: Point) -> None:
+        """Use a click on the map for the tool that is being placed."""
         self.setFocus()
-        self._points.append((x_mm, y_mm))
+        self._points.append(at_mm)
         self.layer.show_begun(tuple(self._points))
         if len(self._points) == len(self._asks()):
             self._add_tool(tuple(self._points))
         self._report()
 
     def _add_tool(self, points: tuple[Point, ...]) -> None:
-        kind = self._kind
-        self.cancel_placing()
         try:
-            tool = make_tool(kind, points)
+            self._work.add(make_tool(self._kind, points))
         except InputError as error:
-            self.refused.emit(str(error))
-            return
-        self._work.add(tool)
+            self._on_placed(str(error))
+        else:
+            self._on_placed("")
 
     def _asks(self) -> tuple[str, ...]:
         return next((kind.asks for kind in kinds() if kind.name == self._kind), ())
@@ -166,23 +138,31 @@ class ToolMap(QWidget):
 
     # Drawing
 
-    def _draw(self) -> None:
+    def draw(self) -> None:
+        """Draw the tools as they are now."""
         work = self._work
-        drawn = tuple(_drawn(k, tool, work.results.get(k)) for k, tool in work.sheet.items())
+        self.drawn = tuple(_drawn(k, tool, work.results.get(k)) for k, tool in work.sheet.items())
         grips = () if work.tool is None else grips_of(work.tool)
-        self.layer.show_tools(drawn, work.chosen, grips, work.grip)
-        self.drawn.emit(drawn, work.chosen)
+        self.layer.show_tools(self.drawn, work.chosen, grips, work.grip)
         self._report()
 
-    def _on_grip(self, name: str) -> None:
+    def on_tool(self, key: int) -> None:
+        """Choose a tool that was clicked."""
+        self._work.choose(key)
+
+    def on_grip(self, name: str) -> None:
+        """Choose a grip of the chosen tool."""
         self.setFocus()
         self._work.choose(self._work.chosen, name)
 
+    def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
+        """Move a grip of the chosen tool."""
+        (self._work.drop if ended else self._work.drag)(name, to_mm)
+
     def _on_pointed(self, x_mm: float, y_mm: float) -> None:
-        heightmap = self.heightmap
         reading = None
-        if heightmap is not None and math.isfinite(x_mm):
-            reading = read_at(heightmap, x_mm, y_mm)
+        if self._heightmap is not None and math.isfinite(x_mm):
+            reading = read_at(self._heightmap, x_mm, y_mm)
         words = "" if reading is None else tr("x {x:.2f} mm  y {y:.2f} mm  depth {d}").format(
             x=reading.x_mm, y=reading.y_mm, d=in_unit(reading.depth_mm)
         )  # fmt: skip
@@ -196,24 +176,26 @@ class ToolMap(QWidget):
         if key in _ARROWS:
             large = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             step = LARGE_NUDGE_MM if large else NUDGE_MM
-            if self._work.nudge(*(step * d for d in _ARROWS[key])):
+            dx, dy = _ARROWS[key]
+            if self._work.nudge(step * dx, step * dy):
                 return
         match key:
             case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp:
-                self._next_grip(1 if key == Qt.Key.Key_PageDown else -1)
+                self.choose_next_grip(1 if key == Qt.Key.Key_PageDown else -1)
             case Qt.Key.Key_Return | Qt.Key.Key_Enter if self._kind:
                 middle = self.view.box.viewRect().center()
                 self._add_tool(first_points(self._kind, (middle.x(), middle.y())))
             case Qt.Key.Key_Delete | Qt.Key.Key_Backspace if self._work.chosen:
                 self._work.remove(self._work.chosen)
             case Qt.Key.Key_Escape if self._kind:
-                self.cancel_placing()
+                self._on_placed("")
             case Qt.Key.Key_Escape if self._work.chosen:
                 self._work.choose(0)
             case _:
                 super().keyPressEvent(event)
 
-    def _next_grip(self, step: int) -> None:
+    def choose_next_grip(self, step: int) -> None:
+        """Let the keys move another grip of the chosen tool."""
         work = self._work
         names = [] if work.tool is None else [grip.name for grip in grips_of(work.tool)]
         if names:

@@ -12,7 +12,7 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from app.measure.grips import grips_of, moved
 from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.placing import kind_label
-from app.services.newest_wins import NewestWins
+from app.services.newest_wins import Finished, NewestWins
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools import Ball, Cuboid, Cylinder, Tool, ToolResult
@@ -43,26 +43,18 @@ class Work(QObject):
         Its grip that the keys move. Empty for none.
     busy : bool
         Whether a measurement is running.
+    refused : str
+        Why the image cannot be measured. Empty if it can.
+    answer : str
+        What the last detection did not find. Empty if it found the object.
 
     Signals
     -------
-    image_changed()
-        Another image, or another depth of it.
     changed()
-        Tools, choice or figures changed.
-    busy_changed(bool)
-        Whether a measurement is running.
-    refused(str)
-        A sentence: why the image cannot be measured.
-    proposed(object)
-        A Proposal, or None if no known object was detected.
+        Image, tools, choice, figures or answers changed.
     """
 
-    image_changed = Signal()
     changed = Signal()
-    busy_changed = Signal(bool)
-    refused = Signal(str)
-    proposed = Signal(object)
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -70,7 +62,7 @@ class Work(QObject):
         self.image: MeasuredImage | None = None
         self.image_results: ImageResults | None = None
         self.chosen = 0
-        self.grip = ""
+        self.grip = self.refused = self.answer = ""
         self._sheet: Sheet = {}
         self._preview: Sheet | None = None
         self._reconstructor: Reconstructor | None = None
@@ -111,12 +103,15 @@ class Work(QObject):
 
     # The image
 
+    @property
+    def placed_by_hand(self) -> bool:
+        """Whether the image has other tools than the detected one."""
+        return bool(self._sheet.keys() - {self._detected})
+
     def use(self, reconstructor: Reconstructor | None) -> None:
         """Measure with this calibration from now on."""
         self._reconstructor = reconstructor
-        self.image_results = None
-        self.image_changed.emit()
-        self.changed.emit()
+        self.image_results, self.refused = None, ""
         self._ask()
 
     def take(self, image: MeasuredImage | None, *, propose: bool = False) -> None:
@@ -127,8 +122,7 @@ class Work(QObject):
         self.chosen, self.grip = 0, ""
         self._propose = propose and image is not None
         self._detected = 0
-        self.image_changed.emit()
-        self.changed.emit()
+        self.refused = self.answer = ""
         self._ask()
 
     @property
@@ -139,9 +133,8 @@ class Work(QObject):
     def propose(self) -> None:
         """Detect the pressed object. While this runs, a further request changes nothing."""
         if not self.detecting:
-            self._propose = True
+            self._propose, self.answer = True, ""
             self._ask()
-            self.changed.emit()
 
     # Tools
 
@@ -172,7 +165,6 @@ class Work(QObject):
         tool = self._sheet.get(self.chosen)
         if tool is not None:
             self._preview = {**self._sheet, self.chosen: moved(tool, grip, to_mm)}
-            self.changed.emit()
             self._ask()
 
     def drop(self, grip: str, to_mm: tuple[float, float]) -> None:
@@ -193,16 +185,19 @@ class Work(QObject):
 
     def choose(self, key: int, grip: str = "") -> None:
         """Choose a tool and the grip that the keys move: its first if none is named."""
+        self._choose(key, grip)
+        self.changed.emit()
+
+    def _choose(self, key: int, grip: str) -> None:
         tool = self.sheet.get(key)
         self.chosen = 0 if tool is None else key
         grips = () if tool is None else grips_of(tool)
         self.grip = grip or (grips[0].name if grips else "")
-        self.changed.emit()
 
     def set_sheet(self, sheet: Sheet, key: int) -> None:
         """Show another state of the sheet, from the undo history."""
         self._sheet, self._preview = sheet, None
-        self.choose(key, self.grip if key == self.chosen else "")
+        self._choose(key, self.grip if key == self.chosen else "")
         self._ask()
 
     # The thread
@@ -221,61 +216,64 @@ class Work(QObject):
             request = MeasureRequest(
                 maker.calibration, maker.model, self.image, self.sheet, self._propose
             )
-        if self._worker is None:
-            if request is None:
-                return
+        if self._worker is None and request is not None:
             self._worker = NewestWins(Measuring(), name="measure")
-        self._worker.submit(request)  # an empty request releases the last image
-        self._timer.start()
-        if request is not None:
-            self._say_busy(True)
+        if self._worker is not None:
+            self._worker.submit(request)  # an empty request releases the last image
+            self._timer.start()
+        self.busy = request is not None
+        self.changed.emit()
 
     def _poll(self) -> None:
         assert self._worker is not None
         finished = self._worker.take()
         if self._worker.idle:
             self._timer.stop()
-            self._say_busy(False)
-        request, maker = None if finished is None else finished.request, self._reconstructor
-        if finished is None or request is None or maker is None:
-            return
-        made = request.calibration is maker.calibration and request.model == maker.model
-        if not made or request.image is not self.image:
-            return  # about an earlier image or calibration
+            self.busy = False
+        if finished is not None and finished.request is not None:
+            self._on_finished(finished.request, finished)
+        if finished is not None or not self.busy:
+            self.changed.emit()
+
+    def _on_finished(
+        self,
+        request: MeasureRequest,
+        finished: Finished[MeasureRequest | None, ImageResults | None],
+    ) -> None:
+        maker = self._reconstructor
+        if maker is None or request.image is not self.image:
+            return  # about an earlier image
+        if request.calibration is not maker.calibration or request.model != maker.model:
+            return  # about an earlier calibration
         if isinstance(finished.error, InputError):
-            self.refused.emit(str(finished.error))
+            self.refused = str(finished.error)
         elif finished.error is not None:
             _LOG.error("Measuring failed", exc_info=finished.error)
             kind = type(finished.error).__name__
-            self.refused.emit(tr("Internal error: {k}. See the log for details.").format(k=kind))
+            self.refused = tr("Internal error: {k}. See the log for details.").format(k=kind)
         elif finished.result is not None:
-            self._show(request, finished.result)
-
-    def _show(self, request: MeasureRequest, image_results: ImageResults) -> None:
-        before, self.image_results = self.image_results, image_results
-        if before is None or before.heightmap is not image_results.heightmap:
-            self.image_changed.emit()
-        self.changed.emit()
-        if request.propose and self._propose:
-            self._propose = False
-            self._on_proposal(image_results.proposal)
-            self.changed.emit()
+            self.image_results = finished.result
+            if request.propose and self._propose:
+                self._propose = False
+                self._on_proposal(finished.result.proposal)
 
     def _on_proposal(self, proposal: Proposal | None) -> None:
-        if proposal is not None:
+        if proposal is None:
+            self.answer = tr(
+                "No ball, cylinder or cuboid was found. Press one, or use the other tools."
+            )
+            return
+        if len(proposal.candidates) > 1:
+            names = tr(" and ").join(map(kind_label, proposal.candidates))
+            self.answer = tr(
+                "The object is not unique: {names} fit equally well. Choose the correct tool."
+            ).format(names=names)
+        if self._sheet.get(self._detected) is None:
             kind = {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}
-            tool = kind[proposal.candidates[0]](proposal.at_mm)
-            if self._sheet.get(self._detected) is None:
-                self._detected = self.add(tool)
-            else:
-                # The same image has the same object: its tool remains, even if it was moved.
-                self.choose(self._detected)
-        self.proposed.emit(proposal)
-
-    def _say_busy(self, busy: bool) -> None:
-        if busy != self.busy:
-            self.busy = busy
-            self.busy_changed.emit(busy)
+            self._detected = self.add(kind[proposal.candidates[0]](proposal.at_mm))
+        else:
+            # The same image has the same object: its tool remains, even if it was moved.
+            self._choose(self._detected, "")
 
 
 class _Edit(QUndoCommand):

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QWidget
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
+from app.widgets.dialog import Kinds
 from app.widgets.question import ask
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
@@ -108,12 +109,15 @@ class CalibrationActions:
             self._remove(entry)
             return
         text = tr("{reason} Move it to the trash? You can restore it from there.")
-        ask(
+        question = ask(
             self._page,
             tr("Remove calibration"),
             text.format(reason=reason.format(name=entry.path.name)),
             (tr("Move to trash"), lambda: self._remove(entry)),
         )
+        cancel = question.buttons.button(Kinds.Cancel)
+        cancel.setDefault(True)
+        cancel.setFocus()
 
     def removals(self) -> tuple[Removal, ...]:
         """Return the calibrations in the trash."""

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import (
-    QLineEdit,
-    QProgressBar,
-    QToolBar,
-    QWidget,
-)
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QAction, QDesktopServices
+from PySide6.QtWidgets import QLineEdit, QProgressBar, QWidget
 
 from app.sensors.tables import made_cell
 from app.theme.icons import icon
+from app.widgets.actions import action_button
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
-from app.widgets.layout import hbox, scroll_area, vbox
+from app.widgets.layout import hbox, keep_space, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
@@ -28,9 +25,17 @@ from gelpolight_core.translation import tr
 
 
 class Details(QWidget):
-    """Shows one calibration, or what to do if none is selected."""
+    """Shows one calibration, or what to do if none is selected.
 
-    def __init__(self, actions: tuple[QAction, ...]) -> None:
+    Parameters
+    ----------
+    actions : tuple of QAction
+        What can be done with it.
+    on_elastomer : callable
+        Called with another name of the elastomer.
+    """
+
+    def __init__(self, actions: tuple[QAction, ...], on_elastomer: Callable[[str], object]) -> None:
         super().__init__()
         named(self, "sensors.details", tr("Details of the calibration"))
         self._title = named(MarkupLabel(parent=self), "sensors.details.title", tr("Calibration"))
@@ -42,32 +47,45 @@ class Details(QWidget):
         # Space for the longest text, that of a validated calibration, so that the buttons do not
         # move.
         self._facts.setMinimumHeight(6 * self._facts.fontMetrics().lineSpacing())
-        # A toolbar, because it has an arrow where it is too narrow for all buttons.
-        buttons = named(QToolBar(self), "sensors.details.bar", tr("Actions of the calibration"))
-        buttons.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        for action in actions:
-            buttons.addAction(action)
-            button = named(
-                buttons.widgetForAction(action),
-                f"{action.objectName()}.button",
-                action.text().replace("&", ""),
-            )
-            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        first, *others = actions
+        buttons = hbox(action_button(first, primary=True), spacing=8)
+        for action in others:
+            buttons.addWidget(action_button(action))
         self._area = scroll_area(QWidget())
         named(self._area, "sensors.details.stages", tr("Quality of the stages"))
         self.busy = named(QProgressBar(self), "sensors.busy", tr("Writing the report"))
         self.busy.setRange(0, 0)
         self.busy.hide()
-        self.gel = GelCarePanel()
-        parts = self._title, self._facts, self.gel, buttons, self.busy, (self._area, 1)
-        vbox(*parts, of=self, margins=(12, 0, 0, 0))
+        self.busy.setFixedHeight(4)
+        self.busy.setTextVisible(False)
+        keep_space(self.busy)
+        self._message = named(MarkupLabel(wrap=True), "sensors.message", tr("Last answer"))
+        self._message.linkActivated.connect(
+            lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))
+        )
+        self._name, self._on_elastomer = "", on_elastomer
+        tip = tr("Name or serial number of the elastomer. It is kept in the calibration file")
+        self.elastomer = named(QLineEdit(), "sensors.gel.elastomer", tr("Elastomer"), tip)
+        self.elastomer.setPlaceholderText(tr("not stated"))
+        self.elastomer.editingFinished.connect(self._on_edited)
+        label = PlainLabel(tr("&Elastomer"))
+        label.setBuddy(self.elastomer)
+        self.presses = named(PlainLabel(wrap=True), "sensors.gel.care", tr("Use of the gel"))
+        self._gel = QWidget()
+        vbox(hbox(label, (self.elastomer, 1)), self.presses, of=self._gel, margins=0)
+        parts = self._title, self._facts, self._gel, buttons, self._message, self.busy
+        vbox(*parts, (self._area, 1), of=self, margins=(12, 0, 0, 0))
 
     def show_entry(self, entry: Entry | None, uses: str = "", presses: str = "") -> None:
         """Show a calibration, or none; how often it was used, and the presses on its gel."""
         summary = None if entry is None else entry.summary
-        self.gel.setVisible(summary is not None)
-        if summary is not None:
-            self.gel.show_gel(summary.elastomer, presses)
+        self._gel.setVisible(summary is not None)
+        self.presses.setText(presses)
+        if summary is not None and (
+            summary.elastomer != self._name or not self.elastomer.hasFocus()
+        ):
+            self._name = summary.elastomer
+            self.elastomer.setText(summary.elastomer)
         if entry is None:
             self._title.setText("")
             self._facts.setText(tr("Select a calibration to see its quality."))
@@ -85,6 +103,18 @@ class Details(QWidget):
         # It scrolls only up and down: no limit is cut at the right.
         bar = self._area.verticalScrollBar().sizeHint().width()
         self._area.setMinimumWidth(stages.minimumSizeHint().width() + bar)
+
+    def say(self, text: str, path: str = "") -> None:
+        """Show an answer of the program, with a link to a file that was written."""
+        link = f" <a href='{escaped(path)}'>{escaped(tr('Open'))}</a>" if path else ""
+        role = "pass" if path else "fail"
+        self._message.setText(f"<span style='color:@{role}'>{escaped(text)}</span>{link}")
+
+    def _on_edited(self) -> None:
+        name = self.elastomer.text().strip()
+        if name != self._name:
+            self._name = name
+            self._on_elastomer(name)
 
 
 def _stages(entry: Entry) -> QWidget:
@@ -135,43 +165,3 @@ def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
         summary.accepted and tr("Used although it failed: {why}").format(why=summary.accepted),
     ]
     return "\n".join((*filter(None, lines), *validation_lines(entry)))
-
-
-class GelCarePanel(QWidget):
-    """Shows the presses on the gel since a calibration, with the name of the elastomer to edit.
-
-    Signals
-    -------
-    renamed(str)
-        The user has entered another name.
-    """
-
-    renamed = Signal(str)
-
-    def __init__(self) -> None:
-        super().__init__()
-        named(self, "sensors.gel", tr("Gel care"))
-        self._name = ""
-        self.elastomer = named(
-            QLineEdit(), "sensors.gel.elastomer", tr("Name or serial number of the elastomer"),
-            tr("Name or serial number of the elastomer. It is kept in the calibration file"),
-        )  # fmt: skip
-        self.elastomer.setPlaceholderText(tr("not stated"))
-        self.elastomer.editingFinished.connect(self._on_edited)
-        label = PlainLabel(tr("&Elastomer"))
-        label.setBuddy(self.elastomer)
-        self._care = named(PlainLabel(wrap=True), "sensors.gel.care", tr("Use of the gel"))
-        vbox(hbox(label, (self.elastomer, 1)), self._care, of=self, margins=0)
-
-    def show_gel(self, elastomer: str, presses: str) -> None:
-        """Show the name of the elastomer, and its presses or why they are not known."""
-        if elastomer != self._name or not self.elastomer.hasFocus():
-            self._name = elastomer
-            self.elastomer.setText(elastomer)
-        self._care.setText(presses)
-
-    def _on_edited(self) -> None:
-        name = self.elastomer.text().strip()
-        if name != self._name:
-            self._name = name
-            self.renamed.emit(name)

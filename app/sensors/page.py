@@ -6,15 +6,9 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QStackedWidget,
-    QToolBar,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
 
 from app.context.context import AppContext
 from app.sensors.calibration_actions import CalibrationActions
@@ -23,10 +17,9 @@ from app.sensors.tables import SessionsBox, cells_of, library_titles
 from app.sensors.trash_dialog import TrashDialog
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job, Jobs
-from app.theme.icons import application_icon
-from app.widgets.actions import make_action
+from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import Cell, CellsTable
-from app.widgets.label import MarkupLabel, PlainLabel
+from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
 from app.workspace.entries import Entry
@@ -59,20 +52,30 @@ class SensorsPage(QWidget):
         self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
         self._table.selectionModel().selectionChanged.connect(self._show_chosen)
         self._table.doubleClicked.connect(lambda _: self.use.trigger())
-        self._sessions = SessionsBox(self)
-        self._sessions.wanted.connect(context.requests.session)
+        self._sessions = SessionsBox(context.requests.session.emit)
         self._reports = Jobs("report", self)
-        self._reports.refused.connect(lambda text: context.toasts.show(text, "fail"))
-        self._details = Details((self.use, self.report, self.reveal, self.remove))
-        self._details.gel.renamed.connect(self._on_elastomer)
+        actions = self.use, self.report, self.reveal, self.remove
+        self._details = Details(actions, self._on_elastomer)
+        self._reports.refused.connect(self._details.say)
         lists = splitter(Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2))
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
-        self._stack = QStackedWidget(self)
-        first = self.demo, self.new, self.session, self.import_, self.trash
-        self._stack.addWidget(Welcome(first))
-        self._stack.addWidget(self._build_library(split))
-        vbox(self._stack, of=self, margins=0)
+        empty = named(PlainLabel(wrap=True), "sensors.empty", tr("No sensor yet"))
+        empty.setText(
+            tr(
+                "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file "
+                "onto this window."
+            )
+        )
+        empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._stack = QStackedWidget()
+        self._stack.addWidget(empty)
+        self._stack.addWidget(split)
+        bar = hbox(spacing=8)
+        for action in (self.new, self.session, self.import_, self.demo, self.trash):
+            bar.addWidget(action_button(action))
+        bar.addStretch(1)
+        vbox(bar, (self._stack, 1), of=self, margins=(16, 12, 16, 12), spacing=8)
         context.requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 
@@ -85,9 +88,8 @@ class SensorsPage(QWidget):
         tip: str = "",
         *keys: str,
     ) -> QAction:
-        return make_action(
-            self, f"sensors.{name}", text, slot, keys=keys, icon_name=icon_name, tip=tip
-        )
+        name = f"sensors.{name}"
+        return make_action(self, name, text, slot, keys=keys, icon_name=icon_name, tip=tip)
 
     def _make_actions(self) -> None:
         requests, library = self._context.requests, self._library
@@ -163,16 +165,6 @@ class SensorsPage(QWidget):
         """Return what the File menu offers to export from this page."""
         return (self.report,)
 
-    def _build_library(self, split: QWidget) -> QWidget:
-        bar = named(QToolBar(self), "sensors.bar", tr("Library"))
-        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        for action in (self.new, self.session, self.import_, self.trash):
-            bar.addAction(action)
-            bar.widgetForAction(action).setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        library = QWidget(self)
-        vbox(bar, (split, 1), of=library, margins=(12, 6, 12, 8))
-        return library
-
     def enter(self) -> None:
         """Read the folder again: files may have been added by other programs."""
         self.refresh()
@@ -245,11 +237,7 @@ class SensorsPage(QWidget):
         self._show_chosen()
 
     def _report_written(self, path: str) -> None:
-        self._context.toasts.show(
-            tr("Report saved to {path}.").format(path=path),
-            "pass",
-            actions=((tr("Open"), lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(path))),),
-        )
+        self._details.say(tr("Report saved to {path}.").format(path=path), path)
 
     def chosen(self) -> Entry | None:
         """Return the selected calibration."""
@@ -294,11 +282,13 @@ class SensorsPage(QWidget):
         """Return the presses on the gel since a calibration, or why they are not known."""
         if entry is None or entry.summary is None:
             return ""
+        workspace, identity = self._context.workspace, entry.summary.identity
         try:
-            presses = read_presses(self._context.workspace.folder)
+            seen = read_presses(workspace.folder).get(identity, 0)
+            # The gel was pressed for each measurement, also where no live image was watched.
+            return presses_text(max(seen, workspace.uses(identity)[0]))
         except InputError as error:
             return str(error)
-        return presses_text(presses.get(entry.summary.identity, 0))
 
     def _on_elastomer(self, name: str) -> None:
         self._with_chosen(lambda entry: self._library.name_elastomer(entry, name))
@@ -312,48 +302,3 @@ class SensorsPage(QWidget):
 def _open_folder(folder: Path) -> None:
     make_folder(folder)
     QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
-
-
-class Welcome(QWidget):
-    """Shows a short introduction and the first actions.
-
-    Parameters
-    ----------
-    actions : tuple of QAction
-        The first one is the most common.
-    """
-
-    def __init__(self, actions: tuple[QAction, ...]) -> None:
-        super().__init__()
-        named(self, "sensors.welcome", tr("Welcome"))
-        sign = PlainLabel(parent=self)
-        sign.setPixmap(application_icon().pixmap(96, 96))
-        heading = tr("No sensor yet")
-        title = MarkupLabel(f"<h1>{heading}</h1>", self)
-        text = PlainLabel(
-            tr(
-                "Sensors are listed here after calibration. Start with one of these "
-                "actions, or drop a session folder or a calibration file onto this window."
-            ),
-            self,
-            wrap=True,
-        )
-        text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        middle = QWidget(self)
-        middle.setFixedWidth(480)
-        centre = Qt.AlignmentFlag.AlignHCenter
-        buttons = [(_button(action), 0, centre) for action in actions]
-        head = (sign, 0, centre), (title, 0, centre)
-        vbox((None, 2), *head, text, 16, *buttons, (None, 3), of=middle)
-        hbox(middle, of=self)
-
-
-def _button(action: QAction) -> QToolButton:
-    button = QToolButton()
-    named(button, f"welcome.{action.objectName()}", action.text().replace("&", ""))
-    button.setDefaultAction(action)
-    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-    button.setIconSize(QSize(24, 24))
-    button.setMinimumSize(320, 44)
-    button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-    return button

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime
 
-from PySide6.QtCore import (
-    Qt,
-    Signal,
-)
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QToolButton, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
 
-from app.widgets.actions import make_action
+from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
@@ -110,19 +107,18 @@ def _in_use(entry: Entry) -> Cell:
 
 
 class SessionsBox(QWidget):
-    """A table of sessions, and the actions on the selected one.
+    """A table of sessions, and a button to continue the selected one.
 
-    Signals
-    -------
-    wanted(str)
-        Folder of the session to continue.
+    Parameters
+    ----------
+    on_continue : callable
+        Called with the folder of the session.
     """
 
-    wanted = Signal(str)
-
-    def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
+    def __init__(self, on_continue: Callable[[str], object]) -> None:
+        super().__init__()
         named(self, "sensors.sessions", tr("Sessions"))
+        self._on_continue = on_continue
         self.table = CellsTable(
             "sensors.sessions.table",
             tr("Sessions"),
@@ -131,24 +127,16 @@ class SessionsBox(QWidget):
             lambda session: session.folder,
         )
         self.table.sortByColumn(0, Qt.SortOrder.AscendingOrder)
-        self.table.doubleClicked.connect(lambda _: self._go_on())
+        self.table.doubleClicked.connect(lambda _: self._continue())
         self.table.selectionModel().selectionChanged.connect(self._enable)
-        self.go_on: QAction = make_action(
-            self,
-            "sensors.go_on",
-            tr("&Continue calibration"),
-            self._go_on,
-            icon_name="calibrate",
-            tip=tr("Open the selected session with all its images and decisions"),
+        tip = tr("Open the selected session with all its images and decisions")
+        self.go_on = make_action(
+            self, "sensors.go_on", tr("&Continue calibration"), self._continue, tip=tip
         )
-        button = named(QToolButton(self), "sensors.go_on.button", tr("Continue calibration"))
-        button.setDefaultAction(self.go_on)
-        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        title = PlainLabel(tr("Sessions"), self)
+        title = PlainLabel(tr("Sessions"))
         make_bold(title)
-        title.setBuddy(self.table)
-        vbox(hbox(title, None, button), (self.table, 1), of=self, margins=(0, 6, 0, 0))
+        row = hbox(title, None, action_button(self.go_on))
+        vbox(row, (self.table, 1), of=self, margins=(0, 8, 0, 0))
 
     def set_entries(self, entries: tuple[SessionEntry, ...]) -> None:
         """Show these sessions. The selection is kept."""
@@ -158,7 +146,7 @@ class SessionsBox(QWidget):
     def _enable(self) -> None:
         self.go_on.setEnabled(self.table.chosen() is not None)
 
-    def _go_on(self) -> None:
+    def _continue(self) -> None:
         session = self.table.chosen()
         if session is not None:
-            self.wanted.emit(str(session.folder))
+            self._on_continue(str(session.folder))

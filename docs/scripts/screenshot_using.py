@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QComboBox, QSpinBox
+from PySide6.QtWidgets import QComboBox
 from screenshot_operator import Operator
 
 from app.inspect.page import InspectPage
@@ -91,15 +91,14 @@ def measure(operator: Operator) -> None:
     places = ((1.0, -1.5), (-3.0, 2.0), (3.5, 3.0), (-2.5, -4.0), (0.5, 4.5))
     for number, (x_mm, y_mm) in enumerate(places):
         press_cylinder(operator, press_view, x_mm, y_mm)
-        truth = press_view.panel.truth
+        known = press_view.inspector.reference.known
         if not number:
-            five = truth.known.findText("Cylinder 5", Qt.MatchFlag.MatchContains)
-            truth.known.setCurrentIndex(five)
-            truth.known.activated.emit(truth.known.currentIndex())
+            known.setCurrentIndex(known.findText("Cylinder 5", Qt.MatchFlag.MatchContains))
+            known.activated.emit(known.currentIndex())
             operator.pause(1.0)
             operator.shot("measure")
-        operator.click("measure.keep")
-        operator.until(press_view.panel.kept.text, "the kept measurement")
+        operator.click("measure.keep.button")
+        operator.until(press_view.inspector.message.text, "the kept measurement")
         press_view.release()
     measure_page(operator).tabs.setCurrentWidget(measure_page(operator).results)
     operator.pause(2.0)
@@ -125,26 +124,20 @@ def evaluation(operator: Operator) -> None:
     measure_page(operator).tabs.setCurrentWidget(view)
     operator.pause(1.0)
     operator.shot("evaluation-set-up")
-    for box in view.setup.findChildren(QCheckBox):
-        name = box.objectName()
-        if name in ("protocol.size.3.0", "protocol.size.6.0", "protocol.height.0.5"):
-            box.setChecked(False)
-    for name in ("protocol.repeats", "protocol.regions"):
-        counter = view.setup.findChild(QSpinBox, name)
-        assert counter is not None
-        counter.setValue(1)
+    for row in range(view.setup.objects.count()):
+        view.setup.objects.item(row).setSelected(row in OBJECTS)
+    view.setup.presses.change(repeats=1, regions=1)
     operator.click("protocol.begin", view)
-    operator.until(lambda: view.pressing is not None, "the run")
-    run = view.pressing
-    assert run is not None and view.work is not None
+    operator.until(lambda: view.run is not None, "the run")
+    assert view.run is not None
+    run, work, result = view.run.pressing, view.run.work, view.run.result
     operator.until(lambda: run.live.stream is not None, "the camera")
     run.panel.bench.setChecked(True)
-    work = view.work
-    operator.until(lambda: work.measured_count >= 4, "measured presses")
+    operator.until(lambda: len(work.outcomes) >= 4, "measured presses")
     operator.shot("evaluation-press")
     operator.until(lambda: work.run.next() is None, "all presses")
-    operator.until(lambda: view._stack.currentWidget() is view.result, "the result")
-    operator.until(lambda: "presses" in view.result.verdict.text(), "the evaluation")
+    operator.until(lambda: view._stack.currentWidget() is result, "the result")
+    operator.until(lambda: "presses" in result.verdict.text(), "the evaluation")
     operator.window.context.toasts.clear()
     operator.shot("evaluation-result")
 
@@ -177,4 +170,6 @@ def measure_page(operator: Operator) -> MeasurePage:
     return found
 
 
+OBJECTS = (1, 2, 4, 6, 7, 8)
+"""Rows of the objects that are pressed: those of 4, 5 and 7 mm, and of 0.75 to 1.5 mm height."""
 SCENES = (library, inspect, recording, drift, measure, evaluation)

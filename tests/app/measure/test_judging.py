@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.measure.judging import Stated, judge, record_of
+from app.measure.judging import Reference, quantities_of, record_of
 from app.services.preferences import Limits
-from gelpolight_core.finding import Verdict, doubt
+from gelpolight_core.finding import doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
@@ -43,49 +43,49 @@ APART = ToolResult(Distance((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", 
 
 
 def _record(
-    result: ToolResult, stated: Stated, limits: Limits = DEFAULT_LIMITS
+    result: ToolResult, reference: Reference, limits: Limits = DEFAULT_LIMITS
 ) -> MeasurementRecord:
     flat = np.zeros((2, 2), np.float32)
     axis, flags = np.arange(2.0), flat.astype(np.uint8)
     heightmap = HeightMap(flat, axis, axis, 1.0, None, flags, "A-1", "full", "p.png")
     return record_of(
-        result, stated, heightmap, limits=limits, serial="A", operator="Ada", note="by hand"
+        result, reference, heightmap, limits=limits, serial="A", operator="Ada", note="by hand"
     )
 
 
 @given(size=LENGTHS, height=LENGTHS)
 def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
     found = compare(FIT, Truth("cylinder", size, height))
-    rows = judge(PRESSED, Stated(size, height), Limits())
-    assert [row.value for row in rows] == [length.error_percent for length in found]
-    record = _record(PRESSED, Stated(size, height))
-    assert [q.error_percent for q in record.quantities] == [row.value for row in rows]
+    record = _record(PRESSED, Reference(size, height))
+    assert [q.error_percent for q in record.quantities] == [q.error_percent for q in found]
     assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
 
 
 def test_only_what_is_known_is_judged() -> None:
-    assert judge(PRESSED, Stated(), Limits()) == ()
-    (row,) = judge(PRESSED, Stated(size_mm=5.0), Limits())
-    assert (row.key, row.fail_limit) == ("diameter_mm", 5.0)
-    (row,) = judge(PRESSED, Stated(height_mm=1.0), Limits())
-    assert (row.key, row.fail_limit) == ("height_mm", 8.0)
-    (row,) = judge(APART, Stated(size_mm=2.0), Limits())
-    assert row.value == pytest.approx(50.0)
-    assert row.verdict is Verdict.FAIL
+    def limits(result: ToolResult, reference: Reference) -> dict[str, float | None]:
+        found = quantities_of(result, reference, Limits())
+        return {q.name: q.limit_percent for q in found if q.passed is not None}
+
+    assert limits(PRESSED, Reference()) == {}
+    assert limits(PRESSED, Reference(size_mm=5.0)) == {"diameter_mm": 5.0}
+    assert limits(PRESSED, Reference(height_mm=1.0)) == {"height_mm": 8.0}
+    (apart,) = quantities_of(APART, Reference(size_mm=2.0), Limits())
+    assert apart.error_percent == pytest.approx(50.0)
+    assert apart.passed is False
 
 
 def test_the_verdict_follows_the_limits() -> None:
-    stated = Stated(5.0, 1.0)
-    assert _record(PRESSED, stated).verdict == PASSED
+    reference = Reference(5.0, 1.0)
+    assert _record(PRESSED, reference).verdict == PASSED
     strict = Limits(size_percent=1.0)
-    assert _record(PRESSED, stated, strict).verdict == FAILED
+    assert _record(PRESSED, reference, strict).verdict == FAILED
     doubtful = replace(PRESSED, findings=(doubt("cut", "cut"),))
-    assert _record(doubtful, stated).verdict == DOUBTFUL
-    assert _record(PRESSED, Stated()).verdict == UNJUDGED
+    assert _record(doubtful, reference).verdict == DOUBTFUL
+    assert _record(PRESSED, Reference()).verdict == UNJUDGED
 
 
 def test_a_record_contains_object_calibration_and_operator() -> None:
-    record = _record(APART, Stated(size_mm=3.01, name="Gauge"))
+    record = _record(APART, Reference(size_mm=3.01, name="Gauge"))
     assert (record.serial, record.calibration_id, record.picture) == ("A", "A-1", "p.png")
     assert (record.operator, record.note) == ("Ada", "by hand")
     assert record.settings["tool"] == {"tool": "distance", "a_mm": [0.0, 0.0], "b_mm": [3.0, 0.0]}

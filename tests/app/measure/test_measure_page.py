@@ -21,12 +21,12 @@ from pytestqt.qtbot import QtBot
 from app.command_line.main import main
 from app.context.context import AppContext
 from app.measure.grips import grips_of
-from app.measure.judging import Stated
+from app.measure.judging import Reference
 from app.measure.page import MeasurePage
 from app.services.preferences import Limits
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.measurement.quantity import Quantity
-from gelpolight_core.measurement.tools import tool_from_dict
+from gelpolight_core.measurement.tools import Distance, tool_from_dict
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
@@ -101,8 +101,8 @@ def _kept(page: MeasurePage, qtbot: QtBot, count: int) -> None:
 
 def test_without_a_calibration_the_page_shows_what_to_do(page: MeasurePage) -> None:
     assert "calibration" in page.press_view.banner.findChild(object, "inspect.advice").text()
-    assert not page.press_view.map.tools.buttons["distance"].isEnabled()
-    assert not page.press_view.panel.keep.isEnabled()
+    assert not page.press_view.palette_.buttons["distance"].isEnabled()
+    assert not page.press_view.save_action.isEnabled()
     assert page.results.stack.currentIndex() == 0
 
 
@@ -132,9 +132,11 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     press_view = page.press_view
     assert press_view.work.tool.name == "cylinder"
     true = _true(press)
-    press_view.panel.truth.state(Stated(float(true["diameter_mm"]), float(true["height_mm"])))
-    press_view.panel.operator.setText("Ada")
-    press_view.panel.note.setText("on the bench")
+    press_view.inspector.reference.state(
+        Reference(float(true["diameter_mm"]), float(true["height_mm"]))
+    )
+    press_view.inspector.operator.setText("Ada")
+    press_view.inspector.note.setText("on the bench")
     press_view.keep()
     _kept(page, qtbot, 1)
 
@@ -157,10 +159,11 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     used = read_calibration(calibration_file)
     assert known == (used.identity, "full", used.provenance.created, used.verdict.value)
 
-    # The limits of the user are saved and applied at once.
-    page._keep_limits(Limits(size_percent=0.001))
-    assert "outside" in press_view.panel.truth.verdict.text()
-    assert context.settings.limits.size_percent == 0.001
+    # Other limits of the user apply at once.
+    assert press_view.state.rows[0].role == "pass"
+    context.settings.limits = Limits(size_percent=0.001)
+    context.requests.preferences_changed.emit()
+    assert press_view.state.rows[0].role == "fail"
 
     again = _open(context)
     _kept(again, qtbot, 1)
@@ -180,14 +183,14 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     page.open_path(press)
     work, tool_map = page.press_view.work, page.press_view.map
     qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
-    tool_map.tools.buttons["distance"].click()
-    tool_map.layer.clicked.emit(-2.0, 0.0)
-    tool_map.layer.clicked.emit(2.0, 0.0)
+    page.press_view.palette_.buttons["distance"].click()
+    tool_map.on_point((-2.0, 0.0))
+    tool_map.on_point((2.0, 0.0))
     _measured(page, qtbot)
     assert work.result.figures[0].value == pytest.approx(4.0)
 
     # Three key moves of one end are one undo step.
-    tool_map._next_grip(1)
+    tool_map.choose_next_grip(1)
     for _ in range(3):
         qtbot.keyClick(tool_map, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
     _measured(page, qtbot)
@@ -198,8 +201,8 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     work.undo.redo()
     assert grips_of(work.tool)[1].at_mm == pytest.approx((2.6, 0.0))
 
-    tool_map.layer.dragged.emit("a", -1.0, 0.0)
-    tool_map.layer.dropped.emit("a", -1.4, 0.0)
+    tool_map.on_drag("a", (-1.0, 0.0), ended=False)
+    tool_map.on_drag("a", (-1.4, 0.0), ended=True)
     _measured(page, qtbot)
     assert work.result.figures[0].value == pytest.approx(4.0)
     qtbot.keyClick(tool_map, Qt.Key.Key_Delete)
@@ -207,39 +210,28 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     work.undo.undo()
     assert len(work.sheet) == 1
 
-    # With the keyboard only: choose a tool, place it in the middle, cancel another one.
-    tool_map.tools.buttons["rectangle"].click()
-    qtbot.keyClick(tool_map, Qt.Key.Key_Return)
-    assert [tool.name for tool in work.sheet.values()] == ["distance", "rectangle"]
-    tool_map.tools.buttons["angle"].click()
-    qtbot.keyClick(tool_map, Qt.Key.Key_Escape)
-    assert not any(b.isChecked() for b in tool_map.tools.buttons.values())
-    _measured(page, qtbot)
-
-
-@pytest.mark.usefixtures("library")
-@pytest.mark.parametrize(
-    ("kind", "quantity", "value"),
-    [("angle", "angle_deg", 45.0)],
-)
-def test_a_tool_of_three_points_is_placed_by_clicks_and_saved(
-    page: MeasurePage, qtbot: QtBot, press: Path, kind: str, quantity: str, value: float
-) -> None:
-    page.open_path(press)
-    work, tool_map = page.press_view.work, page.press_view.map
-    qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
-    tool_map.tools.buttons[kind].click()
-    for x, y in ((2.0, 0.0), (0.0, 0.0), (2.0, 2.0)):
-        tool_map.layer.clicked.emit(x, y)
+    # A tool of three points is saved with its quantity, and as commands read it.
+    page.press_view.palette_.buttons["angle"].click()
+    for point in ((2.0, 0.0), (0.0, 0.0), (2.0, 2.0)):
+        tool_map.on_point(point)
     _measured(page, qtbot)
     page.press_view.keep()
     _kept(page, qtbot, 1)
     (record,) = page.book.records
     first = record.quantities[0]
-    assert first.name == quantity
-    assert first.value == pytest.approx(value)
+    assert (first.name, first.value) == ("angle_deg", pytest.approx(45.0))
     assert first.sd is not None and first.sd > 0.0
     assert tool_from_dict(record.settings["tool"]) == work.tool
+    work.remove(work.chosen)
+
+    # With the keyboard only: choose a tool, place it in the middle, cancel another one.
+    page.press_view.palette_.buttons["rectangle"].click()
+    qtbot.keyClick(tool_map, Qt.Key.Key_Return)
+    assert [tool.name for tool in work.sheet.values()] == ["distance", "rectangle"]
+    page.press_view.palette_.buttons["angle"].click()
+    qtbot.keyClick(tool_map, Qt.Key.Key_Escape)
+    assert not any(b.isChecked() for b in page.press_view.palette_.buttons.values())
+    _measured(page, qtbot)
 
 
 @pytest.mark.usefixtures("library")
@@ -283,7 +275,7 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     page.open_path(wrong)
     advice = page.press_view.banner.findChild(object, "inspect.advice")
     qtbot.waitUntil(lambda: "64x48" in advice.text(), timeout=PATIENCE_MS)
-    assert not page.press_view.panel.keep.isEnabled()
+    assert not page.press_view.save_action.isEnabled()
 
     dropped = QMimeData()
     dropped.setUrls([QUrl.fromLocalFile(str(press))])
@@ -313,7 +305,7 @@ def test_a_steady_press_is_frozen_and_detected_automatically(
     context.source.choose(info)
     _measured(page, qtbot)
     press_view = page.press_view
-    assert press_view.freeze_action.isChecked()
+    assert press_view.state.frozen
     assert press_view.work.tool.name == "cylinder"
     held = press_view.work.result.measurement.as_json()
 
@@ -325,7 +317,42 @@ def test_a_steady_press_is_frozen_and_detected_automatically(
 
     press_view.freeze_action.trigger()
     assert press_view.work.image is None
-    assert not press_view.panel.keep.isEnabled()
+    assert not press_view.save_action.isEnabled()
+
+
+@pytest.mark.usefixtures("library")
+def test_the_next_object_is_followed_or_the_image_is_said_to_be_earlier(
+    page: MeasurePage, context: AppContext, qtbot: QtBot, press: Path, tmp_path: Path
+) -> None:
+    from app.sources.listing import image_folder
+
+    press_view, work = page.press_view, page.press_view.work
+    folders = {}
+    for kind in ("cylinder", "cuboid"):
+        folders[kind] = tmp_path / kind
+        folders[kind].mkdir()
+        shutil.copy(next(press.parent.glob(f"{kind}*.png")), folders[kind])
+    context.source.choose(image_folder(folders["cylinder"]))
+    _measured(page, qtbot)
+    first = work.image
+    context.source.choose(image_folder(folders["cuboid"]))
+    qtbot.waitUntil(lambda: work.image is not first, timeout=PATIENCE_MS)
+    _measured(page, qtbot)
+    assert work.tool.name == "cuboid"
+
+    # A tool placed by hand is not lost: the image stays, and is said to be an earlier one.
+    work.add(Distance((-2.0, 0.0), (2.0, 0.0)))
+    _measured(page, qtbot)
+    second = work.image
+    context.source.choose(image_folder(folders["cylinder"]))
+    qtbot.waitUntil(lambda: press_view.state.earlier, timeout=PATIENCE_MS)
+    assert work.image is second
+    assert "earlier" in press_view.save_action.text()
+    assert "earlier" in press_view.banner.findChild(object, "inspect.advice").text()
+    press_view.detect_action.trigger()
+    assert work.image is not second and not press_view.state.earlier
+    _measured(page, qtbot)
+    assert [tool.name for tool in work.sheet.values()] == ["cylinder"]
 
 
 @pytest.mark.usefixtures("library")
@@ -337,7 +364,7 @@ def test_a_recording_can_be_measured_frame_by_frame(
     with RecordingWriter(path, RecordingHeader(serial="virtual-1")) as writer:
         for number in range(4):
             writer.append(rgb, number, 100.0 + 0.05 * number)
-    page.press_view.auto.setChecked(False)
+    page.press_view.inspector.auto.setChecked(False)
     page.open_path(path)
     press_view = page.press_view
     qtbot.waitUntil(lambda: press_view.replay.isVisible(), timeout=PATIENCE_MS)
@@ -359,7 +386,7 @@ def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(
     book.remove((book.records[0].id,))
     _kept(page, qtbot, 0)
     refused: list[str] = []
-    book.refused.connect(refused.append)
+    book.noticed.connect(refused.append)
     waiting = threading.Event()
 
     def wait(_records: Records) -> None:

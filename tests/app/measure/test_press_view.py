@@ -13,7 +13,6 @@ from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.measure.press_view import PressView
-from app.measure.tool_layer import DrawnTool
 from app.services.jobs import Jobs
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.measurement.tools import Distance
@@ -31,7 +30,9 @@ def press_view(
     """Return the visible view, with the small sensor's calibration in use."""
     _use(context, small_calibration, tmp_path / "small.gplcal")
     jobs = Jobs("desk")
-    made = PressView(jobs, context=context)
+    made = PressView(
+        jobs, on_save=print, on_edit=lambda: None, on_records=lambda: None, context=context
+    )
     made.show()
     made.enter()
     yield made
@@ -55,17 +56,15 @@ def _press(session: Path) -> Path:
 def test_without_a_calibration_nothing_of_the_last_one_stays_on_the_map(
     press_view: PressView, context: AppContext, small_session: Path, qtbot: QtBot
 ) -> None:
-    drawn: list[tuple[DrawnTool, ...]] = []
-    press_view.map.drawn.connect(lambda tools, _chosen: drawn.append(tools))
     press_view.open_file(_press(small_session))
     qtbot.waitUntil(lambda: press_view.work.heightmap is not None, timeout=PATIENCE_MS)
     press_view.work.add(Distance((-2.0, 0.0), (2.0, 0.0)))
     qtbot.waitUntil(lambda: press_view.work.result is not None, timeout=PATIENCE_MS)
-    assert drawn[-1][0].text
+    assert press_view.map.drawn[0].text
     assert press_view.map.view.has_image
     context.workspace.use(None)
     context.requests.calibrations_changed.emit()
-    assert [tool.text for tool in drawn[-1]] == [""]
+    assert [tool.text for tool in press_view.map.drawn] == [""]
     assert not press_view.map.view.has_image
 
 
@@ -83,7 +82,7 @@ def test_a_frozen_frame_is_not_measured_with_another_sensors_calibration(
     with RecordingWriter(path, RecordingHeader(serial=serial)) as writer:
         for number in range(4):
             writer.append(rgb, number, 100.0 + 0.05 * number)
-    press_view.auto.setChecked(False)
+    press_view.inspector.auto.setChecked(False)
     press_view.open_file(path)
     qtbot.waitUntil(press_view.freeze_action.isEnabled, timeout=PATIENCE_MS)
     press_view.freeze()

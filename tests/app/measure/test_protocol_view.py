@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scene
 from protocol_camera import SceneCamera, image
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 from report_pdf import report_data
@@ -17,6 +18,7 @@ from report_pdf import report_data
 from app.command_line.main import main
 from app.context.context import AppContext
 from app.measure.press_check import TOLERANCE_MM, PressCheck, make_target
+from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_press import BenchHand
 from app.measure.protocol_view import ProtocolView
 from app.services.preferences import Limits
@@ -101,8 +103,16 @@ def camera(context: AppContext) -> SceneCamera:
 
 
 @pytest.fixture
-def view(context: AppContext, camera: SceneCamera, qtbot: QtBot) -> Iterator[ProtocolView]:
-    made = ProtocolView(context=context)
+def kept() -> list[MeasurementRecord]:
+    """Return the records of complete runs."""
+    return []
+
+
+@pytest.fixture
+def view(
+    context: AppContext, camera: SceneCamera, kept: list[MeasurementRecord], qtbot: QtBot
+) -> Iterator[ProtocolView]:
+    made = ProtocolView(kept.append, context=context)
     made.resize(1280, 800)
     made.show()
     made.enter()
@@ -113,27 +123,26 @@ def view(context: AppContext, camera: SceneCamera, qtbot: QtBot) -> Iterator[Pro
     made.deleteLater()
 
 
-def choose(view: ProtocolView, *, repeats: int, regions: int = 0) -> None:
-    """Select only a cylinder of 5 mm and 0.5 mm height."""
-    for boxes, kept in (
-        (view.setup.shapes, "cylinder"),
-        (view.setup.sizes, None),
-        (view.setup.heights, 0.5),
-    ):
-        for value, box in boxes.items():
-            box.setChecked(value == kept)
-    view.setup.repeats.setValue(repeats)
-    view.setup.regions.setValue(regions)
+def choose(view: ProtocolView, qtbot: QtBot, *, repeats: int, regions: int = 0) -> None:
+    """Select only a cylinder of 5 mm and 0.5 mm height: a click, and a choice of the shape."""
+    objects = view.setup.objects
+    (item,) = objects.findItems("5 mm, height 0.5 mm", Qt.MatchFlag.MatchExactly)
+    qtbot.mouseClick(
+        objects.viewport(), Qt.MouseButton.LeftButton, pos=objects.visualItemRect(item).center()
+    )
+    view.setup.presses.change(shape="cylinder", repeats=repeats, regions=regions)
 
 
-def begin(view: ProtocolView, qtbot: QtBot) -> None:
+def begin(view: ProtocolView, qtbot: QtBot) -> RunPanel:
+    """Start a run. Return its panel, which asks for the bare membrane."""
     view.setup.begin.click()
-    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
-    take_bare(view, qtbot)
+    qtbot.waitUntil(lambda: view.run is not None, timeout=WAIT_MS)
+    panel = view.run.pressing.panel
+    qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
+    return panel
 
 
-def take_bare(view: ProtocolView, qtbot: QtBot) -> None:
-    panel = view.pressing.panel
+def take_bare(panel: RunPanel, qtbot: QtBot) -> None:
     qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
     panel.bare.click()
     qtbot.waitUntil(panel.capture.isEnabled, timeout=WAIT_MS)
@@ -141,37 +150,34 @@ def take_bare(view: ProtocolView, qtbot: QtBot) -> None:
 
 def wait_until_asked(view: ProtocolView, qtbot: QtBot) -> None:
     """Wait until the program has captured the bare membrane and requests a press."""
-    live = view.pressing.panel.live
+    live = view.run.pressing.panel.live
     qtbot.waitUntil(lambda: live.text().startswith("Press the object in"), timeout=WAIT_MS)
 
 
 def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
     """Press at the mark, wait until it is captured, and lift."""
     wait_until_asked(view, qtbot)
-    run = view.work.run
+    run = view.run.work.run
     before, wanted = run.progress.done, run.next()
     camera.press(wanted.position_mm)
     qtbot.waitUntil(lambda: run.progress.done == before + 1, timeout=WAIT_MS)
     camera.press(None)
 
 
-def test_the_number_of_presses_is_shown_before_the_start(view: ProtocolView) -> None:
+def test_the_number_of_presses_is_shown_before_the_start(view: ProtocolView, qtbot: QtBot) -> None:
     assert "Objects: 18. Presses: 540" in view.setup.summary.text()
-    choose(view, repeats=2, regions=3)
+    choose(view, qtbot, repeats=2, regions=3)
     assert "Objects: 1. Presses: 5" in view.setup.summary.text()
-    choose(view, repeats=0)
+    choose(view, qtbot, repeats=0)
     assert not view.setup.begin.isEnabled()
 
 
 def test_a_membrane_with_an_object_on_it_is_not_accepted_as_bare(
     view: ProtocolView, camera: SceneCamera, qtbot: QtBot
 ) -> None:
-    choose(view, repeats=1, regions=1)
+    choose(view, qtbot, repeats=1, regions=1)
     camera.press((0.0, 0.0))
-    view.setup.begin.click()
-    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
-    panel = view.pressing.panel
-    qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
+    panel = begin(view, qtbot)
     panel.bare.click()
     qtbot.waitUntil(
         lambda: panel.live.text().startswith("Something presses on the membrane"), timeout=WAIT_MS
@@ -179,50 +185,53 @@ def test_a_membrane_with_an_object_on_it_is_not_accepted_as_bare(
     assert not panel.capture.isEnabled()
     camera.press(None)
     qtbot.wait(100)  # the frames with the object have passed
-    take_bare(view, qtbot)
+    take_bare(panel, qtbot)
     assert panel.bare.isVisible()  # if that was wrong after all, it can be done again
 
 
 def test_presses_are_captured_automatically_continued_and_reported(
-    view: ProtocolView, camera: SceneCamera, context: AppContext, qtbot: QtBot, tmp_path: Path
+    view: ProtocolView,
+    camera: SceneCamera,
+    kept: list[MeasurementRecord],
+    context: AppContext,
+    qtbot: QtBot,
+    tmp_path: Path,
 ) -> None:
-    choose(view, repeats=1, regions=1)
-    begin(view, qtbot)
-    assert view.pressing.panel.title.text() == "Cylinder 5 mm, height 0.5 mm"
+    choose(view, qtbot, repeats=1, regions=1)
+    take_bare(begin(view, qtbot), qtbot)
+    assert view.run.pressing.panel.title.text() == "Cylinder 5 mm, height 0.5 mm"
     press_next(view, camera, qtbot)
-    folder = view.work.run.folder
-    assert view.pressing.panel.where.text().startswith("Random region 1")
+    folder = view.run.work.run.folder
+    assert view.run.pressing.panel.where.text().startswith("Random region 1")
 
-    view.pressing.panel.leave.click()
-    assert view.work is None
+    view.run.pressing.panel.leave.click()
+    assert view.run is None
     again = view.findChild(QPushButton, "protocol.run.0")
     assert "1 of 2 presses" in again.text()
     with RunLock(folder):  # like another program
         again.click()
         qtbot.waitUntil(lambda: "written by" in view.setup.problem.text(), timeout=WAIT_MS)
-    kept: list[MeasurementRecord] = []
-    view.completed.connect(kept.append)
     view.findChild(QPushButton, "protocol.run.0").click()
-    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
-    assert view.work.run.folder == folder
-    take_bare(view, qtbot)
+    qtbot.waitUntil(lambda: view.run is not None, timeout=WAIT_MS)
+    assert view.run.work.run.folder == folder
+    take_bare(view.run.pressing.panel, qtbot)
     context.settings.limits = Limits(size_percent=1e-6, height_percent=1e-6)
     press_next(view, camera, qtbot)
 
     # The last press shows the result automatically.
-    qtbot.waitUntil(lambda: "all 2 presses" in view.result.verdict.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "all 2 presses" in view.run.result.verdict.text(), timeout=WAIT_MS)
     assert [(r.shape, r.picture, r.serial) for r in kept] == [
-        ("evaluation", str(folder), view.work.run.content.serial)
+        ("evaluation", str(folder), view.run.work.run.content.serial)
     ]
     context.settings.limits = Limits()
-    view.result.save(folder / "report")
+    view.run.result.save(folder / "report")
     qtbot.waitUntil((folder / "report" / "gauge.csv").is_file, timeout=WAIT_MS)
     names = {path.suffix for path in (folder / "report").iterdir()}
     assert {".csv", ".json", ".pdf"} <= names
 
     # The report uses the limits that were shown, not the present ones.
     assert context.settings.limits == Limits()
-    assert "Fail (" in view.result.verdict.text()
+    assert "Fail (" in view.run.result.verdict.text()
     assert report_data(folder / "report" / "evaluation.pdf")["verdict"] == "fail"
 
     calibration = context.workspace.entries()[0].path
@@ -235,9 +244,10 @@ def test_presses_are_captured_automatically_continued_and_reported(
 def test_an_unsteady_press_is_refused_with_its_reason_and_requested_again(
     view: ProtocolView, camera: SceneCamera, qtbot: QtBot
 ) -> None:
-    choose(view, repeats=2)
-    begin(view, qtbot)
-    run, panel = view.work.run, view.pressing.panel
+    choose(view, qtbot, repeats=2)
+    panel = begin(view, qtbot)
+    take_bare(panel, qtbot)
+    run = view.run.work.run
     wait_until_asked(view, qtbot)
     camera.shaking = True
     camera.press(run.next().position_mm)
@@ -260,12 +270,9 @@ def test_an_unsteady_press_is_refused_with_its_reason_and_requested_again(
 def test_a_camera_of_another_size_is_refused_before_anything_is_pressed(
     view: ProtocolView, camera: SceneCamera, qtbot: QtBot
 ) -> None:
-    choose(view, repeats=1)
+    choose(view, qtbot, repeats=1)
     camera.cropped = True
-    view.setup.begin.click()
-    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
-    panel = view.pressing.panel
-    qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
+    panel = begin(view, qtbot)
     panel.bare.click()
     sizes = "160x240", "320x240"
     qtbot.waitUntil(lambda: all(s in panel.live.text() for s in sizes), timeout=WAIT_MS)

@@ -13,7 +13,9 @@ from app.measure.figures_text import value_text
 from app.measure.grips import Point, grips_of, moved
 from app.measure.placing import first_points, kinds, make_tool
 from app.measure.steady import SteadyPress
+from app.sources.source import Frame
 from gelpolight_core.measurement.tools import tool_as_dict, tool_from_dict
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 KINDS = st.sampled_from([kind.name for kind in kinds()])
 PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
@@ -66,18 +68,36 @@ def test_a_figure_has_no_more_digits_than_its_standard_deviation_allows(
     assert value_text(value, sd, unit) == text
 
 
-def _dome(depth_mm: float) -> np.ndarray:
-    y, x = np.mgrid[-120:121, -120:121] / 20.0
-    return np.maximum(depth_mm * (1.0 - (x**2 + y**2) / 9.0), 0.0).astype(np.float32)
+AXIS = np.arange(-120, 121) / 20.0
+
+
+def _shown(depth_mm: float, time_s: float, seed: int) -> tuple[Frame, HeightMap]:
+    """Return a frame with a round press, and its depth."""
+    radius = np.hypot(*np.meshgrid(AXIS, AXIS))
+    dome = np.maximum(depth_mm * (1.0 - radius**2 / 9.0), 0.0).astype(np.float32)
+    light = 120.0 + 80.0 * np.gradient(dome, axis=1) * 20.0
+    noise = np.random.default_rng(seed).standard_normal((*light.shape, 3))
+    rgb = np.clip(np.rint(light[..., None] + noise), 0, 255).astype(np.uint8)
+    flags = np.zeros_like(dome, np.uint8)
+    heightmap = HeightMap(dome, AXIS, AXIS, 0.05, None, flags, "A", "full", "")
+    return Frame(rgb, seed, time_s), heightmap
 
 
 def test_a_press_is_frozen_once_when_steady_and_again_after_it_moved() -> None:
     watch = SteadyPress()
-    held = [watch.update(_dome(0.1 * k), 0.03 * k) for k in range(11)]
-    assert not any(held)
-    rest = [watch.update(_dome(1.0), 0.4 + 0.05 * k) for k in range(40)]
+
+    def held(depths: list[float], start_s: float) -> list[bool]:
+        shown = (
+            _shown(depth, start_s + 0.15 * k, round(100 * start_s) + k)
+            for k, depth in enumerate(depths)
+        )
+        return [watch.update(*one) for one in shown]
+
+    assert not any(held([0.1 * k for k in range(11)], 0.0))
+    rest = held([1.0] * 12, 2.0)
     assert rest.count(True) == 1
-    assert 0.3 <= 0.05 * rest.index(True) <= 0.6
-    watch.update(_dome(0.5), 3.0)
-    again = [watch.update(_dome(0.5), 3.1 + 0.05 * k) for k in range(40)]
-    assert again.count(True) == 1
+    assert rest.index(True) < 8
+    watch.hold(_shown(1.0, 4.0, 1)[0])
+    assert not any(held([1.0] * 8, 4.0)) and not watch.other
+    assert not any(held([0.0] * 8, 6.0)) and watch.other
+    assert held([0.5] * 8, 8.0).count(True) == 1

@@ -1,0 +1,162 @@
+"""The inspector: what was measured beside its reference, and the buttons at their fixed places."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QLabel, QLineEdit, QProgressBar, QWidget
+
+from app.measure.record_table import VERDICTS, verdict_word
+from app.measure.reference_form import ReferenceForm
+from app.measure.state import PressState, Row
+from app.widgets.actions import action_button
+from app.widgets.buttons import Slot
+from app.widgets.fold import Fold
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.layout import hbox, keep_space, side_panel, vbox
+from app.widgets.meaning import make_bold, show_ground, show_meaning
+from app.widgets.naming import named
+from app.widgets.units import unit_word
+from gelpolight_core.io.user import user_name
+from gelpolight_core.records.entry import UNJUDGED
+from gelpolight_core.translation import tr
+
+NAMES = "measured", "reference", "deviation"
+HEAD = "font-size: 11px; color: @muted"
+
+
+class Inspector(QWidget):
+    """Shows the state of a press.
+
+    Parameters
+    ----------
+    freeze, save : QAction
+        Of the buttons at the lower end.
+    bench : QWidget
+        The controls of the virtual sensor.
+    on_reference, on_edit, on_records : callable
+        Called when the user states another reference, wants to edit the known objects, and wants
+        to see the records.
+    """
+
+    def __init__(
+        self,
+        freeze: QAction,
+        save: QAction,
+        bench: QWidget,
+        *,
+        on_reference: Slot,
+        on_edit: Slot,
+        on_records: Slot,
+    ) -> None:
+        super().__init__()
+        named(self, "measure.panel", tr("Result"))
+        self.title = named(PlainLabel(), "measure.title", tr("Chosen tool"))
+        make_bold(self.title, size=1.5)
+        self.verdict = named(PlainLabel(), "measure.verdict", tr("Verdict"))
+        self.verdict.setStyleSheet("border-radius: 8px; padding: 3px 8px")
+        self.image = named(PlainLabel(wrap=True), "measure.image", tr("Measured image"))
+        show_meaning(self.image, "muted")
+        self.table = named(MarkupLabel(wrap=True), "measure.figures", tr("Figures of the tool"))
+        self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.reason = named(PlainLabel(wrap=True), "measure.reason", tr("Why it is doubtful"))
+        self.reference = ReferenceForm(on_reference, on_edit)
+        self.operator = named(QLineEdit(user_name()), "measure.operator", tr("Operator"))
+        self.note = named(QLineEdit(placeholderText=tr("Any remark")), "measure.note", tr("Note"))
+        remarks = QWidget()
+        form = QFormLayout(remarks)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.addRow(tr("Operator"), self.operator)
+        form.addRow(tr("Note"), self.note)
+        self.bench = Fold("measure.bench", tr("Virtual bench"), bench)
+        self.auto = named(
+            QCheckBox(tr("Freeze when steady")), "measure.auto",
+            tr("Freeze the image and detect the object when a press is steady"),
+        )  # fmt: skip
+        self.auto.setChecked(True)
+        self.busy = named(QProgressBar(), "measure.busy", tr("Measuring"))
+        self.busy.setRange(0, 0)
+        self.busy.setFixedHeight(4)
+        self.busy.setTextVisible(False)
+        keep_space(self.busy)
+        self.message = named(MarkupLabel(wrap=True), "measure.message", tr("Last answer"))
+        self.message.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.message.setFixedHeight(3 * self.message.fontMetrics().lineSpacing())
+        self.message.linkActivated.connect(lambda _link: on_records())
+        heading = QLabel(tr("Reference"))
+        make_bold(heading)
+        head = hbox((self.title, 1), (self.verdict, 0, Qt.AlignmentFlag.AlignTop), spacing=8)
+        self._panel = side_panel(
+            (
+                vbox(head, self.image, spacing=2),
+                self.table,
+                self.reason,
+                vbox(heading, self.reference, spacing=4),
+                Fold("measure.remarks", tr("Operator and note"), remarks),
+                self.bench,
+            ),
+            (
+                self.message,
+                self.busy,
+                self.auto,
+                action_button(freeze),
+                action_button(save, primary=True),
+            ),
+        )
+        vbox(self._panel, of=self, margins=0)
+
+    def set_width(self, width: int) -> None:
+        """Change the width."""
+        self._panel.setFixedWidth(width)
+
+    def show_state(self, state: PressState) -> None:
+        """Show what was measured."""
+        self.title.setText(state.title or (tr("No tool") if state.frozen else tr("Live")))
+        self.image.setText(state.image or tr("Press Space to freeze the image."))
+        judged = state.verdict not in ("", UNJUDGED)
+        self.verdict.setVisible(judged)
+        self.verdict.setText(verdict_word(state.verdict))
+        show_ground(self.verdict, VERDICTS.get(state.verdict, ""))
+        self.table.setText(_table(state.rows))
+        self.reason.setText(state.reason)
+        self.reason.setVisible(bool(state.reason))
+        show_meaning(self.reason, state.role)
+        self.reference.show_state(state)
+        self.busy.setVisible(state.reconstructing or state.detecting)
+
+    def say(self, text: str, role: str = "", *, link: str = "") -> None:
+        """Show an answer of the program, until the next one."""
+        words = escaped(text)
+        if role:
+            words = f"<span style='color:@{role}'>{words}</span>"
+        self.message.setText(f"{words} <a href='#'>{escaped(link)}</a>" if link else words)
+
+
+def _table(rows: tuple[Row, ...]) -> str:
+    if not rows:
+        return ""
+    words = dict(zip(NAMES, (tr("measured"), tr("reference"), tr("deviation")), strict=True))
+    known = any(row.reference for row in rows)
+    heads = [words[name] if known or name == "measured" else "" for name in NAMES]
+    cells = "".join(_cell(f"<span style='{HEAD}'>{escaped(head)}</span>") for head in heads)
+    body = "".join(map(_row, rows))
+    note = escaped(tr("{unit}; ± one standard deviation").format(unit=unit_word()))
+    return (
+        f"<table width='100%' cellspacing='0' cellpadding='1'><tr><td></td>{cells}</tr>{body}"
+        f"</table><span style='color:@muted'>{note}</span>"
+    )
+
+
+def _row(row: Row) -> str:
+    label = f"<td>{escaped(row.label)}</td>"
+    if not row.reference:
+        sd = f"<td colspan='2'><span style='color:@muted'>{row.sd}</span></td>"
+        return f"<tr>{label}{_cell(row.measured)}{sd}</tr>"
+    first = "".join(map(_cell, (row.measured, row.reference, row.deviation)))
+    second = _cell(row.sd, "muted") + _cell("") + _cell(row.percent, row.role)
+    return f"<tr>{label}{first}</tr><tr><td></td>{second}</tr>"
+
+
+def _cell(text: str, role: str = "") -> str:
+    colour = f"color:@{role}" if role else ""
+    return f"<td align='right' style='white-space:nowrap;{colour}'>{text}</td>"

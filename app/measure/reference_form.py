@@ -1,0 +1,135 @@
+"""Asks for the true values of the chosen tool: typed, or those of a known object."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtWidgets import QLabel, QWidget
+
+from app.measure.figures_text import UNITS
+from app.measure.judging import Reference
+from app.measure.state import PressState
+from app.widgets.buttons import Slot, tool_button
+from app.widgets.forms import Form
+from app.widgets.inputs import ComboBox, DoubleSpinBox
+from app.widgets.layout import hbox, vbox
+from app.widgets.naming import named
+from app.workspace.indenters import Indenter
+from gelpolight_core.translation import tr
+
+AGAIN = "\0again"
+"""The entry that states the values of the press before. No name of an object is like it."""
+
+
+class ReferenceForm(QWidget):
+    """The true values.
+
+    Parameters
+    ----------
+    on_changed : callable
+        Called when the user has stated other values.
+    on_edit : callable
+        Called to edit the list of known objects.
+    """
+
+    def __init__(self, on_changed: Slot, on_edit: Slot) -> None:
+        super().__init__()
+        named(self, "measure.reference", tr("Reference"))
+        self._on_changed = on_changed
+        self._kind = ""
+        self._kept: dict[str, Reference] = {}
+        self._before: dict[str, Reference] = {}
+        self._objects: tuple[Indenter, ...] = ()
+        self.known = named(ComboBox(), "measure.reference.known", tr("Known object"))
+        self.known.setMinimumContentsLength(12)
+        self.known.setSizeAdjustPolicy(
+            ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self.known.activated.connect(lambda _index: self._on_known())
+        edit = tool_button(
+            "measure.reference.edit", tr("Edit…"), on_edit, tip=tr("Edit the known objects")
+        )
+        self.form = Form(Reference(), "measure.reference", at_once=True)
+        self.form.changed.connect(lambda _name, _value: self._on_typed())
+        vbox(hbox((self.known, 1), edit, spacing=4), self.form, of=self, margins=0)
+
+    @property
+    def stated(self) -> Reference:
+        """The true values of the chosen tool."""
+        return self.form.value
+
+    def stated_for(self, kind: str) -> Reference:
+        """Return the true values of a kind of tool on this press."""
+        return self.stated if kind == self._kind else self._kept.get(kind, Reference())
+
+    def show_objects(self, objects: tuple[Indenter, ...]) -> None:
+        """Offer these known objects, and use what is corrected in the list."""
+        self._objects = objects
+        for kind, stated in {**self._kept, self._kind: self.stated}.items():
+            if (listed := self._listed(kind, stated.name)) is not None:
+                self._kept[kind] = listed
+                if kind == self._kind:
+                    self.state(listed)
+        self._offer()
+
+    def new_press(self) -> None:
+        """Clear the true values: the next press can be of another object. They are offered."""
+        kept = {**self._kept, self._kind: self.stated}
+        self._before |= {kind: stated for kind, stated in kept.items() if stated != Reference()}
+        self._kept = {}
+        self.state(Reference())
+
+    def show_state(self, state: PressState) -> None:
+        """Ask for the true values of the chosen tool. Those of this press are restored."""
+        if state.kind != self._kind:
+            self._kept[self._kind] = self.stated
+            self._kind = state.kind
+            self.form.show_value(self._kept.get(state.kind, Reference()))
+            self._offer()
+        self.setEnabled(bool(state.kind))
+        self.form.show_row("height_mm", state.has_height)
+        size = self.form.inputs["size_mm"]
+        label = self.form.rows.labelForField(size)
+        if isinstance(label, QLabel) and isinstance(size, DoubleSpinBox):
+            label.setText(state.asked or tr("Size"))
+            size.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
+
+    def state(self, stated: Reference) -> None:
+        """Enter values from code, as if the user had chosen them."""
+        self.form.show_value(stated)
+        self._offer()
+        self._on_changed()
+
+    def _offer(self) -> None:
+        """Show the known objects of the kind, and the values of the press before."""
+        with QSignalBlocker(self.known):
+            self.known.clear()
+            self.known.addItem(tr("No known object"), "")
+            if self._kind in self._before:
+                self.known.addItem(tr("Same as the press before"), AGAIN)
+            for known in self._objects:
+                if known.shape == self._kind:
+                    self.known.addItem(known.name, known.name)
+            self.known.setCurrentIndex(max(self.known.findData(self.stated.name), 0))
+
+    def _listed(self, kind: str, name: str) -> Reference | None:
+        """Return the listed values of an object, or None if it is not in the list."""
+        for known in self._objects:
+            if (known.shape, known.name) == (kind, name):
+                return Reference(known.mean_size_mm, known.height_mm or 0.0, name)
+        return None
+
+    def _on_known(self) -> None:
+        name = self.known.currentData()
+        if name == AGAIN:
+            self.state(self._before[self._kind])
+        else:
+            self.state(self._listed(self._kind, name) or Reference())
+
+    def _on_typed(self) -> None:
+        """Forget the known object: its values are no longer those."""
+        self.form.value = replace(self.form.value, name="")
+        with QSignalBlocker(self.known):
+            self.known.setCurrentIndex(0)
+        self._on_changed()

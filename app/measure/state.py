@@ -1,0 +1,237 @@
+"""What the Measure page shows of a press, from its work and the reference. Without widgets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from app.live.advice import PREPARING, LiveState, advise
+from app.measure.figures_text import decimals_for, unit_behind, unit_of
+from app.measure.judging import Reference, quantities_of
+from app.measure.placing import INDENTERS, kind_label
+from app.measure.work import Work
+from app.services.preferences import Limits
+from app.widgets.units import length_unit, per_mm
+from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.measurement.statistics import finite_or_none
+from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.records.entry import verdict_of
+from gelpolight_core.translation import tr
+
+FIGURE_SPACE, POINT_SPACE = "\N{FIGURE SPACE}", "\N{PUNCTUATION SPACE}"
+"""As wide as a digit and as the decimal point."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A measured value, its reference and its deviation, as text, lengths in the unit in use."""
+
+    label: str
+    measured: str
+    sd: str
+    reference: str = ""
+    deviation: str = ""
+    percent: str = ""
+    role: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PressState:
+    """What the page shows of a press.
+
+    Attributes
+    ----------
+    frozen : bool
+        Whether an image is frozen or opened.
+    earlier : bool
+        Whether the sensor shows another press than the frozen image.
+    measurable : bool
+        Whether there is a height map to measure on.
+    freezable : bool
+        Whether a live height map can be frozen.
+    reconstructing, detecting : bool
+        Work in progress.
+    title, image : str
+        The chosen tool and the name of the image.
+    kind, asked, unit : str
+        Name of the chosen tool, and the figure that has a reference. Empty if there is none.
+    verdict : str
+        As of a record. Empty without a result.
+    rows : tuple of Row
+        The figures of the chosen tool.
+    reason, role : str
+        Why there is no result or a doubtful one, and the meaning of the text.
+    """
+
+    frozen: bool
+    earlier: bool
+    measurable: bool
+    freezable: bool
+    reconstructing: bool
+    detecting: bool
+    title: str = ""
+    image: str = ""
+    kind: str = ""
+    asked: str = ""
+    unit: str = "mm"
+    verdict: str = ""
+    rows: tuple[Row, ...] = ()
+    reason: str = ""
+    role: str = "muted"
+
+    @property
+    def savable(self) -> bool:
+        """Whether there is a result to save."""
+        return bool(self.rows)
+
+    @property
+    def has_height(self) -> bool:
+        """Whether the reference has a height, too."""
+        return self.kind in INDENTERS
+
+
+def resolve(
+    work: Work, reference: Reference, limits: Limits, *, freezable: bool, earlier: bool
+) -> PressState:
+    """Return what the page shows.
+
+    Parameters
+    ----------
+    work : Work
+        The image and the tools on it.
+    reference : Reference
+        The true values of the chosen tool.
+    limits : Limits
+        Limits of the verdict.
+    freezable, earlier : bool
+        As in the state.
+    """
+    tool, found = work.tool, work.results.get(work.chosen)
+    state = PressState(
+        frozen=work.image is not None,
+        earlier=earlier,
+        measurable=work.heightmap is not None or freezable,
+        freezable=freezable,
+        reconstructing=work.image is not None and work.heightmap is None and work.busy,
+        detecting=work.detecting,
+        image="" if work.image is None else work.image.name,
+        title="" if tool is None else kind_label(tool.name),
+        kind="" if tool is None else tool.name,
+    )
+    if isinstance(found, ToolResult):
+        first = found.figures[0]
+        asked = tr("mean side") if found.tool.name == "cuboid" else first.label
+        state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
+        if found.tool == tool:
+            return _with_result(state, found, quantities_of(found, reference, limits))
+    if isinstance(found, str):
+        return replace(state, reason=found, role="fail")
+    return replace(state, reason=tr("Measuring…") if tool and state.measurable else "")
+
+
+def _with_result(
+    state: PressState, result: ToolResult, quantities: tuple[Quantity, ...]
+) -> PressState:
+    doubtful = result.verdict != "ok"
+    return replace(
+        state,
+        verdict=verdict_of(quantities, doubtful=doubtful),
+        rows=tuple(_aligned([_row(*named) for named in _named(result, quantities)])),
+        reason=tr("Doubtful: {reason}").format(reason=result.reason) if doubtful else "",
+        role="warn" if doubtful else "muted",
+    )
+
+
+def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tuple[str, Quantity]]:
+    """Return each figure of a result with its label: with its reference, if there is one."""
+    known = {quantity.name: quantity for quantity in quantities}
+    for figure in result.figures:
+        name = f"{figure.name}_{figure.unit}"
+        if (quantity := known.pop(name, None)) is None:
+            sd = None if figure.sd is None else finite_or_none(figure.sd)
+            quantity = Quantity(name, figure.value, sd)
+        yield figure.label, quantity
+    yield from ((tr("mean side"), rest) for rest in known.values() if rest.truth is not None)
+
+
+def _row(label: str, quantity: Quantity) -> Row:
+    unit, factor = unit_of(quantity.name), 1.0
+    if unit == "mm":
+        unit, factor = length_unit(), per_mm()
+    sd = None if quantity.sd is None else factor * quantity.sd
+    digits = decimals_for(sd, unit)
+    behind = "" if unit == length_unit() else f" ({unit_behind(unit).strip()})"
+    row = Row(
+        label[:1].upper() + label[1:] + behind,
+        f"{factor * quantity.value:.{digits}f}",
+        "" if sd is None else f"± {sd:.{digits}f}",
+    )
+    if quantity.truth is None or quantity.error is None or quantity.error_percent is None:
+        return row
+    return replace(
+        row,
+        reference=f"{factor * quantity.truth:.{digits}f}",
+        deviation=f"{factor * quantity.error:+.{digits}f}",
+        percent=f"{quantity.error_percent:+.2f} %",
+        role={True: "pass", False: "fail", None: ""}[quantity.passed],
+    )
+
+
+def _aligned(rows: list[Row]) -> Iterator[Row]:
+    """Return rows whose numbers have their points one below the other, if they end together."""
+    most = max((_digits(row.measured) for row in rows), default=0)
+    for row in rows:
+        digits = _digits(row.measured)
+        space = FIGURE_SPACE * (most - digits) + (POINT_SPACE if most and not digits else "")
+        numbers = {
+            name: text + space
+            for name in ("measured", "sd", "reference", "deviation")
+            if (text := getattr(row, name))
+        }
+        yield replace(row, **numbers)
+
+
+def _digits(number: str) -> int:
+    return len(number.partition(".")[2])
+
+
+def advice_of(
+    now: LiveState, state: PressState, *, refused: str, findings: tuple[Finding, ...] = ()
+) -> Finding | None:
+    """Return what to do next.
+
+    Parameters
+    ----------
+    now : LiveState
+        State of the live image.
+    state : PressState
+        What is shown.
+    refused : str
+        Why the frozen image cannot be measured. Empty if it can.
+    findings : tuple of Finding
+        About its height map.
+    """
+    if now.used is None and (state.frozen or not now.kind):
+        if now.reading:
+            return PREPARING
+        text = tr("No calibration is in use. Depth cannot be measured without one.")
+        return Finding("sensors", text)
+    if state.frozen and refused:
+        return Finding("live", refused, verdict=Verdict.FAIL)
+    if state.earlier:
+        text = tr("The image shows an earlier press. The sensor shows another one now.")
+        return Finding("live", text, verdict=Verdict.WARN)
+    if state.frozen:
+        text = " ".join(finding.line for finding in findings)
+        return Finding("height_map", text, verdict=Verdict.WARN) if text else None
+    if not now.kind:
+        text = tr("No camera is selected. Choose one, open an image, or try the virtual sensor.")
+        return Finding("virtual", text)
+    if (live := advise(now)) is not None:
+        return live
+    if now.kind == "virtual":
+        text = tr("Place a ball, cylinder or cuboid on the virtual bench. It is then pressed in.")
+    else:
+        text = tr("Press an object into the membrane and hold it still.")
+    return Finding("press", text)

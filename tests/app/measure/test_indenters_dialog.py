@@ -1,0 +1,32 @@
+"""The list of known objects."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QDialog
+from pytestqt.qtbot import QtBot
+
+from app.measure.indenters_dialog import IndentersDialog
+from app.workspace.indenters import Indenter
+
+BALL = Indenter("Ball 8 mm", "ball", 8.0)
+ROD = Indenter("Rod", "cylinder", 5.0, height_mm=1.0)
+
+
+def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_accepted(
+    qtbot: QtBot,
+) -> None:
+    dialog = IndentersDialog((BALL, ROD))
+    qtbot.addWidget(dialog)
+    dialog.remove()
+    dialog.form.change(size_mm=5.02)
+    dialog.add()
+    dialog.form.change(name="", shape="cuboid", second_mm=4.0)
+    dialog.accept()
+    assert dialog.problem.text() and dialog.result() != QDialog.DialogCode.Accepted
+    dialog.form.change(name="Block")
+    dialog.accept()
+    assert dialog.result() == QDialog.DialogCode.Accepted
+    assert dialog.indenters == (
+        Indenter("Rod", "cylinder", 5.02, height_mm=1.0),
+        Indenter("Block", "cuboid", 5.0, 4.0),
+    )
