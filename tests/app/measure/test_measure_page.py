@@ -9,6 +9,7 @@ import sqlite3
 import threading
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -233,6 +234,13 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     assert not any(b.isChecked() for b in page.press_view.palette_.buttons.values())
     _measured(page, qtbot)
 
+    # Without a calibration nothing of the last one stays on the map.
+    assert tool_map.drawn[0].text
+    page.context.workspace.use(None)
+    page.context.requests.calibrations_changed.emit()
+    assert not any(tool.text for tool in tool_map.drawn)
+    assert not tool_map.view.has_image
+
 
 @pytest.mark.usefixtures("library")
 def test_removed_records_are_restored_by_undo_and_exported_as_csv(
@@ -357,7 +365,12 @@ def test_the_next_object_is_followed_or_the_image_is_said_to_be_earlier(
 
 @pytest.mark.usefixtures("library")
 def test_a_recording_can_be_measured_frame_by_frame(
-    page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
+    page: MeasurePage,
+    context: AppContext,
+    qtbot: QtBot,
+    press: Path,
+    small_calibration: Calibration,
+    tmp_path: Path,
 ) -> None:
     rgb = np.ascontiguousarray(cv2.imread(str(press))[..., ::-1])
     path = tmp_path / "press.gplrec"
@@ -374,6 +387,19 @@ def test_a_recording_can_be_measured_frame_by_frame(
     press_view.replay.findChild(QAction, "replay.on").trigger()
     assert press_view.work.image is None
     qtbot.waitUntil(lambda: press_view.freeze_action.isEnabled(), timeout=PATIENCE_MS)
+
+    # A frozen frame is not measured with another sensor's calibration.
+    press_view.freeze()
+    qtbot.waitUntil(lambda: press_view.work.heightmap is not None, timeout=PATIENCE_MS)
+    other = small_calibration.changed(sensor=replace(small_calibration.data.sensor, serial="B-2"))
+    write_calibration(other, tmp_path / "other.gplcal")
+    context.workspace.use(context.workspace.import_calibration(tmp_path / "other.gplcal"))
+    context.requests.calibrations_changed.emit()
+    qtbot.waitUntil(lambda: "sensor virtual-1" in press_view.work.refused, timeout=PATIENCE_MS)
+    assert press_view.work.heightmap is None
+    assert not press_view.map.view.has_image
+    press_view.release()
+    assert press_view.map.view._words.text() == "No depth yet."
 
 
 def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(

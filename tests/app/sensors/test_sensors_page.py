@@ -80,8 +80,6 @@ def test_an_imported_calibration_is_shown_with_every_stage(
 ) -> None:
     page.open_path(source)
     chosen = page.chosen()
-    assert chosen is not None
-    assert chosen.summary is not None
     shown = [t.objectName() for t in page.findChildren(QualityTableWidget) if t.isVisible()]
     assert shown == [f"sensors.quality.{stage}" for stage in chosen.summary.quality]
     assert "Not validated" in words(page)
@@ -95,7 +93,6 @@ def test_the_details_count_the_measurements_with_the_calibration(
     assert "No measurement was saved" in words(page)
     assert not (context.workspace.folder / NAME).exists()
     chosen = page.chosen()
-    assert chosen is not None and chosen.summary is not None
     for hours in range(3):
         context.workspace.records.add(
             MeasurementRecord(
@@ -115,7 +112,6 @@ def test_using_one_that_is_not_validated_warns(
     page.open_path(source)
     page.use.trigger()
     chosen = page.chosen()
-    assert chosen is not None
     assert chosen.in_use
     assert context.workspace.in_use == chosen.path
     assert not chosen.validated
@@ -153,7 +149,6 @@ def test_a_validated_calibration_is_marked(
 ) -> None:
     page.open_path(source)
     chosen = page.chosen()
-    assert chosen is not None
     passed = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
     identity = scene.calibration().identity
     write_validation(
@@ -166,7 +161,6 @@ def test_a_validated_calibration_is_marked(
     count = len(context.toasts.shown())
     page.use.trigger()
     again = page.chosen()
-    assert again is not None
     assert again.in_use and again.validated
     assert len(context.toasts.shown()) == count
 
@@ -233,7 +227,6 @@ def test_a_broken_file_is_shown_with_its_reason(
     (folder / "half.gplcal").write_bytes(source.read_bytes()[:400])
     page.refresh()
     chosen = page.chosen()
-    assert chosen is not None
     assert chosen.broken
     assert "cannot be read" in words(page)
     assert not page.use.isEnabled()
@@ -243,7 +236,6 @@ def test_a_broken_file_is_shown_with_its_reason(
 def test_an_old_calibration_is_marked(source: Path) -> None:
     entry = read_entry(source)
     made = entry.created
-    assert made is not None
     limit = Limits().age_days
     young = cells_of(entry, made + timedelta(days=limit - 1), limit)
     old = cells_of(entry, made + timedelta(days=limit + 1), limit)
@@ -309,7 +301,6 @@ def test_the_gel_of_a_calibration_is_shown_and_named(
 ) -> None:
     page.open_path(source)
     chosen = page.chosen()
-    assert chosen is not None and chosen.summary is not None
     write_presses({chosen.summary.identity: 12}, context.workspace.folder)
     page.refresh()
     assert page.findChild(QLabel, "sensors.gel.care").text() == presses_text(12)
@@ -320,5 +311,4 @@ def test_the_gel_of_a_calibration_is_shown_and_named(
     qtbot.waitUntil(lambda: read_summary(chosen.path).elastomer == "gel 7", timeout=60_000)
     qtbot.waitUntil(lambda: not page._library.jobs.busy, timeout=60_000)
     again = page.chosen()
-    assert again is not None and again.summary is not None
     assert again.summary.identity == chosen.summary.identity
