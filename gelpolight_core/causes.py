@@ -32,7 +32,12 @@ BALLS = ("lowest_cosine", "press_dirt_percent", "press_radius_percent")
 HEIGHTS = ("ball_height_error_percent", "depth_sd_percent")
 MODEL = ("scatter_percent", "factor_spread_percent", "gloss")
 """Light that no reflectance curve explains: it is fitted as gloss and as an uneven membrane."""
-NAMING = ("background_light_percent", "background_place_percent", "stated_percent")
+NAMING = (
+    "background_light_percent",
+    "background_place_percent",
+    "press_radius_percent",
+    "stated_percent",
+)
 """Findings that name their cause themselves, the first one first."""
 ALSO = ("balls_left_out", "depth_sd_percent", "joint_misfit_percent", "worst_press_ratio")
 """What follows from these, besides what others move."""
@@ -45,7 +50,7 @@ CAUSES = (
     Cause(
         "refractive_index",
         tr("Check the refractive index of the elastomer"),
-        frozenset({*HEIGHTS, "stated_index"}),
+        frozenset({*HEIGHTS, "stated_index", "contact_stretch_percent"}),
     ),
     Cause(
         "thickness",
@@ -54,7 +59,7 @@ CAUSES = (
     ),
     Cause(
         "ball_radius",
-        tr("Check that the radii of the balls are stated, not their diameters"),
+        tr("Check the diameters of the balls (session.toml holds their radii)"),
         frozenset({*BALLS, *HEIGHTS, *MODEL}),
     ),
     Cause(
@@ -80,8 +85,8 @@ CAUSES = (
 )
 
 
-def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]:
-    """Return the remedy of a calibration's most likely cause, and the findings that follow from it.
+def best_cause(quality: Mapping[str, QualityTable]) -> Cause | None:
+    """Return a calibration's most likely cause.
 
     A cause is the better, the more poor findings it moves, less the ones that it would move and
     that are not poor.
@@ -93,17 +98,17 @@ def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]
 
     Returns
     -------
-    remedy : str
-        Empty if no cause explains two findings, or two causes explain them equally well.
-    keys : frozenset of str
-        Findings whose own remedies are not shown.
+    Cause or None
+        None if no cause explains two findings, or two causes explain them equally well. A finding
+        that names its cause itself has its key and its remedy.
     """
     figures = [figure for table in quality.values() for figure in table.figures]
     remedies = {f.key: f.remedy for f in figures if f.verdict is not Verdict.PASS}
     poor = set(remedies)
     for key in NAMING:
-        if key in poor:
-            return remedies[key], frozenset().union(*(c.moves for c in CAUSES), ALSO) - {key}
+        if remedies.get(key):
+            follow = frozenset().union(*(c.moves for c in CAUSES), ALSO) - {key}
+            return Cause(key, remedies[key], follow)
     likely = sorted(
         (
             (2 * len(cause.moves & poor) - len(cause.moves), cause)
@@ -113,8 +118,8 @@ def explained(quality: Mapping[str, QualityTable]) -> tuple[str, frozenset[str]]
         key=lambda ranked: -ranked[0],
     )
     if not likely or (len(likely) > 1 and likely[0][0] == likely[1][0]):
-        return "", frozenset()
-    return likely[0][1].remedy, likely[0][1].moves
+        return None
+    return likely[0][1]
 
 
 def with_one_cause(quality: Mapping[str, QualityTable]) -> tuple[str, dict[str, QualityTable]]:
@@ -132,13 +137,13 @@ def with_one_cause(quality: Mapping[str, QualityTable]) -> tuple[str, dict[str, 
     quality : dict of str to QualityTable
         The tables; findings that follow from the cause have no remedy of their own.
     """
-    remedy, follow = explained(quality)
-    if not remedy:
+    found = best_cause(quality)
+    if found is None:
         return "", dict(quality)
     tables = {
         stage: QualityTable(
-            tuple(replace(f, remedy="") if f.key in follow else f for f in table.figures)
+            tuple(replace(f, remedy="") if f.key in found.moves else f for f in table.figures)
         )
         for stage, table in quality.items()
     }
-    return tr("Most likely cause: {remedy}").format(remedy=remedy), tables
+    return tr("Most likely cause: {remedy}").format(remedy=found.remedy), tables

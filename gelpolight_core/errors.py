@@ -88,11 +88,11 @@ class Remedy(StrEnum):
     FLAT_BOARD = marked("Use a flat board, check its square size, and hold it still")
     BOARD_ON_TOP = marked("Lay the board flat on the top surface, and capture it there")
     # Presses
-    PRESS_BALLS = marked("Press balls of known radius deeper or at more places")
+    PRESS_BALLS = marked("Press balls of known diameter deeper or at more places")
     PRESS_DEEPER = marked("Press deeper, and capture the image again")
     PRESS_MIDDLE = marked("Press nearer to the middle of the sensor")
     ONE_BALL = marked("Press a single clean ball straight down")
-    CHECK_RADIUS = marked("Check the stated radius of the ball (not its diameter)")
+    CHECK_RADIUS = marked("Check the stated diameter of the ball (session.toml holds its radius)")
     SWAP_IMAGES = marked("Swap the two images, or capture the background again without contact")
     STATE_SCALE = marked("Press it straight and deeper, or state mm_per_px")
     # Places on a map

@@ -439,12 +439,8 @@ class BallsStep(ImageStep):
 
     def set_radius(self, name: str, radius_mm: float) -> None:
         """Set the ball radius of one image; can be undone."""
-        project = self.model.project
-        act = partial(project.set_ball_radius, name)
-        before = project.session.ball_radii_mm.get(name)
-        if radius_mm != before:
-            text = tr("Diameter of {name}: {d:g} mm").format(name=name, d=2.0 * radius_mm)
-            self.model.correct(text, partial(act, radius_mm), partial(act, before), "balls")
+        if radius_mm != self.model.project.session.ball_radii_mm.get(name):
+            self.model.set_ball_diameter(name, 2.0 * radius_mm)
 
 
 def setting_of(results: Results) -> BallSetting | None:

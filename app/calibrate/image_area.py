@@ -99,15 +99,12 @@ class ImageArea(QWidget):
         self.back_to_live.setVisible(bool(name))
         self._place()
 
-    def show_step(self, *, strip: bool, image: bool) -> None:
-        """Show the parts that a step needs: the film strip, and the image or else the result."""
+    def show_step(self, *, strip: bool) -> None:
+        """Show the parts that a step needs: the image, and the film strip."""
         self.strip.setVisible(strip)
         self.verdict.hide()
-        self._has_image = image
-        self.result.setChecked(not image)
+        self.result.setChecked(False)
         self.show_result_button(False)
-
-    _has_image = True
 
     def show_stream(self, stream: Stream | None) -> None:
         """Show the live image."""
@@ -132,10 +129,10 @@ class ImageArea(QWidget):
         self.result.setChecked(True)
 
     def show_result_button(self, there: bool) -> None:
-        """Offer the images of the result, if there are any and the step has an image, too."""
-        if not there and self._has_image:
+        """Offer the images of the result, if there are any."""
+        if not there:
             self.result.setChecked(False)
-        self.result.setVisible(there and self._has_image)
+        self.result.setVisible(there)
         self._place()
 
 

@@ -230,6 +230,13 @@ class WizardModel(QObject):
         self.correct(text.format(name=name), partial(act, excluded), partial(act, not excluded),
                      stage)  # fmt: skip
 
+    def set_ball_diameter(self, name: str, diameter_mm: float) -> None:
+        """Set the diameter of the ball in one image; can be undone."""
+        act = partial(self.project.set_ball_radius, name)
+        before = self.project.session.ball_radii_mm.get(name)
+        text = tr("Diameter of {name}: {d:g} mm").format(name=name, d=diameter_mm)
+        self.correct(text, partial(act, 0.5 * diameter_mm), partial(act, before), "balls")
+
     def correct(
         self,
         text: str,

@@ -118,10 +118,6 @@ class MovingOn(QTimer):
         later = self._presenters[self._presenters.index(self._open) + 1 :]
         states = self._model.states
         return next(
-            (
-                one
-                for one in later
-                if not one.only_shows and not one.is_settled(states[one.step.key][0])
-            ),
+            (one for one in later if not one.is_settled(states[one.step.key][0])),
             None,
         )

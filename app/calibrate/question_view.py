@@ -34,7 +34,7 @@ class QuestionView(QWidget):
         self.can.clicked.connect(lambda: self.answered.emit(True))
         opened = PlainLabel(
             tr(
-                "Lens, top surface, lights and membrane are measured one by one, in eleven "
+                "Lens, top surface, lights and membrane are measured one by one, in nine "
                 "steps. This gives the most exact depth. You need two checkerboards, a "
                 "mirror, a white board and balls."
             ),

@@ -1,4 +1,4 @@
-"""The refraction step."""
+"""The contact of a ball before and after the correction of lens, tilt and refraction."""
 
 from __future__ import annotations
 
@@ -9,17 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.balls import judge_ball
 from app.calibrate.detection import read_raw
-from app.calibrate.film_strip import Capture
-from app.calibrate.image_step import captures_of
 from app.calibrate.maps import Panel
-from app.calibrate.step import StepPresenter
-from app.calibrate.step_data import Step
 from app.view2d.map_view import Extent
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.open_sensor import TOP_POSE
-from gelpolight_core.errors import InputError
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.translation import tr
@@ -97,8 +92,10 @@ def _close_up(rgb: Rgb, points: NDArray[Any], *, ellipse: bool) -> tuple[Rgb, Ex
     else:
         u, v, radius = _fit_circle(at)
         cv2.circle(near, (round(u), round(v)), round(radius), (255, 255, 255), 1, cv2.LINE_AA)
-    first, last = ((edge - shift) / scale for edge in (-0.5, CLOSE_UP_PX - 0.5))
-    return np.asarray(near, np.uint8), (*map(float, first), *map(float, last))
+    left, top, right, bottom = np.concatenate(
+        [(edge - shift) / scale for edge in (-0.5, CLOSE_UP_PX - 0.5)]
+    ).tolist()
+    return np.asarray(near, np.uint8), (left, top, right, bottom)
 
 
 def _fit_circle(points: NDArray[Any]) -> tuple[float, float, float]:
@@ -110,62 +107,18 @@ def _fit_circle(points: NDArray[Any]) -> tuple[float, float, float]:
     return float(middle[0] + u), float(middle[1] + v), math.sqrt(rest + u * u + v * v)
 
 
-class RefractionStep(StepPresenter):
-    """Shows the most oblique press, or the selected one."""
+def most_oblique_press(project: Project) -> tuple[Panel, ...]:
+    """Return the press nearest to the edge before and after the correction; nothing without one.
 
-    has_image_tab = False
-    only_shows = True
-
-    step = Step(
-        "refraction",
-        tr("Refraction"),
-        ("balls",),
-        tr(
-            "Compare a press near the edge of the field before and after the correction. The "
-            "ellipse of the contact must have become a circle."
-        ),
-        "ball",
-        folder=BALLS.folder,
-    )
-
-    def captures(self) -> tuple[Capture, ...]:
-        """Return the ball presses."""
-        project = self.model.project
-        return captures_of(
-            project.session, self.step.folder, lambda path: judge_ball(path.name, project)
-        )
-
-    def live(self) -> None:
-        """Show the most oblique press."""
-        super().live()
-        self.show_result()
-
-    def show_capture(self, name: str) -> None:
-        """Show a press."""
-        self.area.strip.choose(name)
-        self.area.show_capture_name(name)
-        self.model.show(name)
-        self.show_result()
-
-    def show_result(self) -> None:
-        """Show the press before and after the correction, or say why that is not possible."""
-        why = tr("The comparison needs the ball presses. Complete the earlier steps first.")
-        panels: tuple[Panel, ...] = ()
-        try:
-            panels = self.result_panels()
-        except InputError as error:
-            why = str(error)
-        self.area.maps.show_panels(panels, none=why)
-
-    def result_panels(self) -> tuple[Panel, ...]:
-        """Return the press before and after the correction; nothing without results."""
-        results, folder = self.model.project.results, self.model.project.session.folder
-        balls, top = results.get(BALLS), results.get(TOP_POSE)
-        if balls is None or top is None or not balls.presses:
-            return ()
-        found = {ball.file: ball.press for ball in balls.seen if ball.press is not None}
-        name = self.model.shown
-        if name not in found:
-            name = max(found, key=lambda n: sum(c * c for c in found[n].pose.centre_mm))
-        raw = read_raw(folder / self.step.folder / name)
-        return refraction_panels(raw, found[name], top.table)
+    Raises
+    ------
+    InputError
+        If its image cannot be read.
+    """
+    balls, top = project.results.get(BALLS), project.results.get(TOP_POSE)
+    if balls is None or top is None or not balls.presses:
+        return ()
+    found = {ball.file: ball.press for ball in balls.seen if ball.press is not None}
+    name = max(found, key=lambda n: sum(c * c for c in found[n].pose.centre_mm))
+    raw = read_raw(project.session.folder / BALLS.folder / name)
+    return refraction_panels(raw, found[name], top.table)

@@ -133,9 +133,9 @@ class ResidualTable(QWidget):
 
     def texts(self) -> list[tuple[str, ...]]:
         """Return capture and residual of each row, as shown."""
-        rows = 0 if self.isHidden() else self._table.rowCount()
+        rows, model = 0 if self.isHidden() else self._table.rowCount(), self._table.model()
         columns = (NAME_COLUMN, RESIDUAL_COLUMN)
-        return [tuple(self._table.item(row, k).text() for k in columns) for row in range(rows)]
+        return [tuple(model.index(row, k).data() for k in columns) for row in range(rows)]
 
     def _choose(self, item: QTableWidgetItem) -> None:
         self.chosen.emit(self._captures[item.row()].path.name)
@@ -151,7 +151,7 @@ class _Bars(QStyledItemDelegate):
         index: QModelIndex | QPersistentModelIndex,
     ) -> None:
         """Draw the bar, then the value."""
-        area = QRectF(option.rect).adjusted(1.0, 4.0, -1.0, -4.0)  # type: ignore[attr-defined]
+        area = QRectF(option.rect).adjusted(1.0, 4.0, -1.0, -4.0)
         area.setWidth(area.width() * float(index.data(SHARE) or 0.0))
         colour = theme.colour("accent")
         colour.setAlphaF(0.25)

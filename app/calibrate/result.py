@@ -1,285 +1,306 @@
-"""The calibration step: all figures together, saving and the report."""
+"""The result of a calibration: its verdict, what to mend, saving and the report."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QPushButton,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
 
-from app.calibrate.states import (
-    RUNNING,
-    StepState,
-    is_done,
-    state_icon,
-    state_meaning,
-    state_word,
-    step_state,
-)
+from app.calibrate.maps import MapsView
+from app.calibrate.model import WizardModel
+from app.calibrate.refraction import most_oblique_press
+from app.calibrate.remedies import Mend, mend_of
+from app.calibrate.states import RUNNING, StepState, is_done, step_state
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
+from app.calibrate.step_panel import Remedy
+from app.context.context import AppContext
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
-from app.widgets.label import PlainLabel, RoomyLabel
+from app.widgets.buttons import push_button
+from app.widgets.label import MarkupLabel, PlainLabel, RoomyLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from app.widgets.sign import Sign
 from app.workspace.report import stated_validation
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.missing import OPEN_FOLDERS
-from gelpolight_core.calibration.project import Run
+from gelpolight_core.calibration.open_sensor import TOP_POSE
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.causes import with_one_cause
-from gelpolight_core.finding import Finding, QualityTable
+from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding, QualityTable, Verdict, joined_tables
 from gelpolight_core.translation import tr
 
-FAIL = StageState.FAIL
+if TYPE_CHECKING:
+    from app.calibrate.reflectance.curves import Curves
+
+FAIL, OUTDATED = StageState.FAIL, StageState.STALE
+MAIN = ("ball_height_error_percent", "held_out_normal_deg")
+"""Figures that say how good the whole calibration is; a recipe has one of them."""
 
 
-class ResultView(QWidget):
-    """Shows all stages and the buttons to save the calibration and its report.
+class Say(Protocol):
+    """Shows a sentence in the colour of its role."""
 
-    Signals
-    -------
-    step_wanted(str)
-        Key of a step to go to.
-    """
+    def __call__(self, sentence: str, role: str) -> None:
+        """Show it."""
 
-    step_wanted = Signal(str)
 
-    def __init__(self, steps: Sequence[Step]) -> None:
+class Overview(QWidget):
+    """The verdict in one line, the poor figures first, and the others folded."""
+
+    def __init__(self) -> None:
         super().__init__()
-        named(self, "result", tr("Calibration"))
-        self._rows: dict[str, _StageRow] = {}
-        self._name = ""
+        named(self, "result", tr("Result"))
         self.headline = named(PlainLabel(wrap=True), "result.headline", tr("Verdict"))
-        make_bold(self.headline, size=1.2)
-        self.cause = named(PlainLabel(wrap=True), "result.cause", tr("Most likely cause"))
-        make_bold(self.cause)
+        make_bold(self.headline, size=1.5)
+        self.poor = QualityTableWidget("result.poor", tr("Figures beyond their limits"))
+        self.every = named(MarkupLabel(wrap=True), "result.every", tr("All figures"))
+        self.more = named(QPushButton(), "result.more", tr("Show all figures"))
+        self.more.setCheckable(True)
+        self.more.toggled.connect(self.every.setVisible)
+        self.every.hide()
         inside = QWidget()
-        rows = vbox(of=inside)
-        for step in steps:
-            for stage in step.stages:
-                if stage not in self._rows:
-                    self._rows[stage] = _StageRow(step)
-                    self._rows[stage].step_wanted.connect(self.step_wanted)
-                    rows.addWidget(self._rows[stage])
-        rows.addStretch(1)
-        scroll = named(scroll_area(inside), "result.scroll", tr("All stages"))
-        self.save = named(
-            QPushButton(tr("&Save the calibration")), "result.save", tr("Save the calibration")
-        )
-        self.report = named(
-            QPushButton(tr("Write the &report…")), "result.report", tr("Write the report")
-        )
-        for button in (self.save, self.report):
-            button.setMinimumHeight(38)
-        self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
-        self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        vbox(
-            self.headline,
-            self.cause,
-            (scroll, 1),
-            hbox(self.save, self.report),
-            self.saved,
-            of=self,
-        )
+        vbox(self.poor, hbox(self.more, None), self.every, None, of=inside, margins=0, spacing=16)
+        scroll = named(scroll_area(inside), "result.scroll", tr("Figures"))
+        vbox(self.headline, (scroll, 1), of=self, margins=24, spacing=16)
 
-    def show_saved(self, sentence: str, role: str = "pass") -> None:
+    def show_verdict(self, sentence: str, role: str) -> None:
+        """Show the verdict, in the colour of its role."""
+        self.headline.setText(sentence)
+        show_meaning(self.headline, role)
+
+    def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
+        """Show the figures of stages by their titles, the poor ones first; `cause` once only."""
+        figures = joined_tables(table for _, table in tables).figures
+        order = list(Verdict)
+        worst = sorted(figures, key=lambda f: -order.index(f.verdict))
+        poor = [f for f in worst if f.verdict is not Verdict.PASS]
+        shown = (replace(f, remedy="") if f.remedy == cause else f for f in poor)
+        self.poor.set_table(QualityTable(tuple(shown)))
+        self.poor.setVisible(bool(poor))
+        self.every.setText(
+            "".join(
+                f"<h4>{escaped(title)}</h4>{QualityTableWidget.markup(table)}"
+                for title, table in tables
+                if table.figures
+            )
+        )
+        self.more.setText(tr("All {n} figures").format(n=len(figures)))
+        self.more.setVisible(bool(figures))
+
+
+class SaveButtons(QWidget):
+    """Saves the calibration and its report; the main button until both agree with the captures."""
+
+    def __init__(self, save: Callable[[], None], report: Callable[[], None]) -> None:
+        super().__init__()
+        self.save = push_button("result.save", tr("&Save the calibration"), save)
+        self.report = push_button("result.report", tr("Write the &report…"), report)
+        self.saved = named(RoomyLabel(), "result.saved", tr("Where it was saved"))
+        self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.save.setMinimumHeight(38)
+        vbox(self.saved, self.report, self.save, of=self, margins=0, spacing=8)
+
+    def show_saved(self, sentence: str, role: str) -> None:
         """Show where the calibration or its report was saved, or why it was not."""
         self.saved.setText(sentence)
         show_meaning(self.saved, role)
 
-    def show_states(
-        self,
-        states: Mapping[str, tuple[str, str]],
-        statuses: Mapping[str, StageStatus],
-        *,
-        busy: bool,
-        saved: str = "",
-    ) -> None:
-        """Show the state of every stage.
-
-        Parameters
-        ----------
-        states : mapping
-            State and sentence by the step's key, as the list of steps shows them.
-        statuses : mapping
-            Status of every stage.
-        busy : bool
-            Whether a stage is being computed or waits for it.
-        saved : str, optional
-            Name of the saved calibration that belongs to the present captures.
-        """
-        if self._name and not saved:
-            self.show_saved("")  # what was saved is no longer what the captures give
-        self._name = saved
-        cause, tables = with_one_cause({stage: statuses[stage].quality for stage in self._rows})
-        self.cause.setText(f"{cause}." if cause else "")
-        self.cause.setVisible(bool(cause))
-        for stage, row in self._rows.items():
-            state, sentence = states[row.step.key]
-            # The cause is shown once, above all stages.
-            sentence = sentence.removeprefix(f"{cause}.").strip() if cause else sentence
-            row.show_state(state, sentence, tables[stage])
-        done = [stage for stage in self._rows if is_done(statuses[stage].state.value)]
-        failed = [stage for stage in self._rows if statuses[stage].state is FAIL]
-        complete, made = len(done) == len(self._rows), len(done + failed) == len(self._rows)
-        warned = sum(s.state is StageState.WARN for s in statuses.values())
-        open_count = sum(not is_done(s.state.value) for s in statuses.values())
-        if complete and saved:
-            text = tr("All stages are complete and saved as {name}. Validate the calibration next.")
-        elif complete and warned:
-            text = tr("All stages are complete, {n} with a warning. Read the advice, then save.")
-        elif complete:
-            text = tr("All stages are complete. Save the calibration, then validate it.")
-        elif busy and saved:
-            text = tr(
-                "Saved as {name}. You can validate it now; the stages are being recomputed in the "
-                "background."
-            )
-        elif busy:
-            text = tr("Computing. Please wait.")
-        elif made:
-            text = tr(
-                "Failed: {titles}. Correct this. Until then the calibration can be saved only as a "
-                "draft, which is not used for measuring."
-            )
-        elif any(s.state is StageState.STALE for s in statuses.values()):
-            text = tr(
-                "Outdated stages: {n}. The captures have changed since they were computed. "
-                "Click Recompute."
-            )
-        else:
-            text = self._missing_sentence(statuses)
-        text = text.format(
-            name=saved,
-            n=warned if complete else open_count,
-            titles=", ".join(self._rows[stage].step.title for stage in failed),
-        )
-        self.headline.setText(text)
-        show_meaning(self.headline, "fail" if failed else "")
-        self.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
-        running = any(states[row.step.key][0] == RUNNING for row in self._rows.values())
-        self.save.setEnabled(complete or (made and not running))
-        self.save.setStyleSheet("font-weight: bold;" if complete else "")
-        # The report waits for the stages by itself.
-        self.report.setEnabled(self.save.isEnabled() or bool(busy and saved))
-
-    def _missing_sentence(self, statuses: Mapping[str, StageStatus]) -> str:
-        """Return the incomplete stages, and which of them need the sensor open."""
-        text = tr("Incomplete stages: {n}. Complete them from top to bottom.")
-        closed = [
-            row.step.title
-            for stage, row in self._rows.items()
-            if row.step.folder in OPEN_FOLDERS and statuses[stage].state is StageState.EMPTY
-        ]
-        if closed:
-            text += " " + tr(
-                "{titles} need the open sensor. If it cannot be opened, start a new calibration "
-                "and answer that the membrane is bonded."
-            ).format(titles=", ".join(closed))
-        return text
-
-
-class _StageRow(QWidget):
-    """One stage: icon, state, sentence, and its figures on demand."""
-
-    step_wanted = Signal(str)
-
-    def __init__(self, step: Step) -> None:
-        super().__init__()
-        self.step = step
-        self._sign, self._word, self._sentence = Sign(), PlainLabel(), PlainLabel()
-        self._sentence.setWordWrap(True)
-        self._word.setMinimumWidth(96)
-        make_bold(self._word)
-        self.more = named(
-            QToolButton(),
-            f"result.{step.key}.more",
-            tr("Figures of {title}").format(title=step.title),
-        )
-        self.more.setText(tr("Figures"))
-        self.more.setCheckable(True)
-        title = named(
-            QPushButton(step.title, flat=True, minimumWidth=130, styleSheet="text-align: left;"),
-            f"result.{step.key}",
-            tr("Go to {title}").format(title=step.title),
-        )
-        title.clicked.connect(lambda: self.step_wanted.emit(step.key))
-        row = hbox(self._sign, title, (self._word, 1), self.more)
-        self.table = QualityTableWidget(
-            f"result.{step.key}.quality", tr("Figures of {title}").format(title=step.title)
-        )
-        self.table.hide()
-        self.more.toggled.connect(self.table.setVisible)
-        vbox(row, self._sentence, self.table, of=self, margins=(0, 2, 0, 2))
-
-    def show_state(self, state: str, sentence: str, quality: QualityTable) -> None:
-        self._sign.show_icon(state_icon(state))
-        self._word.setText(state_word(state).capitalize())
-        show_meaning(self._word, state_meaning(state))
-        self._sentence.setText(sentence)
-        self._sentence.setVisible(bool(sentence) and state != StageState.PASS.value)
-        self.table.set_table(quality)
-        self.more.setVisible(bool(quality.figures))
-
 
 class ResultStep(StepPresenter):
-    """Shows every stage, and saves the calibration and its report."""
-
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
-        self.view = ResultView(parts.steps)
-        self.view.step_wanted.connect(self.step_wanted)
-        self.view.save.clicked.connect(self.save)
-        self.view.report.clicked.connect(self.report)
+    """Shows what all stages give together, and saves the calibration and its report."""
 
     step = Step(
         "result",
-        tr("Calibration"),
-        ("joint",),
-        tr("Check all figures together, then save the calibration."),
+        tr("Result"),
+        ("reflectance", "joint"),
+        tr("Check the verdict, then save the calibration."),
         "complete",
     )
 
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts)
+        self._steps = {stage: step for step in parts.steps for stage in step.stages}
+        self.overview, self._maps = Overview(), MapsView()
+        self.buttons = SaveButtons(self.save, self.report)
+        self.panel.add_foot(self.buttons)
+        self.tabs = named(QTabWidget(documentMode=True), "result.tabs", tr("Result"))
+        self.tabs.addTab(self.overview, tr("Verdict"))
+        if REFLECTANCE.key in self.model.statuses:
+            self.tabs.addTab(self._maps, tr("Refraction"))
+            self.tabs.addTab(QWidget(), tr("Reflectance curves"))
+        self.tabs.tabBar().setVisible(self.tabs.count() > 1)
+        self.tabs.currentChanged.connect(lambda _: self._show_tab())
+        self._name = ""
+        self._mend: Mend | None = None
+
+    @cached_property
+    def curves(self) -> Curves:
+        """The editor of the reflectance curves, created when its tab is first shown."""
+        from app.calibrate.reflectance.curves import Curves  # slow to import
+
+        curves = Curves(self.model)
+        vbox(curves, of=self.tabs.widget(2), margins=0)
+        return curves
+
     @property
     def centre(self) -> QWidget:
-        """The overview."""
-        return self.view
+        """The verdict, and what is behind it."""
+        return self.tabs
 
     def focus(self) -> QWidget:
-        """Return the Save button."""
-        return self.view.save
+        """Return the main button."""
+        return self.panel.next if self.model.saved else self.buttons.save
 
     def state(self) -> StepState:
-        """Return the state of the last stage."""
-        last = (self.step.stages or tuple(self.model.statuses))[-1:]
-        step = replace(self.step, stages=last)
-        return step_state(step, self.model.statuses, self.model.running, count=0)
+        """Return the state of the last stages; once they are done, the worst of all."""
+        statuses, running = self.model.statuses, self.model.running
+        own = self.step.stages or tuple(statuses)[-1:]
+        if all(_is_made(statuses[stage]) for stage in own):
+            own = tuple(statuses)
+        return step_state(replace(self.step, stages=own), statuses, running, count=0)
 
     def is_finished(self, state: str) -> bool:
         """Return whether the present captures are saved as a calibration."""
         return is_done(state) and bool(self.model.saved)
 
     def is_settled(self, state: str) -> bool:
-        """Return whether the calibration is saved: the user has then read the figures."""
-        return self.is_finished(state)
+        """Return False: the user reads the figures, and goes on."""
+        return False
+
+    def number(self) -> Finding | None:
+        """Return the figure of the whole calibration."""
+        figures = joined_tables(status.quality for status in self.model.statuses.values()).figures
+        return next((figure for figure in figures if figure.key in MAIN), None)
+
+    def remedies(self, state: str) -> tuple[Remedy, ...]:
+        """Return what mends the one cause: correct the number, or go where it is mended."""
+        mend = self._mend
+        if mend is None or state not in ("warn", "fail"):
+            return super().remedies(state)
+        step = self._steps.get(mend.step)
+        key = mend.step if step is None else step.key
+        title = tr("Set-up") if step is None else step.title
+        go = (tr("Go to {step}").format(step=title), partial(self.step_wanted.emit, key))
+        if not mend.ball:
+            return () if step is self.step else (go,)
+        text = tr("Set {ball} to {d:g} mm").format(ball=Path(mend.ball).stem, d=mend.diameter_mm)
+        return ((text, partial(self.model.set_ball_diameter, mend.ball, mend.diameter_mm)),)
+
+    def tables(self) -> Sequence[QualityTable]:
+        """Return nothing: the figures have their own place."""
+        return ()
+
+    def enter(self) -> None:
+        """Show the step with its buttons."""
+        self.buttons.show()
+        super().enter()
+
+    def leave(self) -> None:
+        """Hide the buttons."""
+        self.buttons.hide()
+        set_property(self.panel.next, "primary", True)
+
+    def close(self) -> None:
+        """Stop the thread of the curves."""
+        if "curves" in self.__dict__:
+            self.curves.close_editor()
 
     def refresh(self) -> None:
         """Show the present state of every stage."""
-        super().refresh()
-        model = self.model
-        self.view.show_states(model.states, model.statuses, busy=model.jobs.busy, saved=model.saved)
+        model, buttons = self.model, self.buttons
+        statuses = model.statuses
+        if self._name and not model.saved:
+            buttons.show_saved("", "")  # what was saved is no longer what the captures give
+        elif model.saved and not buttons.saved.text():
+            text = tr("Saved as {name}. Validate it next.").format(name=model.saved)
+            buttons.show_saved(text, "pass")
+        self._name = model.saved
+        quality = {key: status.quality for key, status in statuses.items()}
+        self._mend = mend_of(quality, model.project.results)
+        _, tables = with_one_cause(quality)
+        cause = "" if self._mend is None else self._mend.text
+        self.overview.show_figures([(self._title(k), t) for k, t in tables.items()], cause)
+        self.overview.show_verdict(*self._verdict(statuses))
+        made = all(map(_is_made, statuses.values()))
+        failed = any(status.state is FAIL for status in statuses.values())
+        idle = all(state != RUNNING for state, _ in model.states.values())
+        buttons.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
+        buttons.save.setEnabled(made and idle)
+        set_property(buttons.save, "primary", made and not model.saved)
+        # The report waits for the stages by itself.
+        buttons.report.setEnabled(buttons.save.isEnabled() or bool(model.jobs.busy and model.saved))
+        state, sentence = model.states[self.step.key]
+        wrong = self._mend is not None and state in ("warn", "fail")
+        self.show_state(state, f"{cause}." if wrong else sentence)
+        set_property(self.panel.next, "primary", bool(model.saved))
+        self._show_tab()
+
+    def _show_tab(self) -> None:
+        """Update the tab that is shown; the others are updated when they are opened."""
+        shown = self.tabs.currentIndex()
+        if shown == 1:
+            why = tr("The comparison needs the ball presses. Complete the earlier steps first.")
+            try:
+                panels = most_oblique_press(self.model.project)
+            except InputError as error:
+                panels, why = (), str(error)
+            self._maps.show_panels(panels, none=why)
+        elif shown == 2:
+            self.curves.show_results()
+
+    def _title(self, stage: str) -> str:
+        return self.model.project.recipe[stage].title
+
+    def _verdict(self, statuses: dict[str, StageStatus]) -> tuple[str, str]:
+        """Return the verdict in one line, and its colour."""
+        states = [status.state for status in statuses.values()]
+        figures = joined_tables(status.quality for status in statuses.values()).figures
+        poor = sum(figure.verdict is Verdict.WARN for figure in figures)
+        failed = [self._title(key) for key, status in statuses.items() if status.state is FAIL]
+        made = all(map(_is_made, statuses.values()))
+        if made and failed:
+            text = tr("Failed: {titles}")
+            return text.format(titles=", ".join(failed)), "fail"
+        if made and poor:
+            return tr("Usable, with warnings: {n} figures.").format(n=poor), "warn"
+        if made:
+            text = tr("Passed: all {n} figures are within their limits.")
+            return text.format(n=len(figures)), "pass"
+        if self.model.jobs.busy and self.model.saved:
+            return tr("Saved. You can validate it now; the stages are computed again."), ""
+        if self.model.jobs.busy:
+            return tr("Computing. Please wait."), ""
+        if OUTDATED in states:
+            text = tr("Outdated stages: {n}. The captures have changed. Click Recompute.")
+            return text.format(n=sum(not is_done(state.value) for state in states)), "stale"
+        return self._missing(statuses), ""
+
+    def _missing(self, statuses: dict[str, StageStatus]) -> str:
+        """Return how many stages are missing, and which of them need the sensor open."""
+        open_count = sum(not is_done(status.state.value) for status in statuses.values())
+        text = tr("Incomplete stages: {n}. Complete them from top to bottom.").format(n=open_count)
+        recipe, empty = self.model.project.recipe, StageState.EMPTY
+        closed = [
+            recipe[key].title
+            for key, status in statuses.items()
+            if recipe[key].folder in OPEN_FOLDERS and status.state is empty
+        ]
+        if closed and TOP_POSE.key in statuses:
+            text += " " + tr(
+                "{titles} need the open sensor. If it cannot be opened, start a new calibration "
+                "and answer that the membrane is bonded."
+            ).format(titles=", ".join(closed))
+        return text
 
     # Saving
 
@@ -298,49 +319,60 @@ class ResultStep(StepPresenter):
         def done(saved: tuple[Path, Finding | None]) -> None:
             path, fault = saved
             if fault is None:
-                text = tr("Saved as {path} and now in use. Validate it next.").format(path=path)
+                text = tr("Saved as {name} and now in use. Validate it next.")
             else:
-                text = tr("Saved as a draft, {path}, and not in use: {fault}.")
-                text = text.format(path=path, fault=fault.text)
-            self.view.show_saved(text, "pass" if fault is None else "fail")
+                text = tr("Saved as a draft, {name}, and not in use.")
+            role = "pass" if fault is None else "fail"
+            self.buttons.show_saved(text.format(name=path.stem), role)
             self.context.requests.calibrations_changed.emit()
             self.model.saved_as.emit(str(path))
 
-        self._submit(tr("Saving the calibration"), work, done)
-
-    def _submit(
-        self, title: str, work: Callable[[object], Any], done: Callable[[Any], None]
-    ) -> None:
-        self.view.show_saved(title + "…")
-
-        def failed(sentence: str) -> None:
-            self.view.show_saved(sentence, "fail")
-
-        self.model.jobs.submit(Job(title, work, done, failed, stopped=failed))
+        _submit(self.model, tr("Saving the calibration"), work, done, self.buttons.show_saved)
 
     def report(self) -> None:
         """Ask for a file name and write the report there."""
-        name = f"{self.model.project.session.serial}-report.pdf"
-        title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
-        path = ask_save(self.view, self.context.settings, "report", title, name, patterns)
-        if path is not None:
-            self.write_report(path)
+        ask_report(self.tabs, self.model, self.context, self.buttons.show_saved)
 
-    def write_report(self, path: Path) -> None:
-        """Write the report of the session in its present state."""
-        project, workspace = self.model.project, self.context.workspace
 
-        def work(_progress: object) -> Run:
-            from gelpolight_core.report.build import run_report  # slow to import
-            from gelpolight_core.report.file import write_report
+def ask_report(parent: QWidget, model: WizardModel, context: AppContext, say: Say) -> None:
+    """Ask for a file name and write the report there."""
+    name = f"{model.project.session.serial}-report.pdf"
+    title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
+    path = ask_save(parent, context.settings, "report", title, name, patterns)
+    if path is not None:
+        write_report(path, model, context, say)
 
-            run = project.finish()
-            saved = workspace.entry_of(run.calibration.identity)
-            validation = None if saved is None else stated_validation(saved)
-            write_report(run_report(run, validation=validation), path)
-            return run
 
-        def done(_run: Run) -> None:
-            self.view.show_saved(tr("Report saved as {path}").format(path=path))
+def write_report(path: Path, model: WizardModel, context: AppContext, say: Say) -> None:
+    """Write the report of the session in its present state; `say` shows how it ended."""
+    project, workspace = model.project, context.workspace
 
-        self._submit(tr("Writing the report"), work, done)
+    def work(_progress: object) -> None:
+        from gelpolight_core.report import build, file  # slow to import
+
+        run = project.finish()
+        saved = workspace.entry_of(run.calibration.identity)
+        validation = None if saved is None else stated_validation(saved)
+        file.write_report(build.run_report(run, validation=validation), path)
+
+    def done(_nothing: None) -> None:
+        say(tr("Report saved as {path}").format(path=path), "pass")
+
+    _submit(model, tr("Writing the report"), work, done, say)
+
+
+def _submit(
+    model: WizardModel,
+    title: str,
+    work: Callable[[object], Any],
+    done: Callable[[Any], None],
+    say: Say,
+) -> None:
+    say(title + "…", "")
+    failed = partial(say, role="fail")
+    model.jobs.submit(Job(title, work, done, failed, stopped=failed))
+
+
+def _is_made(status: StageStatus) -> bool:
+    """Return whether a stage has a result of the present captures, good or bad."""
+    return is_done(status.state.value) or (status.state is FAIL and bool(status.quality.figures))

@@ -12,6 +12,7 @@ from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from gelpolight_core.session.session import Session
+from gelpolight_core.set_up import judge_set_up
 from gelpolight_core.translation import tr
 
 
@@ -41,8 +42,11 @@ class SetupStep(StepPresenter):
         return self.form
 
     def state(self) -> StepState:
-        """Return whether what is stated can be used: a session is created with all values."""
-        return super().state() if self.step.stages else ("pass", tr("Stated"))
+        """Return whether what is stated is usual: a session is created with all values."""
+        state, text = super().state() if self.step.stages else ("pass", tr("Stated"))
+        session = self.model.project.session
+        unusual = judge_set_up(session.sensor) if session.in_place is None else ()
+        return ("warn", unusual[0].sentence) if unusual and state == "pass" else (state, text)
 
     def focus(self) -> QWidget:
         """Return the first value."""

@@ -9,7 +9,8 @@ from PySide6.QtCore import QStandardPaths, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
-    QGroupBox,
+    QFormLayout,
+    QFrame,
     QPushButton,
     QScrollArea,
     QWidget,
@@ -28,10 +29,10 @@ from app.widgets.buttons import push_button
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.session import Session
+from gelpolight_core.session.session import Session, serial_fault
 from gelpolight_core.set_up import judge_set_up
 from gelpolight_core.translation import tr
 
@@ -51,48 +52,38 @@ class SetupForm(QScrollArea):
         super().__init__()
         named(self, "setup", tr("Set-up"))
         self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
         inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
         self.setWidget(inside)
         hbox(None, (holder, 20), None, of=inside)
         self._title, self._task = PlainLabel(), PlainLabel(wrap=True)
         make_bold(self._title, size=1.35)
         self.values = Form(SetupValues(), "setup", at_once=True)
+        # Rows that wrap have no height of their own in a scroll area.
+        self.values.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
         self.values.changed.connect(self._on_changed)
         self.serial = self.values.inputs["serial"]
         self.facts = named(PlainLabel(wrap=True), "setup.facts", tr("About this kind of sensor"))
-        self._insert_below("preset", self.facts)
-        sensor = QGroupBox(tr("Sensor"))
-        vbox(self.values, of=sensor)
-        self._prints: list[QWidget] = []
-        boards = ("lens", tr("Lens views")), ("top", tr("Top surface"))
-        for place, (name, text) in enumerate(boards):
-            button = push_button(
-                f"setup.{name}_board.print",
-                tr("Print…"),
-                partial(self._save_board, place),
-                accessible=tr("{b}: save this board as a page to print").format(b=text),
-                tip=tr(
-                    "Save this board as an A4 page to print at 100 % scale; measure the squares "
-                    "after printing"
-                ),
-            )
-            self._insert_below(f"{name}_square_mm", button)
-            self._prints.append(button)
+        self._prints = QWidget()
+        boards = ("lens", tr("Print the board of the lens…")), ("top", tr("Print the other board…"))
+        tip = tr(
+            "Save this board as an A4 page to print at 100 % scale; measure the squares "
+            "after printing"
+        )
+        buttons = (
+            push_button(f"setup.{name}_board.print", text, partial(self._save_board, k), tip=tip)
+            for k, (name, text) in enumerate(boards)
+        )
+        vbox(*buttons, of=self._prints, margins=0, spacing=8)
         self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
-        self.accept = named(
-            QPushButton(minimumHeight=38), "setup.accept", tr("Start the calibration")
-        )
-        self.accept.clicked.connect(lambda: self.accepted.emit(self.stated()))
-        vbox(
-            self._title,
-            self._task,
-            self._build_camera(),
-            sensor,
-            self.problem,
-            self.accept,
-            None,
-            of=holder,
-        )
+        self.accept = push_button("setup.accept", "", lambda: self.accepted.emit(self.stated()))
+        self.accept.setAccessibleName(tr("Start the calibration"))
+        self.accept.setMinimumHeight(38)
+        set_property(self.accept, "primary", True)
+        sensor = named(QFrame(), "card", tr("Sensor"))
+        vbox(self.values, self.facts, self._prints, of=sensor, margins=16, spacing=8)
+        parts = self._title, self._task, self._build_camera(), sensor, self.problem, self.accept
+        vbox(*parts, None, of=holder, margins=(0, 16, 0, 16), spacing=16)
         self.show_session(new_session(), new=True)
 
     def show_session(self, session: Session, *, new: bool) -> None:
@@ -159,27 +150,22 @@ class SetupForm(QScrollArea):
         values, problem = self.values.value, ""
         self.facts.setText(preset_text(values.preset))
         known = values.preset != OTHER and not values.optics
-        self.values.rows.setRowVisible(self.facts, known or values.source == "stated")
-        for button in self._prints:
-            self.values.rows.setRowVisible(button, values.optics)
+        self.facts.setVisible(known or values.source == "stated")
+        self._prints.setVisible(values.optics)
         try:
             sensor = session_of(self.session, values).sensor
             unusual = () if not values.optics else judge_set_up(sensor)
         except InputError as error:
             unusual = ()
             problem = f"{error.found}. {error.advice}."
-        if not values.serial.strip():
-            problem = tr("Enter a serial number for the sensor.")
-        warnings = (f"{found.stated}. {found.remedy}." for found in unusual)
-        self.problem.setText(problem or " ".join(warnings))
+        if fault := serial_fault(values.serial.strip()):
+            problem = tr("The serial number {what}").format(what=fault) + "."
+        self.problem.setText(problem or " ".join(found.sentence for found in unusual))
+        show_meaning(self.problem, "fail" if problem else "warn")
         self.accept.setEnabled(not problem)
 
-    def _insert_below(self, name: str, widget: QWidget) -> None:
-        rows = self.values.rows
-        rows.insertRow(rows.getWidgetPosition(self.values.inputs[name])[0] + 1, "", widget)
-
-    def _build_camera(self) -> QGroupBox:
-        box = QGroupBox(tr("Camera"))
+    def _build_camera(self) -> QFrame:
+        box = named(QFrame(), "card", tr("Camera"))
         self.camera = named(PlainLabel(wrap=True), "setup.camera", tr("Camera state"))
         self.camera_settings = named(
             QPushButton(tr("&Set and lock…")),
@@ -187,7 +173,7 @@ class SetupForm(QScrollArea):
             tr("Set and lock the camera"),
             tr("Format, exposure, gain, white balance, focus, and a test of the image stability"),
         )
-        self._camera_row = hbox((self.camera, 1), self.camera_settings, of=box)
+        hbox((self.camera, 1), self.camera_settings, of=box, margins=16)
         self.show_camera(tr("No camera is selected."), "", settable=False)
         return box
 

@@ -69,11 +69,6 @@ class StepPresenter(QObject):
     lay_wanted = Signal()
     step: Step
     uses_camera = False
-    has_image_tab = True
-    opens_slowly = False
-    """Whether the widget in the middle is created when the step is first opened."""
-    only_shows = False
-    """Whether the step needs no action: it shows what was computed."""
 
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts.area)
@@ -167,7 +162,7 @@ class StepPresenter(QObject):
 
     def enter(self) -> None:
         """Show the step."""
-        self.area.show_step(strip=self.step.stage is not None, image=self.has_image_tab)
+        self.area.show_step(strip=self.step.stage is not None)
         self.live()
 
     def leave(self) -> None:

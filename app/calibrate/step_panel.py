@@ -167,7 +167,7 @@ class StepPanel(QWidget):
             button.setFixedHeight(36)
         self.more.setFixedSize(48, 36)
         foot = QWidget()
-        vbox(
+        self._foot = vbox(
             hbox((self.progress, 1), self.cancel, margins=0), self.capturing, self.next,
             of=foot, margins=(16, 8, 16, 16), spacing=8,
         )  # fmt: skip
@@ -185,6 +185,11 @@ class StepPanel(QWidget):
         return made
 
     # What is shown
+
+    def add_foot(self, widget: QWidget) -> None:
+        """Add a step's own buttons above Next; the step shows and hides them."""
+        self._foot.insertWidget(self._foot.count() - 1, widget)
+        widget.hide()
 
     def show_step(self, step: Step, *, following: str) -> None:
         """Show the task of another step; `following`: title of the next step, if any."""

@@ -14,8 +14,6 @@ from app.calibrate.in_place_balls import InPlaceBallsStep
 from app.calibrate.lens import LensStep
 from app.calibrate.lights import LightsStep
 from app.calibrate.radiance import RadianceStep
-from app.calibrate.reflectance.presenter import ReflectanceStep
-from app.calibrate.refraction import RefractionStep
 from app.calibrate.result import ResultStep
 from app.calibrate.scale import ScaleStep
 from app.calibrate.setup import SetupStep
@@ -37,8 +35,7 @@ PANELS: Mapping[Stage[Any], Route] = {
     open_sensor.LIGHTS: (LightsStep,),
     open_sensor.RADIANCE: (RadianceStep,),
     open_sensor.BACKGROUND: (BackgroundStep,),
-    ball_stage.BALLS: (BallsStep, RefractionStep),
-    ball_stage.REFLECTANCE: (ReflectanceStep,),
+    ball_stage.BALLS: (BallsStep,),
     in_place.BACKGROUND: (BackgroundStep,),
     in_place.SCALE: (ScaleStep,),
     in_place.BALLS: (InPlaceBallsStep,),

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.calibrate.detection import read_raw
 from app.calibrate.maps import depth_panel
+from app.calibrate.result import ask_report
 from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
@@ -53,7 +54,18 @@ class ValidationStep(StepPresenter):
 
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
-        self.form = form = ValidationPanel(self.step, self.context.settings.limits)
+        page = self.context.requests.page
+        form: ValidationPanel
+        after = (
+            ("inspect", tr("&Inspect"), lambda: page.emit("inspect")),
+            ("measuring", tr("M&easure"), lambda: page.emit("measure")),
+            (
+                "report",
+                tr("&Report…"),
+                lambda: ask_report(form, self.model, self.context, form.say),
+            ),
+        )
+        self.form = form = ValidationPanel(self.step, after)
         self._path: Path | None = None
         # Separate jobs: a press can be measured while the stages are recomputed.
         self.jobs = Jobs("validating", self)
@@ -189,21 +201,17 @@ class ValidationStep(StepPresenter):
 
     def _measure(self, frames: list[NDArray[Any]]) -> None:
         self._drop_trial()
-        stated, asked = self.form.asked, self._asked
-        known, path, present = stated.known, self._path, self._reconstructor
+        known, asked = self.form.asked.known, self._asked
+        path, present = self._path, self._reconstructor
         if path is None:
             return
 
         def work(progress: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
             reconstructor = present or Reconstructor(read_calibration(path))
-            trial = run_trial(
-                frames,
-                reconstructor,
-                known,
-                limits_percent=(stated.size_limit, stated.height_limit),
-                progress=progress,
+            limits = self.context.settings.limits.percent
+            return reconstructor, run_trial(
+                frames, reconstructor, known, limits_percent=limits, progress=progress
             )
-            return reconstructor, trial
 
         text = tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm)
 
@@ -223,7 +231,7 @@ class ValidationStep(StepPresenter):
         self.form.show_work(None)
         self.form.show_trial(trial)
         panel = depth_panel(tr("Measured depth"), trial.heightmap, trial.measurement.outline_mm)
-        if self.form.isVisibleTo(self.form.parentWidget()):
+        if not self.form.isHidden():
             self.area.show_result(panel)
 
     def _refuse(self, sentence: str) -> None:
@@ -269,23 +277,18 @@ class ValidationStep(StepPresenter):
         return found
 
     def _show_verdict(self) -> None:
-        found = self._recorded()
+        found, used = self._recorded(), self.context.workspace.in_use == self._path
         if found is None:
-            self.form.show_verdict(tr("Not validated."), passed=False)
-        elif found.passed:
-            used = self.context.workspace.in_use == self._path
-            text = tr("Validated and in use: the Inspect and Measure pages measure with it.")
-            if not used:
-                text = tr(
-                    "This calibration is validated, but not in use. The Inspect and Measure pages "
-                    "do not measure with it."
-                )
-            self.form.show_verdict(text, passed=True, may_use=not used)
+            text = tr("Not validated.")
+        elif not found.passed:
+            text = tr("Not validated: the errors of the recorded trial are beyond the limits.")
+        elif used:
+            text = tr("Validated: {e:.1f} %").format(e=found.largest_percent)
         else:
-            self.form.show_verdict(
-                tr("Not validated: the errors of the recorded trial are beyond the limits."),
-                passed=False,
-            )
+            text = tr("Validated: {e:.1f} %, but not in use: Inspect and Measure use another one.")
+            text = text.format(e=found.largest_percent)
+        role = "warn" if found is None else "pass" if found.passed else "fail"
+        self.form.show_verdict(text, role, used=used)
 
 
 def _known_in_folder(path: Path) -> Truth | None:

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from PySide6.QtWidgets import (
-    QProgressBar,
-    QPushButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QFrame, QProgressBar, QPushButton, QWidget
 
-from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.step_data import Step
 from app.calibrate.step_panel import WIDTH, help_button, lay_button, side_scroll
 from app.calibrate.trial import Trial
-from app.services.preferences import Limits
-from app.widgets.fields import choice, number, switch
+from app.widgets.buttons import push_button
+from app.widgets.fields import choice, number
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, keep_space, vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.translation import tr
@@ -30,61 +26,76 @@ SHAPES = {
     "cuboid": tr("Cuboid, flat end"),
     "ball": tr("Ball"),
 }
-MM, PERCENT = tr(" mm"), tr(" %")
+MM = tr(" mm")
 
 
 @dataclass(frozen=True)
 class Asked:
-    """The pressed object, and the largest errors with which it validates the calibration."""
+    """The pressed object; a height of 0 is not known."""
 
     shape: str = choice("cylinder", tr("Shape"), SHAPES)
     size_mm: float = number(5.0, tr("True diameter or side"), 0.01, 500.0, MM, 3, step=0.1)
-    height_known: bool = switch(False, "", tr("Depth is known"))
     height_mm: float = number(
-        1.0,
-        tr("True depth of the press"),
-        0.01,
-        500.0,
-        MM,
-        3,
-        step=0.1,
-        when=lambda asked: asked.height_known,
+        0.0, tr("True depth of the press"), 0.0, 500.0, MM, 3, step=0.1, none=tr("not known")
     )
-    size_limit: float = number(5.0, tr("Largest size error"), 0.1, 100.0, PERCENT, 1)
-    height_limit: float = number(8.0, tr("Largest depth error"), 0.1, 100.0, PERCENT, 1)
 
     @property
     def known(self) -> Truth:
         """The object."""
-        height = self.height_mm if self.height_known else math.nan
-        return Truth(self.shape, self.size_mm, height)
+        return Truth(self.shape, self.size_mm, self.height_mm or math.nan)
 
 
 class ValidationPanel(QWidget):
-    """Asks for the known object, and shows the result of the trial."""
+    """Asks for the known object, and shows the result of the trial.
 
-    def __init__(self, step: Step, limits: Limits) -> None:
+    Parameters
+    ----------
+    step : Step
+        The step.
+    after : tuple of (str, str, callable)
+        Name, text and action of the buttons that follow a validation.
+    """
+
+    def __init__(
+        self, step: Step, after: tuple[tuple[str, str, Callable[[], object]], ...]
+    ) -> None:
         super().__init__()
-        asked = Asked(size_limit=limits.size_percent, height_limit=limits.height_percent)
-        self.form = Form(asked, "validation", at_once=True)
+        self.form = Form(Asked(), "validation", at_once=True)
         named(self, "validation", tr("Validation"))
         self.setFixedWidth(WIDTH)
         self._has_calibration = self._has_camera = False
-        scroll, inside = side_scroll("validation.scroll", tr("Validation"))
-        vbox(scroll, of=self, margins=0)
         title = PlainLabel(step.title)
-        make_bold(title, size=1.35)
+        make_bold(title, size=1.5)
         self.help = help_button("validation.help")
-        head = hbox((title, 1), self.help)
-        assembly = AssemblyDrawing()
-        assembly.show_assembly(step.assembly)
         task = PlainLabel(step.task, wrap=True)
         self.calibration = named(
             PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
         )
+        self.result = named(MarkupLabel(wrap=True), "validation.result", tr("Result"))
+        self.verdict = named(PlainLabel(wrap=True), "validation.verdict", tr("Validated or not"))
+        make_bold(self.verdict, size=1.2)
+        self.use = named(
+            QPushButton(tr("&Use it now")),
+            "validation.use",
+            tr("Use the validated calibration"),
+            tr("Use this calibration on the Inspect and Measure pages"),
+        )
+        self.after = QWidget()
+        buttons = (push_button(f"validation.{name}", text, act) for name, text, act in after)
+        hbox(*buttons, of=self.after, margins=0, spacing=8)
+        object_card, result_card = (named(QFrame(), "card", tr("Pressed object")) for _ in range(2))
+        vbox(self.form, of=object_card, margins=12)
+        vbox(self.verdict, self.result, self.use, self.after, of=result_card, margins=12, spacing=8)
+        scroll, inside = side_scroll("validation.scroll", tr("Validation"))
+        parts = hbox((title, 1), self.help), task, self.calibration, object_card, result_card
+        vbox(*parts, None, of=inside, margins=(16, 16, 16, 8), spacing=12)
+        vbox((scroll, 1), self._build_foot(), of=self, margins=0, spacing=0)
+        self.show_trial(None)
+
+    def _build_foot(self) -> QWidget:
         self.lay = lay_button("validation.lay")
         self.measure = named(
-            QPushButton(tr("&Measure the press"), minimumHeight=38),
+            QPushButton(tr("&Measure the press")),
             "validation.measure",
             tr("Measure the pressed object"),
         )
@@ -94,61 +105,32 @@ class ValidationPanel(QWidget):
             tr("Measure a press from an image file"),
             tr("The true size is read from a truth.csv file in the same folder, if there is one"),
         )
-        row = hbox((self.measure, 2), (self.import_press, 1))
-        self.blocked = named(PlainLabel(), "validation.blocked", tr("Why nothing can be measured"))
-        self.blocked.setWordWrap(True)
+        self.keep = named(
+            QPushButton(tr("&Record this validation")),
+            "validation.keep",
+            tr("Record this validation"),
+        )
+        for button in (self.measure, self.import_press, self.keep):
+            button.setMinimumHeight(36)
         self.progress = named(QProgressBar(), "validation.progress", tr("Progress"))
         self.progress.setRange(0, 100)
         keep_space(self.progress)
         self.progress.hide()
-        self.result = named(MarkupLabel(wrap=True), "validation.result", tr("Result"))
-        self.keep = named(
-            QPushButton(tr("&Record this validation"), minimumHeight=34),
-            "validation.keep",
-            tr("Record this validation"),
-        )
-        self.verdict = named(PlainLabel(wrap=True), "validation.verdict", tr("Validated or not"))
-        make_bold(self.verdict)
-        self.use = named(
-            QPushButton(tr("&Use it now")),
-            "validation.use",
-            tr("Use the validated calibration"),
-            tr("Use this calibration on the Inspect and Measure pages"),
-        )
-        vbox(
-            head,
-            assembly,
-            task,
-            self.calibration,
-            self.form,
-            self.lay,
-            row,
-            self.blocked,
-            self.progress,
-            self.result,
-            self.keep,
-            self.verdict,
-            self.use,
-            None,
-            of=inside,
-            margins=(12, 10, 12, 10),
-        )
-        self.show_trial(None)
+        foot, row = QWidget(), hbox((self.measure, 2), (self.import_press, 1), spacing=8)
+        parts = self.progress, self.lay, row, self.keep
+        vbox(*parts, of=foot, margins=(16, 8, 16, 16), spacing=8)
+        return foot
 
     @property
     def asked(self) -> Asked:
-        """The object and the limits as entered."""
+        """The object as entered."""
         return self.form.value
 
     def show_known(self, known: Truth) -> None:
         """Fill in an object, for example the one on the virtual bench."""
         shape = known.shape if known.shape in SHAPES else next(iter(SHAPES))
-        self.form.change(
-            shape=shape,
-            size_mm=known.size_mm,
-            height_known=known.is_whole,
-            height_mm=known.height_mm if known.is_whole else self.asked.height_mm,
-        )
+        height_mm = known.height_mm if known.is_whole else 0.0
+        self.form.change(shape=shape, size_mm=known.size_mm, height_mm=height_mm)
 
     def show_calibration(self, name: str, *, present: bool) -> None:
         """Show which calibration is validated.
@@ -168,10 +150,11 @@ class ValidationPanel(QWidget):
                 "Calibration: {name}. Its captures or corrections have changed since. Save it "
                 "again."
             )
-        self.calibration.setText(text.format(name=name))
+        self._has_calibration, self._calibration = bool(name), text.format(name=name)
         show_meaning(self.calibration, "" if present else "warn")
-        self._has_calibration = bool(name)
         self._allow()
+
+    _calibration = ""
 
     def show_camera(self, there: bool) -> None:
         """Enable measuring only if there is a camera."""
@@ -181,11 +164,10 @@ class ValidationPanel(QWidget):
     def _allow(self) -> None:
         self.measure.setEnabled(self._has_calibration and self._has_camera)
         self.import_press.setEnabled(self._has_calibration)
-        why = ""
+        text = self._calibration
         if self._has_calibration and not self._has_camera:
-            why = tr("No camera. Select one in the bar above, or import an image.")
-        self.blocked.setText(why)
-        self.blocked.setVisible(bool(why))
+            text += " " + tr("No camera. Select one in the bar above, or import an image.")
+        self.calibration.setText(text)
 
     def show_work(self, share: float | None) -> None:
         """Show the progress; None if nothing is running."""
@@ -197,7 +179,7 @@ class ValidationPanel(QWidget):
         sure = trial is not None and trial.measurement.verdict == "ok"
         passed = trial is not None and all(c.passed for c in trial.comparisons)
         # A failed trial may be recorded, too, but nothing doubtful validates a calibration.
-        self.keep.setEnabled(trial is not None and (sure or not passed))
+        self._show_main(recording=trial is not None and (sure or not passed))
         if trial is None:
             self.say("")
             return
@@ -226,16 +208,27 @@ class ValidationPanel(QWidget):
         meaning = "pass" if passed else "fail"
         self._show_result("<br>".join(rows), meaning if sure else "warn")
 
-    def say(self, sentence: str, meaning: str = "") -> None:
+    def _show_main(self, *, recording: bool) -> None:
+        """Make what comes next the main button."""
+        self.keep.setEnabled(recording)
+        set_property(self.keep, "primary", recording)
+        set_property(self.measure, "primary", not recording)
+
+    def say(self, sentence: str, role: str = "") -> None:
         """Show how a trial is progressing, or why it failed."""
-        self._show_result(escaped(sentence), meaning)
+        self._show_result(escaped(sentence), role)
 
     def _show_result(self, markup: str, meaning: str) -> None:
         self.result.setText(markup)
+        self.result.setVisible(bool(markup))
         show_meaning(self.result, meaning)
 
-    def show_verdict(self, text: str, *, passed: bool, may_use: bool = False) -> None:
-        """Show whether the calibration is validated, and offer to use it."""
-        self.use.setVisible(may_use)
+    def show_verdict(self, text: str, role: str, *, used: bool) -> None:
+        """Show whether the calibration is validated, with what follows if it is in use."""
+        passed = role == "pass"
+        self.use.setVisible(passed and not used)
+        self.after.setVisible(passed and used)
         self.verdict.setText(text)
-        show_meaning(self.verdict, "pass" if passed else "fail")
+        show_meaning(self.verdict, role)
+        if passed:
+            set_property(self.measure, "primary", False)

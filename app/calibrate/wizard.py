@@ -67,8 +67,7 @@ class Wizard(QWidget):
         self.open = self.presenters[0]
         for presenter in self.presenters:
             _add(self.side, presenter.side)
-            if not presenter.opens_slowly:
-                _add(self.centre, presenter.centre)
+            _add(self.centre, presenter.centre)
         self._running: object = None
         # Not at once: the history may ask for it, and is closed then.
         self._renewal = QTimer(self, singleShot=True, interval=0)
@@ -227,7 +226,6 @@ class Wizard(QWidget):
                 sensor=self.model.project.session.serial,
                 task=tr("Calibrating: {n} of {count}").format(n=n, count=count),
             )
-        _add(self.centre, self.open.centre)
         self.centre.setCurrentWidget(self.open.centre)
         self.side.setCurrentWidget(self.open.side)
         self._focus_on_what_comes_next()

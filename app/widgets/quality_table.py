@@ -48,8 +48,7 @@ class QualityTableWidget(MarkupLabel):
         """Show a table."""
         if table != self._table:
             self._table = table
-            rows = "".join(map(self._row, table.figures))
-            self.setText(f"<table width='100%' cellspacing='4'>{rows}</table>" if rows else "")
+            self.setText(self.markup(table, narrow=self._narrow))
 
     def texts(self) -> list[list[str]]:
         """Return the texts of the rows."""
@@ -60,23 +59,30 @@ class QualityTableWidget(MarkupLabel):
                 rows.append(["", _advice(f), "", ""])
         return rows
 
-    def _row(self, figure: Finding) -> str:
-        verdict, cell = figure.verdict, "<td width='1%' align='right' style='white-space: nowrap"
-        colour = f"white-space: nowrap; color: @{verdict.value}"
-        sign = SIGNS[verdict] if self._narrow else f"{SIGNS[verdict]} {verdict_word(verdict)}"
-        row = (
-            f"<tr><td width='1%' style='{colour}'><b>{sign}</b></td>"
-            f"<td width='97%'>{escaped(figure.text)}</td>"
-            f"{cell}'>{escaped(value_text(figure))}</td>"
-            f"{cell}; color: @muted'>{escaped(limit_text(figure))}</td></tr>"
-        )
-        advice = _advice(figure)
-        return row + (f"<tr><td></td><td colspan='3'>{escaped(advice)}</td></tr>" if advice else "")
+    @staticmethod
+    def markup(table: QualityTable, *, narrow: bool = False) -> str:
+        """Return a table as markup for a :class:`MarkupLabel`."""
+        rows = "".join(_row(figure, narrow=narrow) for figure in table.figures)
+        return f"<table width='100%' cellspacing='4'>{rows}</table>" if rows else ""
 
     def minimumSizeHint(self) -> QSize:
         """Return a width at which the labels are readable."""
         width = 260 if self._narrow else 360
         return QSize(width, self.heightForWidth(width))
+
+
+def _row(figure: Finding, *, narrow: bool) -> str:
+    verdict, cell = figure.verdict, "<td width='1%' align='right' style='white-space: nowrap"
+    colour = f"white-space: nowrap; color: @{verdict.value}"
+    sign = SIGNS[verdict] if narrow else f"{SIGNS[verdict]} {verdict_word(verdict)}"
+    row = (
+        f"<tr><td width='1%' style='{colour}'><b>{sign}</b></td>"
+        f"<td width='97%'>{escaped(figure.text)}</td>"
+        f"{cell}'>{escaped(value_text(figure))}</td>"
+        f"{cell}; color: @muted'>{escaped(limit_text(figure))}</td></tr>"
+    )
+    advice = _advice(figure)
+    return row + (f"<tr><td></td><td colspan='3'>{escaped(advice)}</td></tr>" if advice else "")
 
 
 def _advice(figure: Finding) -> str:

@@ -90,14 +90,18 @@ def looking_back(operator: Operator) -> None:
     strip.chosen.emit(sorted(p.name for p in balls(operator).glob("*.png"))[3])
     operator.pause(4.0)
     operator.shot("calibrate-looked-at")
-    wizard(operator).go_to("refraction")
+    wizard(operator).go_to("result")
+    computed(operator)
+    tabs = wizard(operator).at("result").tabs
+    tabs.setCurrentIndex(1)
     operator.shot("calibrate-refraction")
-    wizard(operator).go_to("reflectance")
+    tabs.setCurrentIndex(2)
     computed(operator)
     effect = wizard(operator).findChild(QLabel, "lut.effect")
     assert effect is not None
     operator.until(lambda: "RMS" in effect.text(), "the press through the curve")
     operator.shot("calibrate-reflectance")
+    tabs.setCurrentIndex(0)
 
 
 def calibration(operator: Operator) -> None:

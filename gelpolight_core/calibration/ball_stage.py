@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,10 +76,11 @@ class SeenBall:
 
 @dataclass(frozen=True, slots=True)
 class Balls:
-    """What was found in the images of ball presses, and what they say of the background."""
+    """What was found in the images of ball presses, what it says of background and refraction."""
 
     seen: tuple[SeenBall, ...]
     background: tuple[Finding, ...] = ()
+    roundness: tuple[Finding, ...] = ()
 
     @property
     def presses(self) -> tuple[BallPress, ...]:
@@ -105,7 +106,7 @@ class Balls:
             if ball.fault is not None
         ]
         left_out = judge_left_out("balls_left_out", tr("Captures left out"), refused)
-        return QualityTable((left_out, *self.background))
+        return QualityTable((left_out, *self.background, *self.roundness))
 
     @property
     def quality(self) -> QualityTable:
@@ -150,6 +151,7 @@ def _run_balls(work: Work) -> Balls:
     from gelpolight_core.calibration.untouched import cells_of, judge_background
     from gelpolight_core.lights.crosstalk import unmix
     from gelpolight_core.parallel import in_parallel
+    from gelpolight_core.reflectance.roundness import judge_roundness
 
     session, before = linear(work.session, work.results), work.results.get(BALLS)
     known = {ball.key: ball for ball in (() if before is None else before.seen)}
@@ -173,7 +175,8 @@ def _run_balls(work: Work) -> Balls:
     table = work[TOP_POSE].table
     untouched = [ball.cells for ball in balls if ball.cells is not None]
     agreement = judge_background(cells_of(work[BACKGROUND].light, table), untouched, table)
-    return Balls(tuple(balls), agreement)
+    found_balls = Balls(tuple(balls), agreement)
+    return replace(found_balls, roundness=judge_roundness(found_balls.presses, table))
 
 
 def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) -> SeenBall:
@@ -329,7 +332,7 @@ REFLECTANCE = Stage(
             "reflectance",
             tr("Reflectance"),
             lambda made: made.table.quality,
-            tr("Measures the reflectance of the membrane with balls of known radius"),
+            tr("Measures the reflectance of the membrane with balls of known diameter"),
         ),
         Table(
             "factors",

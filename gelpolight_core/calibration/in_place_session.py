@@ -269,7 +269,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
     caps, widths = caps[np.isfinite(caps)], widths[np.isfinite(widths)]
     used, refused = len(result.presses), len(result.refused)
     more = tr("Press more balls at more positions")
-    sizes = tr("Check the ball radii and the scale (mm per pixel)")
+    sizes = tr("Check the ball diameters and the scale (mm per pixel)")
     grid = result.model.grid
     scale = judge_scale(grid.pixel_mm.tolist(), result.model.scale_sd).figures
     return {

@@ -214,7 +214,7 @@ def judge_joint(
                 "%",
                 warn=4.0,
                 fail=12.0,
-                remedy=tr("Check the ball radii, then repeat the worst presses"),
+                remedy=tr("Check the ball diameters, then repeat the worst presses"),
             ),
             judge(
                 "joint_led_sd_mm",
@@ -285,7 +285,7 @@ def judge_stated(
     best = stated[0]
     apparent_mm = sum(t / n for t, n in zip(stack.thicknesses_mm, stack.indices, strict=True))
     texts = {
-        "radius": tr("the ball radii ({x:.3f} times the stated ones fit)"),
+        "radius": tr("the ball diameters ({x:.3f} times the stated ones fit)"),
         "square": tr("the squares of the board on the top surface ({x:.3f} times the stated fit)"),
         "led_height": tr("the LED height ({height:.1f} mm fits)"),
         "coating": tr("the coating (stretched to twice its area, it has {light:.0%} of its light)"),
@@ -327,7 +327,7 @@ def _scale_figures(full: FullModel) -> tuple[Finding, ...]:
     scale = full.scale_sd
     if scale is None:
         return ()
-    lengths = tr("Check the ball radii, the LED height and the refractive index")
+    lengths = tr("Check the ball diameters, the LED height and the refractive index")
     stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
     return (
         judge(

@@ -338,7 +338,7 @@ def _explained(
         if not stays:
             refused[press.name] = InputError(
                 tr(
-                    "its shading does not fit a ball of the stated radius, compared with the "
+                    "its shading does not fit a ball of the stated diameter, compared with the "
                     "other presses (slope error {e:.2f}, other presses {m:.2f})"
                 ).format(e=error, m=float(np.median(errors))),
                 where=press.name,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,12 +76,12 @@ class PressAgreement:
     @property
     def fault(self) -> Finding | None:
         """The most probable cause, with the remedy; None if the press agrees."""
-        name, limit = self.name, ODD_WARN_PERCENT / 100.0
+        name, limit = PurePath(self.name).stem, ODD_WARN_PERCENT / 100.0
         if self.usual_odd_share > limit:
             text = tr("No press follows a single reflectance curve")
             remedy = tr(
                 "On a very glossy membrane this is normal if the figures of the joint refinement"
-                " pass; otherwise check the LEDs, the exposure and the ball radii, and repeat"
+                " pass; otherwise check the LEDs, the exposure and the ball diameters, and repeat"
                 " mirror, whiteboard and background"
             )
         elif self.odd_share > limit:
@@ -89,10 +90,13 @@ class PressAgreement:
             remedy = tr("Remove dirt, clean the membrane and press again, or leave the capture out")
         elif self.radius_off_percent > RADIUS_WARN_PERCENT:
             text = tr(
-                "The radius of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
+                "The diameter of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
                 " other presses"
-            ).format(name=name, stated=self.stated_radius_mm, fitted=self.radius_mm)
-            remedy = tr("Correct the radius (not the diameter), or check the circle")
+            )
+            text = text.format(
+                name=name, stated=2.0 * self.stated_radius_mm, fitted=2.0 * self.radius_mm
+            )
+            remedy = tr("Correct the diameter, or check the circle")
         elif self.moved_share > MOVED_SHARE:
             text = tr("The circle of {name} is misplaced by {share:.0f} % of its radius")
             text = text.format(name=name, share=100.0 * self.moved_share)
@@ -166,17 +170,18 @@ def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Finding, ..
         return ()
     odd = max(agreements, key=lambda a: a.radius_off_percent)
     poor = max(agreements, key=lambda a: a.odd_share)
+    glossy = odd.usual_odd_share > ODD_WARN_PERCENT / 100.0
     return (
         judge(
             "press_radius_percent",
-            tr("Stated radius against the other presses, worst ({name})").format(name=odd.name),
+            tr("Stated diameter against the other presses, worst ({name})").format(name=odd.name),
             odd.radius_off_percent,
             "%",
             warn=RADIUS_WARN_PERCENT,
             # If no press follows a curve, as with a glossy membrane, the curve cannot show a wrong
             # radius. The joint refinement compares the presses again.
-            fail=None if odd.usual_odd_share > ODD_WARN_PERCENT / 100.0 else RADIUS_FAIL_PERCENT,
-            remedy=odd.remedy,
+            fail=None if glossy else RADIUS_FAIL_PERCENT,
+            remedy="" if glossy else odd.remedy,
         ),
         judge(
             "press_dirt_percent",

@@ -230,8 +230,8 @@ def check_shading(
     if ball_radius_px is not None and circle.radius > _LARGEST_OF_BALL * ball_radius_px:
         _refuse_shape(
             Reason.TOO_LARGE,
-            tr("the contact's radius is {c:.0f} px, the ball's only {r:.0f} px").format(
-                c=circle.radius, r=ball_radius_px
+            tr("the contact is {c:.0f} px wide, the ball only {d:.0f} px").format(
+                c=2.0 * circle.radius, d=2.0 * ball_radius_px
             ),
             name,
         )

@@ -157,10 +157,9 @@ def find_ball(
 
 def larger_contact(contact_mm: float, radius_mm: float, name: str) -> InputError:
     """Return the error that a contact is larger than the ball that is stated."""
-    text = tr("the contact's radius is {c:.2f} mm, the ball's is stated as {r:.2f} mm")
-    return InputError(
-        text.format(c=contact_mm, r=radius_mm), where=name, advice=Remedy.CHECK_RADIUS
-    )
+    text = tr("the contact is {c:.2f} mm wide, the ball's diameter is stated as {d:.2f} mm")
+    text = text.format(c=2.0 * contact_mm, d=2.0 * radius_mm)
+    return InputError(text, where=name, advice=Remedy.CHECK_RADIUS)
 
 
 def _on_grid(placed: PlacedContact, table: ResamplingTable) -> Circle:
@@ -241,7 +240,7 @@ def _judge(
                 "%",
                 warn=8.0,
                 fail=25.0,
-                remedy=tr("Check the ball's radius and that nothing else touches the membrane"),
+                remedy=tr("Check the ball's diameter and that nothing else touches the membrane"),
             ),
         )
     )

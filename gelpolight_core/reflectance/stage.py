@@ -189,8 +189,8 @@ def _judge(
                 fail=25.0,
                 remedy=tr(
                     "On a very glossy membrane this is normal if the figures of the joint"
-                    " refinement pass; otherwise check ball radii and LED positions, then repeat"
-                    " the worst presses"
+                    " refinement pass; otherwise check ball diameters and LED positions, then"
+                    " repeat the worst presses"
                 ),
             ),
             judge(

@@ -190,6 +190,6 @@ def _numbers(c: Calibration) -> dict[str, Any]:
 def _not_validated() -> Validation:
     sentence = tr(
         "Not validated: no object of known size was measured with this calibration. A wrong ball "
-        "radius, square size or scale makes every result wrong, and no image can show this"
+        "diameter, square size or scale makes every result wrong, and no image can show this"
     )
     return Validation(sentence, Verdict.WARN)

@@ -18,6 +18,7 @@ from gelpolight_core.session.session import (
     VERSION,
     InPlace,
     Session,
+    serial_fault,
 )
 from gelpolight_core.translation import tr
 
@@ -30,8 +31,14 @@ def write_description(session: Session) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the serial number cannot name files, or the file cannot be written.
     """
+    if fault := serial_fault(session.serial):
+        raise InputError(
+            tr("The serial number {what}").format(what=fault),
+            where=session.folder,
+            advice=Remedy.CORRECT_VALUE,
+        )
     radii: dict[str, float] = dict(session.ball_radii_mm)
     if session.ball_default_radius_mm is not None:
         radii["default"] = session.ball_default_radius_mm

@@ -14,7 +14,7 @@ from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
-from gelpolight_core.io.reading import read_toml
+from gelpolight_core.io.reading import NAME_LIMIT, read_toml
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
@@ -39,6 +39,8 @@ SENSOR_RANGES = {
 }
 _SENSOR_DEFAULTS = {"window_thickness_mm": 0.0, "window_refractive_index": 1.49}
 IN_PLACE = "in_place"
+NOT_IN_A_NAME = '/\\:*?"<>|'
+"""Characters that the name of a folder cannot have everywhere; files are named by the serial."""
 SCALE_RANGE = (1e-4, 10.0)
 PUNCH_RANGE = (0.1, 100.0)
 
@@ -57,6 +59,19 @@ class SensorData:
     window_thickness_mm: float = 0.0
     window_refractive_index: float = 0.0
     working_diameter_mm: float = 0.0
+
+
+def serial_fault(serial: str) -> str:
+    """Return why a text cannot be a serial number, as a clause; empty if it can."""
+    if not serial.strip():
+        return tr("is empty")
+    if set(serial) & set(NOT_IN_A_NAME) or not serial.isprintable() or serial[0] == ".":
+        return tr("must not start with a dot, or contain any of {characters}").format(
+            characters=" ".join(NOT_IN_A_NAME)
+        )
+    if len(serial) > NAME_LIMIT:
+        return tr("has more than {n} characters").format(n=NAME_LIMIT)
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,7 +313,7 @@ def _parse_in_place(top: Table) -> dict[str, Any]:
             where=top.path,
             advice=Remedy.STATE_IN_SESSION,
         )
-    return {"sensor": SensorData(sensor.text("serial")), "in_place": found}
+    return {"sensor": SensorData(_parse_serial(sensor)), "in_place": found}
 
 
 def _parse_scale(table: Table) -> tuple[float, float] | None:
@@ -353,9 +368,16 @@ def _parse_sensor(table: Table) -> SensorData:
         name: table.number(name, low, high, default=_SENSOR_DEFAULTS.get(name))
         for name, (low, high) in SENSOR_RANGES.items()
     }
-    sensor = SensorData(serial=table.text("serial"), **numbers)
+    sensor = SensorData(serial=_parse_serial(table), **numbers)
     table.no_more(*SensorData.__dataclass_fields__, ELASTOMER)
     return sensor
+
+
+def _parse_serial(table: Table) -> str:
+    serial = table.text("serial")
+    if fault := serial_fault(serial):
+        raise table.wrong("serial", fault)
+    return serial
 
 
 def _parse_board(table: Table) -> BoardSpec:

@@ -10,7 +10,7 @@ from test_joint import BALLS, MIRROR, NO_MAP, SLAB, found_press, pixels_of, trut
 
 from gelpolight_core.calibration.joint import Stated, refine_jointly
 from gelpolight_core.calibration.refinement import judge_stated
-from gelpolight_core.causes import explained
+from gelpolight_core.causes import best_cause
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.session.session import SensorData
@@ -24,7 +24,7 @@ STACK = LayerStack((25.0, 14.0), (1.0, 1.41))
     ("key", "stated", "named"),
     [
         ("", 1.0, ""),
-        ("radius", 1.1, "the ball radii (0.9"),
+        ("radius", 1.1, "the ball diameters (0.9"),
         ("layers", 1.03, "mm of elastomer or"),
         ("square", 1.04, "the squares of the board"),
         ("led_height", 0.7, "the LED height (19."),
@@ -50,10 +50,11 @@ def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> N
         leds += (stated - 1.0) * (leds - np.pad(BRIGHT, ((0, 0), (0, 1))))
     joint = refine_jointly(presses, pixels, leds, SLAB, NO_MAP, bright_mm=BRIGHT)
     (figure,) = judge_stated(joint.stated, SENSOR, STACK)
-    cause, _ = explained({"joint": QualityTable((figure,))})
+    cause = best_cause({"joint": QualityTable((figure,))})
     if key:
         assert joint.stated[0].key == key
-        assert named in cause
+        assert cause is not None
+        assert named in cause.remedy
     assert (figure.verdict is Verdict.PASS) == (not key)
 
 
@@ -63,4 +64,4 @@ def test_two_lengths_that_explain_the_presses_equally_well_are_both_named() -> N
     (figure,) = judge_stated(stated, SENSOR, STACK)
     assert "of elastomer or" in figure.remedy
     assert "the LED height (15.1 mm fits)" in figure.remedy
-    assert "radii" not in figure.remedy
+    assert "diameters" not in figure.remedy

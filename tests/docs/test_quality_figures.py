@@ -26,9 +26,8 @@ HIGHER_IS_BETTER = {"axis_ratio", "coverage", "signal_to_noise"}  # of a ball's 
 # What the chapter says of limits that depend on the image or the ball; its numbers are filled in
 # from the module.
 IN_WORDS = {
-    "None if odd.usual_odd_share > ODD_WARN_PERCENT / 100.0 else RADIUS_FAIL_PERCENT": (
-        "{RADIUS_FAIL_PERCENT:g} %"
-    ),
+    "None if glossy else RADIUS_FAIL_PERCENT": "{RADIUS_FAIL_PERCENT:g} %",
+    "100.0 * SIGMAS * sd": "{SIGMAS:g} standard deviations",
     "camera.width / 500.0": "width/500",
     "camera.width / 50.0": "width/50",
     "edge_limit_px(view.image_size[0])": "width / 200, at least 3 px",

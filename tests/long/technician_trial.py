@@ -75,17 +75,11 @@ class Trial:
             hand.click("calibrate.next")
         for step in IMAGE_STEPS:
             self.images(step)
-        for step in ("refraction", "reflectance"):
-            if self.by_hand:
-                hand.begin(step)
-                hand.until(lambda: not self.wizard.model.busy, f"the {step} step")
-                hand.click("calibrate.next")
         hand.begin("result")
         hand.until(lambda: self.step == "result", "the result step")
         hand.click("result.save")
         hand.until(lambda: self.wizard.model.saved, "the saved calibration")
-        if self.by_hand:
-            hand.click("calibrate.next")
+        hand.click("calibrate.next")
         self._validate()
         self.done = True
 

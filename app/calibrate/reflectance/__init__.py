@@ -1,1 +1,1 @@
-"""The step `reflectance` of the wizard."""
+"""The editor of the reflectance curves."""

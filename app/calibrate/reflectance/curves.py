@@ -1,8 +1,8 @@
-"""The reflectance step: the curve editor with the data of the session's ball presses."""
+"""The curve editor with the data of the session's ball presses."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from operator import is_
 
@@ -12,20 +12,20 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.calibrate.model import WizardModel
 from app.calibrate.reflectance.lut_editor import LutEditor
 from app.calibrate.reflectance.lut_effect import Effect, ball_effect
-from app.calibrate.reflectance.lut_model import Curve, CurveEdit, start_edit, with_curves
+from app.calibrate.reflectance.lut_model import CurveSet, fitted_curves, with_nodes
 from app.services.jobs import Job
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.recipes import PAPER
+from gelpolight_core.calibration.recipes import JOINT, PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.status import StageState
+from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.translation import tr
 
-Material = tuple[CurveEdit, CurveEdit, ReflectanceScatter, Callable[[CurveEdit, str], Effect]]
-Nodes = dict[int, tuple[Point, ...]]
+Material = tuple[ReflectanceTable, ReflectanceScatter, Callable[[CurveSet, str], Effect]]
 
 
 class Curves(QWidget):
@@ -45,7 +45,7 @@ class Curves(QWidget):
         named(self, "curves", tr("Reflectance curves"))
         self._model = model
         self.editor: LutEditor | None = None
-        self._fitted: CurveEdit | None = None
+        self._fitted: CurveSet | None = None
         self._made_of: tuple[object, object] | None = None
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
@@ -58,7 +58,7 @@ class Curves(QWidget):
         """Show the present curves, or explain why there are none yet."""
         project = self._model.project
         present = project.results.get(REFLECTANCE)
-        if present is None or "reflectance" in project.stale():
+        if present is None or REFLECTANCE.key in project.stale():
             self.close_editor()
             self._made_of = None
             waits = self._model.jobs.busy
@@ -99,55 +99,34 @@ class Curves(QWidget):
         self._message.show()
 
     def _on_stopped(self, sentence: str) -> None:
-        self._made_of = None  # collected again when the step is next shown
+        self._made_of = None  # collected again when the tab is next shown
         self._show_message(sentence)
 
     def _show(self, material: Material) -> None:
-        fitted, state, scatter, effect = material
+        table, scatter, effect = material
         self.close_editor()
         self._message.hide()
-        self._fitted = fitted
-        self.editor = LutEditor(
-            state, scatter, previous=fitted, effect=effect, history=partial(self._on_edit, fitted)
-        )
+        self._fitted = fitted_curves(table)
+        stored = self._model.project.session.decisions.curves
+        present = with_nodes(self._fitted, stored)
+        self.editor = LutEditor(table, present, scatter, effect=effect, history=self._on_edit)
         self._column.addWidget(self.editor, 1)
 
-    def _on_edit(self, fitted: CurveEdit, text: str, before: CurveEdit, after: CurveEdit) -> None:
+    def _on_edit(self, text: str, after: CurveSet) -> None:
+        fitted, before = self._fitted, self._model.project.session.decisions.curves
+        nodes = {k: c.points for k, c in enumerate(after) if fitted and c != fitted[k]}
         self._model.correct(
-            text, partial(self._put, fitted, after), partial(self._put, fitted, before),
-            "reflectance",
-        )  # fmt: skip
+            text, partial(self._put, nodes), partial(self._put, dict(before)), REFLECTANCE.key
+        )
 
-    def _put(self, fitted: CurveEdit, state: CurveEdit) -> None:
-        """Apply curves and show them; an editor of other presses shows only the nodes."""
-        nodes = _nodes(state, fitted)
+    def _put(self, nodes: Mapping[int, tuple[Point, ...]]) -> None:
+        """Store the nodes of edited curves and show them."""
         self._model.project.edit_curves(nodes)
         if self.editor is not None and self._fitted is not None:
-            same = self._fitted is fitted
-            self.editor.show_state(state if same else with_curves(self._fitted, _curves(nodes)))
-
-
-def _nodes(state: CurveEdit, fitted: CurveEdit) -> Nodes:
-    """Return the nodes of the curves that differ from the fit of the session's stage."""
-    return {
-        channel: tuple(zip(now.curve.cosines, now.curve.values, strict=True))
-        for channel, (now, fit) in enumerate(zip(state, fitted, strict=True))
-        if now.curve != fit.curve
-    }
-
-
-def _curves(nodes: Nodes) -> dict[int, Curve]:
-    return {
-        channel: Curve(tuple(c for c, _ in points), tuple(v for _, v in points))
-        for channel, points in nodes.items()
-    }
+            self.editor.show_curves(with_nodes(self._fitted, nodes))
 
 
 def _gather(project: Project) -> Material:
-    known = project.statuses()["joint"].state in (StageState.PASS, StageState.WARN)
+    known = project.statuses()[JOINT.key].state in (StageState.PASS, StageState.WARN)
     run = project.finish(None if known else PAPER)
-    session = run.session
-    fitted = start_edit(run.results[REFLECTANCE].table.table)
-    scatter = gather_scatter(run)
-    edited = _curves(dict(session.decisions.curves))
-    return fitted, with_curves(fitted, edited), scatter, ball_effect(run)
+    return run.results[REFLECTANCE].table.table, gather_scatter(run), ball_effect(run)

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.reflectance.lut_model import CurveEdit
+from app.calibrate.reflectance.lut_model import CurveSet
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.project import Run
@@ -60,8 +60,8 @@ class Effect:
         return self.profile_mm - self.sphere_mm
 
 
-def ball_effect(run: Run) -> Callable[[CurveEdit, str], Effect]:
-    """Return a function of (state, name of press) that reconstructs the press with those curves.
+def ball_effect(run: Run) -> Callable[[CurveSet, str], Effect]:
+    """Return a function of (curves, name of press) that reconstructs the press with those curves.
 
     Parameters
     ----------
@@ -75,10 +75,8 @@ def ball_effect(run: Run) -> Callable[[CurveEdit, str], Effect]:
     def frame(name: str) -> NDArray[np.float32]:
         return read_image(run.session.folder / name, response=calibration.response).rgb
 
-    def effect(edit: CurveEdit, name: str) -> Effect:
-        curves = {
-            k: (np.array(c.curve.cosines), np.array(c.curve.values)) for k, c in enumerate(edit)
-        }
+    def effect(edited_curves: CurveSet, name: str) -> Effect:
+        curves = {k: (np.array(c.cosines), np.array(c.values)) for k, c in enumerate(edited_curves)}
         changed = edited(calibration, curves, operator="", made="")
         solver = SOLVERS[calibration.model](changed.data, workers=1)
         return _compare(solver.depth(frame(name), wanted).depth_mm.astype(np.float64), name, run)

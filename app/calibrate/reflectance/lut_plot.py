@@ -1,319 +1,148 @@
-"""The plot of the editor: scatter as density, measured and extrapolated curve, draggable nodes."""
+"""The plot of the curve editor: pixels of the ball presses, the curve, and nodes to drag."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QBrush, QColor, QPen
-from PySide6.QtWidgets import QGraphicsRectItem
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor
 
-from app.calibrate.reflectance.lut_model import Curve, CurveEdit, left_out_points
+from app.calibrate.reflectance.lut_model import Curve
 from app.theme import theme
 from app.widgets.plots import without_menus
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.translation import tr
 
-Array = NDArray[np.float64]
 # (light, dark): both contrast with the theme's base colour.
 CHANNEL_COLOURS = (("#b3211d", "#ff8a80"), ("#1b6e3a", "#7fdc9a"), ("#1f4fbf", "#8ab4ff"))
 BINS = 240
-OUTLIER_SPREADS = 4.0
-MAX_MARKS = 1500
 GRAB_PX = 14
 NODE_PX = 11
 
 
-def channel_colour(channel: int) -> QColor:
-    """Return the channel's colour in the present theme."""
-    return QColor(CHANNEL_COLOURS[channel][theme.is_dark()])
+def bare_plot() -> pg.PlotWidget:
+    """Return a plot without menus and prefixes of units."""
+    plot = without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False)))
+    plot.hideButtons()
+    for side in ("left", "bottom"):
+        plot.getAxis(side).enableAutoSIPrefix(False)
+    return plot
 
 
-class LassoViewBox(pg.ViewBox):
-    """A view box in which a drag draws an outline while the lasso is on."""
-
-    drawn = Signal(object)
-
-    def __init__(self) -> None:
-        super().__init__(enableMenu=False)
-        self.lasso = False
-        self._points: list[tuple[float, float]] = []
-        self._line = pg.PlotCurveItem()
-        self._line.setZValue(50)
-        self.addItem(self._line, ignoreBounds=True)
-
-    def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
-        """Draw the outline, or pan."""
-        if not self.lasso or event.button() != Qt.MouseButton.LeftButton:
-            super().mouseDragEvent(event, axis)
-            return
-        event.accept()
-        if event.isStart():
-            self._points = [self._to_point(event.buttonDownPos())]
-        self._points.append(self._to_point(event.pos()))
-        if event.isFinish():
-            self._line.setData([], [])
-            self.drawn.emit(tuple(self._points))
-            return
-        x, y = zip(*self._points, self._points[0], strict=True)
-        pen = pg.mkPen(theme.colour("accent"), width=2, style=Qt.PenStyle.DashLine)
-        self._line.setData(list(x), list(y), pen=pen)
-
-    def _to_point(self, position: Any) -> tuple[float, float]:
-        point = self.mapToView(position)
-        return float(point.x()), float(point.y())
+def apply_theme(plot: pg.PlotWidget) -> None:
+    """Apply the colours of the present theme to a plot."""
+    plot.setBackground(theme.colour("base"))
+    for side in ("bottom", "left"):
+        plot.getAxis(side).setPen(pg.mkPen(theme.colour("muted")))
+        plot.getAxis(side).setTextPen(pg.mkPen(theme.colour("text")))
 
 
-class NodeItem(pg.ScatterPlotItem):
-    """The nodes of one curve; a dragged node follows the pointer within the limits of `moved`."""
+class CurvePlot(pg.PlotWidget):  # type: ignore[misc]
+    """The curve of one channel over the pixels that it was fitted to.
+
+    Parameters
+    ----------
+    scatter : ReflectanceScatter
+        The pixels of the ball presses.
+    moved : callable
+        Called with the index of a dragged node, its cosine and value, and whether the drag ended.
+    chosen : callable
+        Called with the index of a clicked node.
+    added : callable
+        Called with a cosine after a double click.
+    """
 
     def __init__(
         self,
-        chosen: Callable[[int], None],
+        scatter: ReflectanceScatter,
+        *,
         moved: Callable[[int, float, float, bool], None],
+        chosen: Callable[[int], None],
+        added: Callable[[float], None],
     ) -> None:
-        super().__init__(pxMode=True)
-        self._chosen, self._moved = chosen, moved
-        self._dragged: int | None = None
-        self._nodes = np.zeros((0, 2))
-        self.setZValue(40)
-        self.setCursor(Qt.CursorShape.ArrowCursor)
-
-    def show_nodes(self, curve: Curve, index: int | None, colour: QColor) -> None:
-        """Show the nodes, the selected one filled and larger."""
-        self._nodes = np.stack([curve.cosines, curve.values], axis=-1)
-        base = theme.colour("base")
-        spots = [
-            {
-                "pos": node,
-                "size": NODE_PX + 5 if i == index else NODE_PX,
-                "brush": pg.mkBrush(colour if i == index else base),
-                "pen": pg.mkPen(colour, width=2),
-                "symbol": "o",
-            }
-            for i, node in enumerate(self._nodes)
-        ]
-        self.setData(spots=spots)
-
-    def nearest(self, position: QPointF) -> int | None:
-        """Return the node that can be grabbed at a position of this item."""
-        box = self.getViewBox()
-        if box is None or not len(self._nodes):
-            return None
-        wide, high = box.viewPixelSize()
-        off = (self._nodes - [position.x(), position.y()]) / [wide, high]
-        away = np.hypot(off[:, 0], off[:, 1])
-        index = int(away.argmin())
-        return index if away[index] <= GRAB_PX else None
-
-    def hoverEvent(self, event: Any) -> None:
-        """Show a hand cursor where a node can be grabbed."""
-        over = not event.isExit() and self.nearest(event.pos()) is not None
-        if over:
-            event.acceptDrags(Qt.MouseButton.LeftButton)
-            event.acceptClicks(Qt.MouseButton.LeftButton)
-        shape = Qt.CursorShape.OpenHandCursor if over else Qt.CursorShape.ArrowCursor
-        self.setCursor(shape)
-
-    def mouseClickEvent(self, event: Any) -> None:
-        """Select the node under the pointer."""
-        index = self.nearest(event.pos())
-        if index is None or event.button() != Qt.MouseButton.LeftButton:
-            event.ignore()
-            return
-        event.accept()
-        self._chosen(index)
-
-    def mouseDragEvent(self, event: Any) -> None:
-        """Move the grabbed node."""
-        if event.button() != Qt.MouseButton.LeftButton:
-            event.ignore()
-            return
-        if event.isStart():
-            self._dragged = self.nearest(event.buttonDownPos())
-            if self._dragged is not None:
-                self._chosen(self._dragged)
-        if self._dragged is None:
-            event.ignore()
-            return
-        event.accept()
-        position = event.pos()
-        self._moved(self._dragged, float(position.x()), float(position.y()), bool(event.isFinish()))
-
-
-class CurvePlot(pg.PlotWidget):
-    """One channel of a state, drawn over its scatter."""
-
-    node_chosen = Signal(int)
-    node_moved = Signal(int, float, float, bool)
-    outlined = Signal(object)
-    asked_for_node = Signal(float)
-
-    def __init__(self, scatter: ReflectanceScatter) -> None:
-        self.box = LassoViewBox()
-        super().__init__(viewBox=self.box)
+        super().__init__(viewBox=pg.ViewBox(enableMenu=False))
         without_menus(self)
-        self.hideButtons()  # the tool that shows the whole curve has a name
-        self._scatter = scatter
-        self._density_of: tuple[object, ...] = ()
-        self._image = pg.ImageItem()
-        self._outliers = pg.ScatterPlotItem(symbol="x", size=6)
-        self._gone = pg.ScatterPlotItem(symbol="x", size=7)
-        self._shades = [QGraphicsRectItem(), QGraphicsRectItem()]
-        self._words = [pg.TextItem(anchor=(0.5, 0.5), angle=90) for _ in self._shades]
-        self._edges = [pg.InfiniteLine(angle=90) for _ in self._shades]
-        self._previous, self._fit = pg.PlotCurveItem(), pg.PlotCurveItem()
-        self._dashed, self._solid = pg.PlotCurveItem(), pg.PlotCurveItem()
-        self.nodes = NodeItem(self.node_chosen.emit, self.node_moved.emit)
-        layers = (
-            self._image,
-            *self._shades,
-            *self._edges,
-            *self._words,
-            self._outliers,
-            self._gone,
-            self._previous,
-            self._fit,
-            self._dashed,
-            self._solid,
-            self.nodes,
-        )
-        for layer in layers:
+        self._scatter, self._moved, self._chosen, self._added = scatter, moved, chosen, added
+        self._pixels, self._line = pg.ImageItem(), pg.PlotCurveItem()
+        self._fit = pg.PlotCurveItem()
+        self._unseen = [pg.LinearRegionItem(movable=False) for _ in range(2)]
+        self._nodes: list[pg.TargetItem] = []
+        self._busy = False
+        for layer in (*self._unseen, self._pixels, self._fit, self._line):
             self.addItem(layer, ignoreBounds=True)
-        self._legend = self.addLegend(offset=(-40, -12))
-        self.box.drawn.connect(self.outlined)
         self.scene().sigMouseClicked.connect(self._on_click)
         self.setLabel("bottom", tr("cosine of the angle between normal and light"))
-        self.getAxis("left").enableAutoSIPrefix(False)
         self.setLabel("left", tr("pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)"))
+        self.getAxis("left").enableAutoSIPrefix(False)
 
-    def show_state(
-        self, edit: CurveEdit, channel: int, *, chosen: int | None, previous: Curve | None
-    ) -> None:
-        """Show a channel of a state.
-
-        Parameters
-        ----------
-        edit : CurveEdit
-            State of the editor.
-        channel : int
-            Index of the channel.
-        chosen : int or None
-            Index of the selected node.
-        previous : Curve or None
-            An older curve to compare with.
-        """
-        colour = channel_colour(channel)
-        self._show_scatter(edit, channel)
-        self._show_coverage(edit, channel)
+    def show_channel(self, channel: int, fit: Curve, coverage: tuple[float, float]) -> None:
+        """Show the pixels and the fit of a channel; outside of its coverage there are none."""
+        apply_theme(self)
+        x, y = self._scatter.cosines[channel], self._scatter.values[channel]
+        top = 1.12 * float(max(fit.values[-1], np.quantile(y, 0.999)))
+        counts, _, _ = np.histogram2d(x, y, BINS, ((0.0, 1.0), (0.0, top)))
+        self._pixels.setImage(_density(counts), autoLevels=False)
+        self._pixels.setRect(QRectF(0.0, 0.0, 1.0, top))
+        shade = QColor(theme.colour("muted"))
+        shade.setAlpha(60)
+        for region, span in zip(
+            self._unseen, ((-1.0, coverage[0]), (coverage[1], 2.0)), strict=True
+        ):
+            region.setRegion(span)
+            region.setBrush(pg.mkBrush(shade))
+            for line in region.lines:
+                line.setPen(pg.mkPen(shade))
         cosine = np.linspace(0.0, 1.0, 500)
-        curve = edit[channel].curve
-        value = curve.at(cosine)
-        low, high = edit[channel].coverage
-        seen = (cosine >= low) & (cosine <= high)
-        self._solid.setData(cosine[seen], value[seen], pen=pg.mkPen(colour, width=3))
-        self._dashed.setData(
-            cosine, value, pen=pg.mkPen(colour, width=2, style=Qt.PenStyle.DashLine)
-        )
         dots = pg.mkPen(theme.colour("text"), width=1.5, style=Qt.PenStyle.DotLine)
-        fit = edit[channel].fit
         self._fit.setData(cosine, fit.at(cosine), pen=dots)
-        self._fit.setVisible(fit != curve)
-        if previous is not None:
-            pen = pg.mkPen(theme.colour("stale"), width=2, style=Qt.PenStyle.DashDotLine)
-            self._previous.setData(cosine, previous.at(cosine), pen=pen)
-        self._previous.setVisible(previous is not None)
-        self.nodes.show_nodes(curve, chosen, colour)
-        self._show_legend(fit != curve, previous is not None)
+        self.setRange(xRange=(-0.02, 1.02), yRange=(-0.02 * top, top), padding=0.0)
 
-    def whole(self, edit: CurveEdit, channel: int) -> None:
-        """Show the whole curve."""
-        top = max(edit[channel].curve.values[-1], edit[channel].fit.values[-1])
-        self.setRange(xRange=(-0.02, 1.02), yRange=(-0.02 * top, 1.12 * top), padding=0.0)
+    def show_curve(self, curve: Curve, channel: int, chosen: int | None) -> None:
+        """Show a curve with its nodes, the chosen one filled."""
+        colour = QColor(CHANNEL_COLOURS[channel][theme.is_dark()])
+        cosine = np.linspace(0.0, 1.0, 500)
+        self._line.setData(cosine, curve.at(cosine), pen=pg.mkPen(colour, width=3))
+        while len(self._nodes) > len(curve.cosines):
+            self.removeItem(self._nodes.pop())
+        while len(self._nodes) < len(curve.cosines):
+            node, index = pg.TargetItem(size=NODE_PX, symbol="o"), len(self._nodes)
+            node.sigPositionChanged.connect(partial(self._on_moved, index, False))
+            node.sigPositionChangeFinished.connect(partial(self._on_moved, index, True))
+            self._nodes.append(node)
+            self.addItem(node, ignoreBounds=True)
+        self._busy = True
+        for index, (node, point) in enumerate(zip(self._nodes, curve.points, strict=True)):
+            node.setPos(point)
+            node.setPen(pg.mkPen(colour, width=2))
+            node.setBrush(pg.mkBrush(colour if index == chosen else theme.colour("base")))
+        self._busy = False
 
-    def apply_theme(self) -> None:
-        """Apply the colours of the present theme."""
-        text = theme.colour("text")
-        self.setBackground(theme.colour("base"))
-        for side in ("bottom", "left"):
-            axis = self.getAxis(side)
-            axis.setPen(pg.mkPen(theme.colour("muted")))
-            axis.setTextPen(pg.mkPen(text))
-        self._legend.setLabelTextColor(text)
-        panel = QColor(theme.colour("base"))
-        panel.setAlpha(215)
-        self._legend.setBrush(pg.mkBrush(panel))
-        self._legend.setPen(pg.mkPen(theme.colour("line")))
-        self._density_of = ()
+    def _on_moved(self, index: int, end: bool, node: pg.TargetItem) -> None:
+        if not self._busy:  # moved by the pointer
+            self._moved(index, float(node.pos().x()), float(node.pos().y()), end)
 
     def _on_click(self, event: Any) -> None:
-        if event.double() and event.button() == Qt.MouseButton.LeftButton:
-            event.accept()
-            self.asked_for_node.emit(float(self.box.mapSceneToView(event.scenePos()).x()))
-
-    def _show_scatter(self, edit: CurveEdit, channel: int) -> None:
-        """Show density and outliers; recomputed only if channel, fit or theme have changed."""
-        state = (channel, edit[channel].left_out, edit[channel].fit, theme.is_dark())
-        if state == self._density_of:
+        view = self.getViewBox()
+        at = view.mapSceneToView(event.scenePos())
+        if event.double():
+            self._added(float(at.x()))
             return
-        self._density_of = state
-        x, y = self._scatter.cosines[channel], self._scatter.values[channel]
-        out = left_out_points(edit[channel].left_out, self._scatter, channel)
-        top = 1.12 * float(max(edit[channel].fit.values[-1], np.quantile(y, 0.9999)))
-        counts, _, _ = np.histogram2d(x[~out], y[~out], BINS, ((0.0, 1.0), (0.0, top)))
-        self._image.setImage(_density(counts), autoLevels=False)
-        self._image.setRect(QRectF(0.0, 0.0, 1.0, top))
-        off = y / np.maximum(edit[channel].fit.at(np.clip(x, 0.0, 1.0)), 1e-9) - 1.0
-        spread = 1.4826 * float(np.median(np.abs(off[~out])))
-        far = np.flatnonzero(~out & (np.abs(off) > OUTLIER_SPREADS * spread))
-        warn, fail = theme.colour("warn"), theme.colour("fail")
-        for item, which, hue in (
-            (self._outliers, far, warn),
-            (self._gone, np.flatnonzero(out), fail),
-        ):
-            which = which[:: max(which.size // MAX_MARKS, 1)]
-            item.setData(x[which], y[which], pen=pg.mkPen(hue), brush=pg.mkBrush(hue))
-
-    def _show_coverage(self, edit: CurveEdit, channel: int) -> None:
-        low, high = edit[channel].coverage
-        shade, muted = QColor(theme.colour("muted")), theme.colour("muted")
-        shade.setAlpha(90)
-        # Much higher than the curve, so that its end is not visible when zoomed out.
-        for rectangle, word, edge, (start, stop) in zip(
-            self._shades, self._words, self._edges, ((-1.0, low), (high, 2.0)), strict=True
-        ):
-            rectangle.setRect(QRectF(start, -10.0, stop - start, 30.0))
-            brush = QBrush(shade, Qt.BrushStyle.BDiagPattern)
-            rectangle.setBrush(brush)
-            rectangle.setPen(QPen(Qt.PenStyle.NoPen))
-            edge.setPen(pg.mkPen(muted, width=1, style=Qt.PenStyle.DashLine))
-            edge.setPos(low if start < 0.0 else high)
-            word.setText(tr("extrapolated: no ball data here"), color=theme.colour("text"))
-            word.fill = pg.mkBrush(theme.colour("base"))
-            middle = 0.5 * (max(start, 0.0) + min(stop, 1.0))
-            word.setPos(middle, 0.62 * edit[channel].fit.values[-1])
-            # A narrow strip has no room for text.
-            word.setVisible(min(stop, 1.0) - max(start, 0.0) > 0.04)
-
-    def _show_legend(self, fit: bool, previous: bool) -> None:
-        self._legend.clear()
-        self._legend.addItem(self._solid, tr("curve, measured"))
-        self._legend.addItem(self._dashed, tr("curve, extrapolated"))
-        if fit:
-            self._legend.addItem(self._fit, tr("fit to the ball pixels"))
-        if previous:
-            self._legend.addItem(self._previous, tr("previous version"))
-        if len(self._outliers.data):
-            self._legend.addItem(self._outliers, tr("outliers"))
-        if len(self._gone.data):
-            self._legend.addItem(self._gone, tr("excluded"))
+        wide, high = view.viewPixelSize()
+        away = [
+            np.hypot((n.pos().x() - at.x()) / wide, (n.pos().y() - at.y()) / high)
+            for n in self._nodes
+        ]
+        nearest = int(np.argmin(away))
+        if away[nearest] <= GRAB_PX:
+            self._chosen(nearest)
 
 
-def _density(counts: Array) -> NDArray[np.uint8]:
+def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return counts as a fog in the text colour, logarithmic, (columns, rows, 4)."""
     share = np.log1p(counts) / max(float(np.log1p(counts.max())), 1e-9)
     colour = theme.colour("text")

@@ -13,6 +13,7 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 from technician import ScriptedCamera, Technician, read_rgb
 
+from app.calibrate.reflectance.curves import Curves
 from app.context.context import AppContext
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
@@ -93,7 +94,7 @@ def test_capturing_again_makes_later_stages_stale_and_offers_recompute(
     technician.capture()
     technician.rest()
     assert technician.state("radiance") in ("pass", "warn")
-    assert {technician.state(key) for key in ("balls", "reflectance", "result")} == {"stale"}
+    assert {technician.state(key) for key in ("balls", "result")} == {"stale"}
     assert technician.state("lights") == "warn", "small spots do not show the crosstalk"
     technician.wizard.go_to("balls")
     assert technician.wizard.panel.buttons[0].text() == "Recompute"
@@ -225,7 +226,7 @@ def test_the_saved_calibration_equals_that_of_the_command_line(
     technician.begin(computed_project(), "result")
     technician.click("result.save")
     technician.rest()
-    assert "Saved as" in technician.wizard.at("result").view.saved.text()
+    assert "Saved as" in technician.see("result.saved").text()
     (path,) = (tmp_path / "workspace" / "sensors").rglob("*.gplcal")
     made, theirs = read_calibration(path), small_calibration
     assert made.identity == theirs.identity
@@ -249,21 +250,23 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
     technician.rest()
     used = context.workspace.in_use
     assert used is not None
-    project, view = technician.wizard.project, technician.wizard.at("result").view
+    project, step = technician.wizard.project, technician.wizard.at("result")
     results = project._results
     failed = QualityTable((judge("k", "Half a pixel", 0.5, "px", fail=0.3),))
     top = results[TOP_POSE]
     failed_top = replace(top, pose=replace(top.pose, quality=failed))
     project._results = results.having(TOP_POSE, failed_top)
     technician.wizard.refresh()
-    assert "Failed" in view.headline.text() and view.headline.property("meaning") == "fail"
-    assert view.save.text() == "&Save as a draft"
+    assert step.overview.headline.property("meaning") == "fail"
+    assert technician.state("result") == "fail"
+    assert step.buttons.save.text() == "&Save as a draft"
     technician.click("result.save")
     technician.rest()
     (draft,) = context.workspace.sensors_folder.rglob("*-draft.gplcal")
     assert context.workspace.in_use == used
     assert read_summary(draft).verdict is Verdict.FAIL
-    assert "not in use" in view.saved.text() and view.saved.property("meaning") == "fail"
+    assert step.buttons.saved.property("meaning") == "fail"
+    assert not step.buttons.save.property("primary")
 
 
 def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_again(
@@ -287,18 +290,42 @@ def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_agai
     assert technician.state("validation") == "pass"
 
 
+def curves_of(technician: Technician, project: Project) -> Curves:
+    """Open the curves of a project, and return them when their editor is there."""
+    technician.begin(project, "result")
+    step = technician.wizard.at("result")
+    step.tabs.setCurrentIndex(2)
+    technician.until(lambda: step.curves.editor is not None)
+    return step.curves
+
+
+def test_where_it_was_saved_is_shown_until_the_captures_change(
+    technician: Technician, computed_project: Made
+) -> None:
+    technician.begin(computed_project(), "result")
+    wizard, step = technician.wizard, technician.wizard.at("result")
+    step.overview.more.click()
+    assert step.buttons.save.property("primary") and not wizard.panel.next.property("primary")
+    technician.click("result.save")
+    technician.rest()
+    assert wizard.model.saved in step.buttons.saved.text()
+    assert step.overview.every.isVisible(), "the figures stay open"
+    assert not step.buttons.save.property("primary") and wizard.panel.next.property("primary")
+    wizard.model.exclude("balls", "ball_01.png", True)
+    wizard.model.jobs.cancel()
+    technician.rest()
+    assert not step.buttons.saved.text()
+
+
 def test_curves_and_other_corrections_share_one_history(
     technician: Technician, computed_project: Made, qtbot: QtBot
 ) -> None:
-    technician.begin(computed_project(), "reflectance")
-    step = technician.wizard.at("reflectance").curves
-    technician.until(lambda: step.editor is not None)
+    step = curves_of(technician, computed_project())
     technician.until(step.editor.isVisible)
     editor, undo = step.editor, technician.wizard.model.undo
-    fitted = editor.state
-    technician.click("lut.smooth.button")
-    smoothed = editor.state
-    assert smoothed != fitted
+    fitted = editor.curves
+    technician.click("lut.smooth")
+    assert editor.curves != fitted
     assert set(read_session(technician.session).decisions.curves) == {0}
     technician.wizard.model.exclude("balls", "ball_01.png", True)
     assert undo.count() == 2
@@ -310,21 +337,7 @@ def test_curves_and_other_corrections_share_one_history(
     assert read_session(technician.session).decisions.curves == {}
     technician.rest()
     technician.until(lambda: step.editor is not None)
-    assert step.editor.state == fitted
-    technician.rest()
-
-
-def test_points_excluded_with_the_lasso_change_the_calibration(
-    technician: Technician, computed_project: Made
-) -> None:
-    """The new fit differs from the session's fit, so it is a decision, like a drawn curve."""
-    technician.begin(computed_project(), "reflectance")
-    step = technician.wizard.at("reflectance").curves
-    technician.until(lambda: step.editor is not None)
-    step.editor._on_outlined(((0.5, 0.0), (0.6, 0.0), (0.6, 5.0), (0.5, 5.0)))
-    state = step.editor.state
-    assert state[0].left_out
-    assert set(read_session(technician.session).decisions.curves) == {0}
+    assert step.editor.curves == fitted
     technician.rest()
 
 
@@ -391,11 +404,11 @@ def test_a_press_image_is_validated_with_its_truth_file(
 
 
 def test_a_waiting_step_names_the_step_it_waits_for(technician: Technician, fresh: Project) -> None:
-    technician.begin(fresh, "refraction")
-    assert "captured" in technician.wizard.panel.sentence.text()
+    technician.begin(fresh, "result")
+    tabs = technician.wizard.at("result").tabs
+    tabs.setCurrentIndex(1)
     assert "earlier steps" in technician.see("calibrate.maps.none").text()
-    technician.wizard.go_to("reflectance")
-    assert "Lens" in technician.wizard.panel.sentence.text()
+    assert "Lens" in technician.wizard.model.states["result"][1]
 
 
 def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
@@ -419,7 +432,7 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
         step = wizard.at("validation")
         assert "present captures" in step.form.calibration.text()
         wizard.go_to("result")
-        assert "You can validate it now" in wizard.at("result").view.headline.text()
+        assert "You can validate it now" in wizard.at("result").overview.headline.text()
         wizard.go_to("validation")
         step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
         technician.until(lambda: "Diameter" in step.form.result.text())

@@ -15,15 +15,13 @@ from gelpolight_core.calibration.project import Run
 
 def test_a_wrong_table_changes_the_press(virtual_run: Run, virtual_session: Path) -> None:
     effect = ball_effect(virtual_run)
-    start = model.start_edit(virtual_run.results[REFLECTANCE].table.table)
+    start = model.fitted_curves(virtual_run.results[REFLECTANCE].table.table)
     name = virtual_run.results[REFLECTANCE].table.presses[0].name
-    bent = model.thin_nodes(start, 0)
-    index = int(np.argmin(np.abs(np.subtract(bent[0].curve.cosines, 0.4))))  # on the ball's side
-    low, value = bent[0].curve.values[index - 1 : index + 1]
-    bent = model.move_node(
-        bent, 0, index, bent[0].curve.cosines[index], value - 0.6 * (value - low)
-    )
-    before, after = effect(start, name), effect(bent, name)
+    curve = model.thin_nodes(start[0])
+    index = int(np.argmin(np.abs(np.subtract(curve.cosines, 0.4))))  # on the ball's side
+    low, value = curve.values[index - 1 : index + 1]
+    curve = model.move_node(curve, index, curve.cosines[index], value - 0.6 * (value - low))
+    before, after = effect(start, name), effect(model.with_curve(start, 0, curve), name)
     assert after.rms_mm > 1.5 * before.rms_mm
     # The factors follow the curve, so the membrane far from the ball stays flat.
     assert after.profile_mm[[0, -1]] == pytest.approx(before.profile_mm[[0, -1]], abs=0.06)

@@ -14,6 +14,7 @@ from report_pdf import report_data
 from technician import Technician
 
 from app.calibrate import validation as validating
+from app.calibrate.result import write_report
 from app.command_line.main import main
 from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.manifest import read_summary
@@ -140,7 +141,7 @@ def test_reports_of_the_window_and_of_the_command_state_the_validation(
     step.import_press(small_session / PRESS)
     technician.until(lambda: "Diameter" in step.form.result.text())
     step.keep()
-    technician.wizard.at("result").write_report(tmp_path / "window.pdf")
+    write_report(tmp_path / "window.pdf", technician.wizard.model, step.context, step.form.say)
     technician.rest()
     assert main(["report", str(path), "-o", str(tmp_path / "command.pdf")]) == 0
     window, command = (report_data(tmp_path / f"{n}.pdf") for n in ("window", "command"))
