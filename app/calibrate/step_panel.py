@@ -165,7 +165,7 @@ class StepPanel(QWidget):
         self.next.setProperty("primary", True)
         for button in (self.capture, self.next):
             button.setFixedHeight(36)
-        self.more.setFixedSize(48, 36)
+        self.more.setFixedSize(56, 36)
         foot = QWidget()
         self._foot = vbox(
             hbox((self.progress, 1), self.cancel, margins=0), self.capturing, self.next,

@@ -53,9 +53,7 @@ QToolBar#state {{ border-bottom: 1px solid {line}; padding: 7px 16px; }}
 QToolBar#state QToolButton, QLabel#chip {{ background: {button}; border: 1px solid transparent;
     border-radius: 14px; padding: 5px 12px; }}
 QToolBar#state QToolButton:hover {{ background: {hover}; }}
-QToolBar#state QToolButton[fold="true"] {{ text-align: left; padding: 4px 0; color: {text};
-    background: transparent; }}
-QToolButton:focus {{ border-color: {accent}; }}
+QToolBar#state QToolButton:focus {{ border-color: {accent}; }}
 QToolBar#state QToolButton[popupMode="2"] {{ padding-right: 24px; }}
 QToolBar#navigation {{ background: {window}; border: none; border-right: 1px solid {line};
     padding: 8px; spacing: 4px; }}
@@ -64,9 +62,7 @@ QToolBar#navigation QToolButton {{ border: 1px solid transparent; border-radius:
 QToolBar#navigation QToolButton:hover {{ background: {button}; }}
 QToolBar#navigation QToolButton:checked {{ background: {hover}; color: {text};
     font-weight: 600; }}
-QToolBar#navigation QToolButton[fold="true"] {{ text-align: left; padding: 4px 0; color: {text};
-    background: transparent; }}
-QToolButton:focus {{ border-color: {accent}; }}
+QToolBar#navigation QToolButton:focus {{ border-color: {accent}; }}
 QPushButton {{ border: 1px solid transparent; border-radius: 6px; padding: 6px 10px;
     background: {button}; color: {text}; }}
 QPushButton:hover {{ background: {hover}; }}
