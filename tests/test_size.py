@@ -39,7 +39,7 @@ MOST = {
     "app/shell": 1257,
     "app/sources": 2584,
     "app/start": 138,
-    "app/theme": 283,
+    "app/theme": 279,
     "app/tools": 363,
     "app/view2d": 1113,
     "app/view3d": 1602,
