@@ -55,7 +55,7 @@ CAUSES = (
     Cause(
         "thickness",
         tr("Check the thickness of the elastomer"),
-        frozenset({*HEIGHTS, "led_outside_elastomer"}),
+        frozenset({*HEIGHTS, "led_outside_elastomer", "contact_stretch_percent"}),
     ),
     Cause(
         "ball_radius",

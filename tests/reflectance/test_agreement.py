@@ -57,13 +57,13 @@ def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
     status = recomputed(project)
     assert status.state is StageState.FAIL
     assert status.quality["press_radius_percent"].verdict is Verdict.FAIL
-    assert ODD in status.sentence
+    assert ODD.removesuffix(".png") in status.sentence
     reflectance = project.results[REFLECTANCE].table
     assert reflectance is not None
     (odd,) = [a for a in reflectance.agreements if a.fault]
     assert odd.name.endswith(ODD)
     assert odd.radius_mm == pytest.approx(4.0, rel=0.08)
-    assert "radius" in odd.remedy
+    assert "diameter" in odd.remedy
     presses = project.session.found("balls")
     assert [p.name for p in presses if judge_ball(p.name, project).verdict == "fail"] == [ODD]
     project.set_ball_radius(ODD, 4.0)
