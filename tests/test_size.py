@@ -27,7 +27,7 @@ NO_CODE = {
 MOST = {
     "app/.": 171,
     "app/bench": 248,
-    "app/calibrate": 6101,
+    "app/calibrate": 6102,
     "app/cameras": 606,
     "app/command_line": 1850,
     "app/context": 483,
@@ -70,7 +70,7 @@ MOST = {
     "gelpolight_core/simulation": 2096,
     "gelpolight_core/studies": 1143,
     "tests/.": 1448,
-    "tests/app": 10643,
+    "tests/app": 10644,
     "tests/batch": 408,
     "tests/calibration": 1720,
     "tests/command_line": 1032,

@@ -339,9 +339,9 @@ class BallsStep(ImageStep):
     def remedies(self, state: str) -> tuple[Remedy, ...]:
         """Offer the diameter that fits a press which disagrees with the others."""
         project = self.model.project
-        for press in _presses(project):
+        for press in _presses(project) if REFLECTANCE.key in self.model.statuses else ():
             if (odd := _agreement(press, project)) is not None and odd.fault is not None:
-                diameter_mm, name = 2.0 * odd.radius_mm, press.name
+                diameter_mm, name = 2.0 * odd.radius_mm, Path(press.name).name
                 text = tr("Set {name} to {d:.2g} mm").format(name=Path(name).stem, d=diameter_mm)
                 fit = partial(self.set_radius, name, 0.5 * float(f"{diameter_mm:.2g}"))
                 return (text, fit), (tr("Repeat it"), partial(self.repeat, name))

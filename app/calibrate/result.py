@@ -130,12 +130,13 @@ class ResultStep(StepPresenter):
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
         self._steps = {stage: step for step in parts.steps for stage in step.stages}
-        self.overview, self._maps = Overview(), MapsView()
+        self.overview = Overview()
         self.buttons = SaveButtons(self.save, self.report)
         self.panel.add_foot(self.buttons)
         self.tabs = named(QTabWidget(documentMode=True), "result.tabs", tr("Result"))
         self.tabs.addTab(self.overview, tr("Verdict"))
         if REFLECTANCE.key in self.model.statuses:
+            self._maps = MapsView()
             self.tabs.addTab(self._maps, tr("Refraction"))
             self.tabs.addTab(QWidget(), tr("Reflectance curves"))
         self.tabs.tabBar().setVisible(self.tabs.count() > 1)

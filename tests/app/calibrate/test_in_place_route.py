@@ -16,6 +16,7 @@ from technician import Technician
 
 from app.calibrate.detection import as_image, read_raw
 from app.calibrate.in_place_balls import Progress
+from app.calibrate.result import write_report
 from app.calibrate.setup_form import SetupForm
 from app.calibrate.setup_values import new_session
 from gelpolight_core.calibration import in_place
@@ -80,7 +81,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert read_calibration(path).model == "in-place"
     step = wizard.at("validation")
     report = tmp_path / "report.pdf"
-    wizard.open.write_report(report)
+    write_report(report, wizard.model, step.context, step.form.say)
     technician.rest()
     assert report.is_file()
     wizard.go_to("validation")
