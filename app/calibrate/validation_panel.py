@@ -82,7 +82,7 @@ class ValidationPanel(QWidget):
         )
         self.after = QWidget()
         buttons = (push_button(f"validation.{name}", text, act) for name, text, act in after)
-        hbox(*buttons, of=self.after, margins=0, spacing=8)
+        vbox(*buttons, of=self.after, margins=0, spacing=8)
         object_card, result_card = (named(QFrame(), "card", tr("Pressed object")) for _ in range(2))
         vbox(self.form, of=object_card, margins=12)
         vbox(self.verdict, self.result, self.use, self.after, of=result_card, margins=12, spacing=8)
