@@ -33,7 +33,7 @@ MOST = {
     "app/context": 483,
     "app/inspect": 1935,
     "app/live": 2318,
-    "app/measure": 3865,
+    "app/measure": 3866,
     "app/sensors": 696,
     "app/services": 812,
     "app/shell": 1257,

@@ -108,6 +108,7 @@ class Inspector(QWidget):
     def set_width(self, width: int) -> None:
         """Change the width."""
         self._panel.setFixedWidth(width)
+        self.setFixedWidth(width)
 
     def show_state(self, state: PressState) -> None:
         """Show what was measured."""

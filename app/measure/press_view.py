@@ -46,7 +46,7 @@ from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 IMAGES = (".png", ".tif", ".tiff")
-TOOLS_WIDTH = 142
+TOOLS_WIDTH = 148
 INSPECTOR_SHARE, INSPECTOR_PX = 0.26, (272, 380)
 """Width of the inspector: a share of the page, and its limits."""
 KEY = Qt.ItemDataRole.UserRole

@@ -119,7 +119,7 @@ class ProtocolSetup(QScrollArea):
             self.objects.count() * self.objects.sizeHintForRow(0) + 2 * self.objects.frameWidth()
         )
         self.objects.itemSelectionChanged.connect(self._count)
-        hint = PlainLabel(tr("Click one, or several with Ctrl. Ctrl+A chooses all."))
+        hint = PlainLabel(tr("Click one, or several with Ctrl. Ctrl+A chooses all."), wrap=True)
         show_meaning(hint, "muted")
         top.addRow(tr("Diameter or side"), vbox(self.objects, hint, spacing=2))
         self.presses = Form(Presses(), "protocol", at_once=True)
