@@ -22,7 +22,7 @@ from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.step_data import Step
 from app.calibrate.step_help import StepHelp
 from app.widgets.actions import make_action
-from app.widgets.label import PlainLabel
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
 from app.widgets.meaning import make_bold, show_ground, show_meaning
 from app.widgets.naming import named
@@ -218,7 +218,7 @@ class StepPanel(QWidget):
     def show_number(self, number: Finding | None, below: str) -> None:
         """Show the one figure of the step, and a line about its captures."""
         self.caption.setText(tr("No result yet") if number is None else number.text)
-        self.caption.setToolTip("" if number is None else number.text)
+        self.caption.setToolTip(plain_tip("" if number is None else number.text))
         self.number.setText("\u2013" if number is None else value_text(number))
         self.below.setText(below)
 
