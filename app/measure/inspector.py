@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QLabel, QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QLineEdit, QProgressBar, QWidget
 
 from app.measure.record_table import VERDICTS, verdict_word
 from app.measure.reference_form import ReferenceForm
@@ -83,7 +83,7 @@ class Inspector(QWidget):
         self.message.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.message.setFixedHeight(3 * self.message.fontMetrics().lineSpacing())
         self.message.linkActivated.connect(lambda _link: on_records())
-        heading = QLabel(tr("Reference"))
+        heading = PlainLabel(tr("Reference"))
         make_bold(heading)
         head = hbox((self.title, 1), (self.verdict, 0, Qt.AlignmentFlag.AlignTop), spacing=8)
         self._panel = side_panel(
