@@ -256,7 +256,7 @@ class InPlaceBallsStep(BallsStep):
         return tr("{n} captured.").format(n=self.count()) + " " + progress.sentence()
 
     def show_state(self, state: str, sentence: str) -> None:
-        """Show the state; what one more press changes stands beside the number."""
+        """Show the state; the effect of one more press is shown beside the number."""
         if self.progress is not None:
             figures = self.model.statuses["balls"].quality.figures
             others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies

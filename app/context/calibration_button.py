@@ -61,8 +61,8 @@ class CalibrationButton(QToolButton):
         none = menu.addAction(tr("No calibration"), lambda: self.use(None))
         none.setObjectName("state.calibration.none")
         page = self._context.requests.page
-        library = menu.addAction(tr("All sensors and calibrations"), lambda: page.emit("sensors"))
-        library.setObjectName("state.calibration.library")
+        others = menu.addAction(tr("All sensors and calibrations"), lambda: page.emit("sensors"))
+        others.setObjectName("state.calibration.sensors")
 
     def _add(self, entry: Entry) -> None:
         assert entry.summary is not None

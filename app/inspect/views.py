@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -23,17 +22,16 @@ from app.live.height_panel import HeightPanel
 from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Jobs
-from app.theme.icons import icon
 from app.view2d.cuts import Cut, Section
-from app.view2d.display import Display, display_as_text, display_from_text
+from app.view2d.display import Display
 from app.view2d.map_view import MapView, extent_of
 from app.view2d.profile_plot import line_colour
 from app.view2d.quantities import Reference
 from app.view3d.menu import DIRECTIONS
 from app.view3d.panel import SurfacePanel
 from app.view3d.surface import SurfaceLine
-from app.widgets.actions import make_action
-from app.widgets.fields import choice, is_possible, switch
+from app.widgets.actions import make_action, switch_button
+from app.widgets.fields import as_text, choice, from_text, switch
 from app.widgets.fold import Fold
 from app.widgets.layout import hbox, side_panel, splitter, vbox
 from app.widgets.naming import named
@@ -65,16 +63,6 @@ class Layout:
         """Keys of the visible views."""
         below = {"section"} if self.section and not self.maximised else set()
         return frozenset(STAGES[self.stage][1]) | below
-
-
-def layout_from_text(text: str) -> Layout:
-    """Return a kept layout. The default if the text is damaged."""
-    try:
-        kept = dict(json.loads(text))
-    except (ValueError, TypeError):
-        return Layout()
-    parts = (f for f in fields(Layout) if f.metadata and is_possible(f, kept.get(f.name)))
-    return Layout(**{f.name: kept[f.name] for f in parts})
 
 
 class Views(QWidget):
@@ -165,26 +153,15 @@ class Views(QWidget):
         for number, (key, (text, _views)) in enumerate(STAGES.items(), start=1):
             row.addWidget(self._button(key, text, f"Alt+{number}"))
         row.addStretch(1)
-        for key, text, keys in (
-            ("section", tr("Section"), "Alt+0"),
-            ("maximised", tr("Maximise"), "F"),
-        ):
-            row.addWidget(self._button(key, text, keys))
+        row.addWidget(self._button("section", tr("Section"), "Alt+0"))
+        row.addWidget(self._button("maximised", tr("Maximise"), "F", "maximise"))
         self.surface.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         return bar
 
-    def _button(self, key: str, text: str, keys: str) -> QToolButton:
-        action = make_action(
-            self, f"inspect.show_{key}", text, lambda: self._choose(key), keys=(keys,)
-        )
-        action.setCheckable(True)
-        button = named(QToolButton(), f"inspect.switch.{key}", text)
-        button.setDefaultAction(action)
-        if key == "maximised":
-            action.setIcon(icon("maximise"))
-            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._switches[key] = action
+    def _button(self, key: str, text: str, keys: str, icon_name: str = "") -> QToolButton:
+        name, choose = f"inspect.show_{key}", partial(self._choose, key)
+        button = switch_button(self, name, text, choose, keys, icon_name=icon_name)
+        self._switches[key] = button.defaultAction()
         return button
 
     def _choose(self, key: str) -> None:
@@ -351,16 +328,16 @@ class Views(QWidget):
     def restore(self) -> None:
         """Restore the saved layout and display settings."""
         settings = self._context.settings
-        self.display.show_display(display_from_text(settings.display("look")))
+        self.display.show_display(from_text(Display, settings.display("look")))
         self._on_display()
-        self.arrange(layout_from_text(settings.display("inspect_layout")))
+        self.arrange(from_text(Layout, settings.display("inspect_layout")))
         self.follow_source()
 
     def keep(self) -> None:
         """Save the layout and display settings."""
         settings = self._context.settings
-        settings.keep_display("inspect_layout", json.dumps(asdict(self.layout_shown)))
-        settings.keep_display("look", display_as_text(self.display.display))
+        settings.keep_display("inspect_layout", as_text(self.layout_shown))
+        settings.keep_display("look", as_text(self.display.display))
 
     def finish(self) -> None:
         """Release the resources of the views."""

@@ -29,7 +29,7 @@ from app.view2d.quantities import depth_scale, difference_scale
 from app.view3d.panel import SurfacePanel
 from app.view3d.picking import along
 from app.view3d.surface import Surface, SurfaceLine, surface_of
-from app.widgets.actions import make_action
+from app.widgets.actions import switch_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
@@ -123,13 +123,8 @@ class Stage(QWidget):
         self._buttons["map"].setChecked(True)
 
     def _button(self, name: str, text: str, slot: Callable[[], object], keys: str) -> QToolButton:
-        action = make_action(self, f"measure.show_{name}", text, slot, keys=(keys,))
-        action.setCheckable(True)
-        button = named(QToolButton(), f"measure.view.{name}", text, text, keys)
-        button.setDefaultAction(action)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._buttons[name] = button
-        return button
+        self._buttons[name] = switch_button(self, f"measure.show_{name}", text, slot, keys)
+        return self._buttons[name]
 
     # What is visible
 

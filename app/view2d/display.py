@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 
-from app.widgets.fields import choice, is_possible, number, switch
+from app.widgets.fields import choice, number, switch
 from gelpolight_core.translation import tr
 
 LIMITS_MM = -1.0, 5.0
@@ -114,21 +113,6 @@ class Display:
     def light(self) -> Light:
         """The lamp."""
         return Light(self.azimuth_deg, self.elevation_deg)
-
-
-def display_as_text(display: Display) -> str:
-    """Return the display settings as text for the settings file."""
-    return json.dumps(asdict(display))
-
-
-def display_from_text(text: str) -> Display:
-    """Return the display settings of a text. Missing or invalid values get their defaults."""
-    try:
-        kept = dict(json.loads(text))
-    except (ValueError, TypeError):
-        return Display()
-    known = {f.name: kept[f.name] for f in fields(Display) if is_possible(f, kept.get(f.name))}
-    return Display(**known)
 
 
 @lru_cache(maxsize=16)

@@ -21,8 +21,9 @@ from app.services.opengl import opengl_problem
 from app.services.settings import Settings
 from app.view3d.menu import ViewMenu
 from app.view3d.picking import Point, pins_text, with_pin
-from app.view3d.style import Style, style_as_text, style_from_text
+from app.view3d.style import Style
 from app.view3d.surface import Surface, SurfaceLine
+from app.widgets.fields import as_text, from_text
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
@@ -78,7 +79,7 @@ class SurfacePanel(QWidget):
         self._jobs, self._settings = jobs, settings
         self.view: Interactor | None = None
         self.reason = ""
-        self.view_style = style_from_text(settings.display("view3d"))
+        self.view_style = from_text(Style, settings.display("view3d"))
         self.pins: tuple[Point, ...] = ()
         self._asked = False
         self._last: Surface | None = None
@@ -183,7 +184,7 @@ class SurfacePanel(QWidget):
     def set_style(self, style: Style) -> None:
         """Show or hide parts of the style, and store it."""
         self.view_style = style
-        self._settings.keep_display("view3d", style_as_text(style))
+        self._settings.keep_display("view3d", as_text(style))
         if self.view is not None:
             self.view.set_style(style)
             self._draw_pins()

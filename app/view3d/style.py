@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from app.widgets.fields import is_possible, switch
+from app.widgets.fields import switch
 from gelpolight_core.translation import tr
 
 Vector = tuple[float, float, float]
@@ -64,21 +64,6 @@ class Viewpoint:
     up: Vector
     parallel: bool = False
     parallel_scale: float = 1.0
-
-
-def style_as_text(style: Style) -> str:
-    """Return a style as text for the settings file."""
-    return json.dumps(asdict(style))
-
-
-def style_from_text(text: str) -> Style:
-    """Return the style of a text. The default if the text is damaged."""
-    try:
-        kept = dict(json.loads(text))
-    except (ValueError, TypeError):
-        return Style()
-    parts = (f for f in fields(Style) if f.metadata and is_possible(f, kept.get(f.name)))
-    return Style(**{f.name: kept[f.name] for f in parts})
 
 
 def viewpoints_as_text(viewpoints: dict[str, Viewpoint]) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtWidgets import QPushButton, QToolButton, QWidget
 
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
@@ -53,6 +54,24 @@ def make_action(
     action.triggered.connect(lambda _checked=False: slot())
     parent.addAction(action)
     return action
+
+
+def switch_button(
+    owner: QWidget,
+    name: str,
+    text: str,
+    slot: Callable[[], object],
+    key: str,
+    *,
+    icon_name: str = "",
+) -> QToolButton:
+    """Return a button that shows which view is visible, with its action; see `make_action`."""
+    action = make_action(owner, name, text, slot, keys=(key,), icon_name=icon_name)
+    action.setCheckable(True)
+    button = named(QToolButton(), f"{name}.button", text)
+    button.setDefaultAction(action)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    return button
 
 
 def action_button(action: QAction, *, primary: bool = False) -> QPushButton:

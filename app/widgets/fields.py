@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import Field, field
-from typing import Any
+from dataclasses import Field, asdict, field, fields
+from typing import Any, TypeVar
 
+Kept = TypeVar("Kept")
 When = Callable[[Any], bool]
 """Whether the row of a field is shown, from the value of the form."""
 
@@ -68,6 +70,21 @@ def text(
 def folder(default: str, label: str, tip: str = "") -> Any:
     """Return a field with the absolute path of a folder."""
     return field(default=default, metadata={"label": label, "tip": tip})
+
+
+def as_text(value: Any) -> str:
+    """Return the fields of a dataclass as text for the settings file."""
+    return json.dumps(asdict(value))
+
+
+def from_text(kind: type[Kept], text: str) -> Kept:
+    """Return a dataclass from its text. What is missing or not possible gets its default."""
+    try:
+        kept = dict(json.loads(text))
+    except (ValueError, TypeError):
+        return kind()
+    parts = (f for f in fields(kind) if f.metadata and is_possible(f, kept.get(f.name)))  # type: ignore[arg-type]
+    return kind(**{f.name: kept[f.name] for f in parts})
 
 
 def is_possible(f: Field[Any], value: object) -> bool:

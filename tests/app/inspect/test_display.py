@@ -8,7 +8,8 @@ from app.context.context import AppContext
 from app.inspect.processing_panel import DisplayPanel
 from app.inspect.views import Views
 from app.services.jobs import Jobs
-from app.view2d.display import Display, display_as_text, display_from_text
+from app.view2d.display import Display
+from app.widgets.fields import as_text, from_text
 
 CHOSEN = Display(
     "magma",
@@ -26,10 +27,10 @@ CHOSEN = Display(
 
 @pytest.mark.parametrize(
     "text",
-    ["", "nonsense", "{}", '{"colours": "jet"}', display_as_text(Display(colours="jet")), "[1]"],
+    ["", "nonsense", "{}", '{"colours": "jet"}', as_text(Display(colours="jet")), "[1]"],
 )
 def test_unreadable_display_settings_give_the_default(text: str) -> None:
-    assert display_from_text(text) == Display()
+    assert from_text(Display, text) == Display()
 
 
 def test_the_views_restore_their_display_settings(context: AppContext) -> None:

@@ -348,7 +348,7 @@ def test_the_next_object_is_followed_or_the_image_is_said_to_be_earlier(
     _measured(page, qtbot)
     assert work.tool.name == "cuboid"
 
-    # A tool placed by hand is not lost: the image stays, and is said to be an earlier one.
+    # A tool placed by hand is not lost: the image stays, and the page says that it is earlier.
     work.add(Distance((-2.0, 0.0), (2.0, 0.0)))
     _measured(page, qtbot)
     second = work.image
