@@ -106,12 +106,12 @@ def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
     live.stream.start(_free_port())
     qtbot.waitUntil(lambda: live.stream.count > 0, timeout=WAIT_MS)
     live.pause(True)
-    qtbot.waitUntil(lambda: live.depth.last is not None, timeout=WAIT_MS)
-    last = live.depth.last
+    qtbot.waitUntil(lambda: live.live_depth.last is not None, timeout=WAIT_MS)
+    last = live.live_depth.last
     assert last is not None
     before = live.stream.count
     for _ in range(3):
-        live.depth.shown.emit(live.depth.last)
+        live.live_depth.shown.emit(live.live_depth.last)
     assert live.stream.count <= before + 1
 
 
