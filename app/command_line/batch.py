@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import FrameType
@@ -15,7 +15,8 @@ from typing import Any
 from tqdm import tqdm
 
 from app.command_line.inputs import frame_slice
-from app.command_line.reconstructing import add_effort, add_format, add_model, load_reconstructor
+from app.command_line.options import Command, option, output, place
+from app.command_line.reconstructing import effort, formats, load_reconstructor, model
 from app.command_line.terminal import say
 from gelpolight_core.batch.plan import plan_batch
 from gelpolight_core.batch.results import SUMMARY, FrameRow, last_line
@@ -30,84 +31,6 @@ SHOWN_FAULTS = 20
 """Bad frames that are printed during the work. The summary contains all of them."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command and its function."""
-    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
-    parser.add_argument(
-        "inputs",
-        type=Path,
-        nargs="+",
-        metavar="INPUT",
-        help=tr("recordings, images, and folders of them"),
-    )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="OUT",
-        help=tr("folder of the run; an unfinished run is continued"),
-    )
-    parser.add_argument(
-        "--frames",
-        type=frame_slice,
-        default="",
-        metavar="A:B:N",
-        help=tr(
-            "for each recording and folder: every N-th frame from A, counted from 0, up to but not "
-            "including B"
-        ),
-    )
-    parser.add_argument(
-        "--measure",
-        choices=SHAPES,
-        metavar="SHAPE",
-        help=tr("also measure the pressed object: {shapes}; takes several times as long").format(
-            shapes=", ".join(SHAPES)
-        ),
-    )
-    parser.add_argument(
-        "--workers",
-        type=_workers,
-        default="1",
-        metavar="N|ADDRESS",
-        help=tr(
-            "number of worker processes on this machine, each on its own core (default: 1), or "
-            "address of the scheduler of a Dask cluster"
-        ),
-    )
-    add_format(parser)
-    add_effort(parser)
-    add_model(parser)
-
-
-def run(options: argparse.Namespace) -> int:
-    """Reconstruct every frame that has no result yet, and write the summary."""
-    # Reports problems of the calibration here, before every worker would.
-    reconstructor = load_reconstructor(
-        options.calibration, model=options.model, effort=options.effort
-    )
-    calibration = reconstructor.calibration
-    out = options.output.absolute()
-    plan = plan_batch(options.inputs, out, calibration, options.frames)
-    for note in plan.notes:
-        say(note, file=sys.stderr)
-    settings = BatchSettings(
-        options.calibration.absolute(),
-        calibration.identity,
-        reconstructor.model,
-        options.effort,
-        options.format,
-        options.measure,
-    )
-    bar = tqdm(total=len(plan), file=sys.stderr, unit=tr("frame"), smoothing=0)
-    with _stopped_by_ctrl_c() as stopped, bar:
-        progress = run_batch(
-            plan, settings, out, options.workers, report=partial(_show, bar), stopped=stopped
-        )
-    return _report(progress, options.output)
-
-
 def _workers(text: str) -> AbstractContextManager[Workers]:
     """Return the workers of the argument."""
     if not text.isdecimal():
@@ -117,6 +40,69 @@ def _workers(text: str) -> AbstractContextManager[Workers]:
             tr("At least one worker is needed"), where="--workers", advice=Remedy.CORRECT_VALUE
         )
     return processes(int(text))
+
+
+@dataclass(frozen=True)
+class Batch(Command):
+    """Recordings and folders of any size become depth maps."""
+
+    calibration: Path = place("CALIBRATION")
+    inputs: list[Path] = place("INPUT", tr("recordings, images, and folders of them"))
+    output: Path = output(
+        "OUT", tr("folder of the run; an unfinished run is continued"), writes=False
+    )
+    frames: slice = option(
+        tr(
+            "for each recording and folder: every N-th frame from A, counted from 0, up to but not "
+            "including B"
+        ),
+        type=frame_slice,
+        default="",
+        metavar="A:B:N",
+    )
+    measure: str | None = option(
+        tr("also measure the pressed object: {shapes}; takes several times as long").format(
+            shapes=", ".join(SHAPES)
+        ),
+        choices=SHAPES,
+        metavar="SHAPE",
+    )
+    workers: AbstractContextManager[Workers] = option(
+        tr(
+            "number of worker processes on this machine, each on its own core (default: 1), or "
+            "address of the scheduler of a Dask cluster"
+        ),
+        type=_workers,
+        default="1",
+        metavar="N|ADDRESS",
+    )
+    format: tuple[str, ...] = formats()
+    effort: str = effort()
+    model: str | None = model()
+
+    def run(self) -> None:
+        """Reconstruct every frame that has no result yet, and write the summary."""
+        # Reports problems of the calibration here, before every worker would.
+        reconstructor = load_reconstructor(self.calibration, self.model, self.effort)
+        calibration = reconstructor.calibration
+        out = self.output.absolute()
+        plan = plan_batch(self.inputs, out, calibration, self.frames)
+        for note in plan.notes:
+            say(note, file=sys.stderr)
+        settings = BatchSettings(
+            self.calibration.absolute(),
+            calibration.identity,
+            reconstructor.model,
+            self.effort,
+            self.format,
+            self.measure,
+        )
+        bar = tqdm(total=len(plan), file=sys.stderr, unit=tr("frame"), smoothing=0)
+        with _stopped_by_ctrl_c() as stopped, bar:
+            progress = run_batch(
+                plan, settings, out, self.workers, report=partial(_show, bar), stopped=stopped
+            )
+        _report(progress, self.output)
 
 
 def _show(bar: tqdm[Any], progress: BatchProgress) -> None:
@@ -139,8 +125,8 @@ def _bad_line(row: FrameRow, *, last: bool) -> str:
     return f"{where}: {reason}"
 
 
-def _report(progress: BatchProgress, out: Path) -> int:
-    """Print a summary. Return the exit status, or raise an error."""
+def _report(progress: BatchProgress, out: Path) -> None:
+    """Print a summary, or raise an error."""
     done = progress.before + progress.done
     if progress.left:
         tqdm.write(
@@ -165,7 +151,6 @@ def _report(progress: BatchProgress, out: Path) -> int:
             where=out / SUMMARY,
             advice=Remedy.CORRECT_AND_REPEAT,
         )
-    return 0
 
 
 @contextmanager

@@ -2,42 +2,39 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
+from app.command_line.options import Command, option, output
 from app.command_line.terminal import say
 from gelpolight_core.export.board_page import caption, write_board
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
+BOARD = BoardSpec()
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    usual = BoardSpec()
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.pdf")
-    parser.add_argument(
-        "--corners",
-        type=int,
-        nargs=2,
-        default=usual.inner_corners,
-        metavar=("ACROSS", "DOWN"),
-        help=tr("inner corners, where four squares meet (default: {w} {h})").format(
-            w=usual.inner_corners[0], h=usual.inner_corners[1]
+
+@dataclass(frozen=True)
+class Board(Command):
+    """A checkerboard to print."""
+
+    output: Path = output("FILE.pdf")
+    corners: tuple[int, int] = option(
+        tr("inner corners, where four squares meet (default: {w} {h})").format(
+            w=BOARD.inner_corners[0], h=BOARD.inner_corners[1]
         ),
+        default=BOARD.inner_corners,
+        metavar=("ACROSS", "DOWN"),
     )
-    parser.add_argument(
-        "--square",
-        type=float,
-        default=usual.square_mm,
+    square: float = option(
+        tr("side of a square in mm (default: {s:g})").format(s=BOARD.square_mm),
+        default=BOARD.square_mm,
         metavar="MM",
-        help=tr("side of a square in mm (default: {s:g})").format(s=usual.square_mm),
     )
 
-
-def run(options: argparse.Namespace) -> int:
-    """Write the page and print its description."""
-    across, down = options.corners
-    board = BoardSpec((across, down), options.square)
-    write_board(board, options.output)
-    say(tr("{what}: saved to {path}").format(what=caption(board), path=options.output))
-    return 0
+    def run(self) -> None:
+        """Write the page and print its description."""
+        across, down = self.corners
+        board = BoardSpec((across, down), self.square)
+        write_board(board, self.output)
+        say(tr("{what}: saved to {path}").format(what=caption(board), path=self.output))

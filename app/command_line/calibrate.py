@@ -1,55 +1,66 @@
-"""``gelpolight calibrate``: turns a session folder into a calibration file."""
+"""Commands that write a calibration, or what is needed for one."""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import check_outputs, quality_lines, stage_progress
-from app.command_line.reconstructing import add_model, report_failure
-from app.command_line.sessions import session_files
+from app.command_line.common import quality_lines, stage_progress
+from app.command_line.options import Command, option, output, place, result
+from app.command_line.reconstructing import load_reconstructor, model, read_frame, report_failure
 from app.command_line.terminal import say
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.in_place import in_place_towards
+from gelpolight_core.calibration.in_place_session import with_background
 from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.calibration.recipes import recipe_named, recipe_of
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.in_place.foreign import FORMS, read_foreign
+from gelpolight_core.in_place.import_session import Stated, import_session
+from gelpolight_core.in_place.preset import preset_named, presets
 from gelpolight_core.io.atomic import write_json
+from gelpolight_core.io.user import user_name
+from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
+from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import average, read_image, require_colour
+from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument("session", type=Path, metavar="SESSION")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="CALIBRATION")
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help=tr("write the results of every stage as JSON")
-    )
-    add_model(parser)
+@dataclass(frozen=True)
+class Calibrate(Command):
+    """A session folder becomes a calibration file."""
 
+    session: Path = place("SESSION")
+    output: Path = output("CALIBRATION")
+    json: Path | None = result(tr("write the results of every stage as JSON"))
+    model: str | None = model()
 
-def run(options: argparse.Namespace) -> int:
-    """Calibrate, write the file and print the quality table."""
-    session = session_to_calibrate(options.session)
-    recipe = recipe_of(session, options.model)
-    check_outputs([options.output, options.json], session_files(session))
-    with stage_progress() as progress:
-        result = calibrate(session, recipe, progress=progress)
-    write_calibration(result.calibration, options.output)
-    if options.json:
-        write_json(options.json, run_as_json(result))
-    stages = recipe.of(session)
-    lines = [line for stage in stages for line in stage.lines(result.results[stage])]
-    say("\n".join([*lines, *quality_lines(result.calibration.quality)]))
-    report_failure(result.calibration, options.output)
-    say(
-        tr("Calibration {id} saved to {path}: {verdict}").format(
-            id=result.calibration.identity,
-            path=options.output,
-            verdict=result.calibration.verdict.value,
+    def run(self) -> None:
+        """Calibrate, write the file and print the quality table."""
+        session = session_to_calibrate(self.session)
+        recipe = recipe_of(session, self.model)
+        with stage_progress() as progress:
+            run = calibrate(session, recipe, progress=progress)
+        write_calibration(run.calibration, self.output)
+        if self.json:
+            write_json(self.json, run_as_json(run))
+        stages = recipe.of(session)
+        lines = [line for stage in stages for line in stage.lines(run.results[stage])]
+        say("\n".join([*lines, *quality_lines(run.calibration.quality)]))
+        report_failure(run.calibration, self.output)
+        say(
+            tr("Calibration {id} saved to {path}: {verdict}").format(
+                id=run.calibration.identity,
+                path=self.output,
+                verdict=run.calibration.verdict.value,
+            )
         )
-    )
-    return 0
 
 
 def run_as_json(run: Run) -> dict[str, Any]:
@@ -59,3 +70,138 @@ def run_as_json(run: Run) -> dict[str, Any]:
     for stage in recipe_named(c.model).of(run.session):
         content |= stage.entries(run.results)
     return {**content, "quality": {stage: table.as_rows() for stage, table in c.quality.items()}}
+
+
+@dataclass(frozen=True)
+class Refresh(Command):
+    """A closed sensor's calibration after its gel was changed."""
+
+    calibration: Path = place("CALIBRATION")
+    output: Path = output("CALIBRATION")
+    background: list[Path] | None = option(
+        tr("images of the new gel, untouched; slopes stay as calibrated"),
+        one_of=True,
+        metavar="IMAGE",
+    )
+    session: Path | None = option(
+        tr("background and three or more ball presses of the new gel, which correct them"),
+        one_of=True,
+        metavar="SESSION",
+    )
+
+    def run(self) -> None:
+        """Write the refreshed calibration and print its quality."""
+        calibration = read_calibration(self.calibration)
+        coefficients = calibration.data_of(ClosedSensor).in_place.coefficients
+        if self.background:
+            new = self._with_background(calibration, self.background)
+        else:
+            assert self.session is not None  # one of them is required
+            session = read_session(self.session)
+            recipe = in_place_towards(coefficients)
+            if not recipe.fits(session):
+                raise InputError(
+                    tr("the session is of an open sensor: session.toml has no table [in_place]"),
+                    where=self.session,
+                    advice=Remedy.CHOOSE_SESSION,
+                )
+            new = calibrate(session, recipe).calibration
+        write_calibration(new, self.output)
+        say("\n".join(quality_lines(new.quality)))
+        say(
+            tr("Calibration {id} written to {path}: {verdict}").format(
+                id=new.identity, path=self.output, verdict=new.verdict.value
+            )
+        )
+
+    def _with_background(self, calibration: Calibration, files: list[Path]) -> Calibration:
+        images = [read_image(file, response=calibration.response) for file in files]
+        for file, image in zip(files, images, strict=True):
+            require_colour(image, where=str(file))
+        background = average(images, name=str(files[0]))
+        return with_background(calibration, background, operator=user_name(), made=_now())
+
+
+@dataclass(frozen=True)
+class Drift(Command):
+    """How far the background of an untouched sensor has changed."""
+
+    calibration: Path = place("CALIBRATION")
+    image: Path = place("IMAGE")
+    json: Path | None = result()
+    zero: Path | None = result(tr("write the calibration with this image as its new background"))
+
+    def run(self) -> None:
+        """Compare, print the figures, and write the calibration with the new background."""
+        reconstructor = load_reconstructor(self.calibration)
+        frame = read_frame(self.image, reconstructor)
+        shift = background_shift(frame, reconstructor.calibration)
+        say("\n".join(quality_lines({tr("background"): shift.quality})))
+        if self.json:
+            content = {
+                "touched": shift.touched,
+                "shift_px": None if shift.shift_px is None else list(shift.shift_px),
+                "brightness_percent": list(shift.brightness_percent),
+                "differs_percent": shift.differs_percent,
+                "verdict": shift.quality.verdict.value,
+                "figures": shift.quality.as_rows(),
+            }
+            write_json(self.json, content)
+        if self.zero:
+            new = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=_now())
+            write_calibration(new, self.zero)
+            say(tr("{name} saved to {path}").format(name=new.identity, path=self.zero))
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _length(text: str) -> float:
+    """Return a length in mm."""
+    value = float(text)
+    if not 1e-4 <= value <= 1000.0:
+        raise argparse.ArgumentTypeError(tr("{text} is not a possible length").format(text=text))
+    return value
+
+
+@dataclass(frozen=True)
+class Import(Command):
+    """A calibration folder of another library becomes a closed sensor's session."""
+
+    folder: Path = place("FOLDER", tr("with one of: {forms}").format(forms=FORMS))
+    output: Path = output("SESSION", writes=False)
+    preset: str | None = option(
+        tr("kind of sensor, for its scale: {names}, or a TOML file").format(
+            names=", ".join(sorted(preset.key for preset in presets()))
+        ),
+        metavar="NAME",
+    )
+    mm_per_px: float | None = option(tr("size of a pixel"), type=_length, metavar="MM")
+    ball_diameter: float | None = option(
+        tr("where the folder does not state it"), type=_length, metavar="MM"
+    )
+    background: Path | None = option(tr("the untouched membrane"), metavar="IMAGE")
+    serial: str | None = option(tr("name of the sensor"), metavar="NAME")
+
+    def run(self) -> None:
+        """Write the session."""
+        found = read_foreign(self.folder)
+        stated = Stated(
+            self.serial or self.folder.resolve().name,
+            self.mm_per_px,
+            None if self.ball_diameter is None else 0.5 * self.ball_diameter,
+            self.background,
+            preset_named(self.preset) if self.preset else None,
+        )
+        session = import_session(found, stated, self.output)
+        say(
+            tr("{n} presses from {form} saved to {folder}; {k} with a labelled circle").format(
+                n=len(found.presses),
+                form=found.form,
+                folder=self.output,
+                k=len(session.decisions.balls),
+            )
+        )
+        if stated.preset is not None and stated.preset.limits:
+            say(stated.preset.limits)

@@ -1,30 +1,50 @@
-"""``gelpolight design``: checks a sensor design before it is built."""
+"""``gelpolight simulate`` and ``design``: a sensor that is not built yet."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from app.command_line.common import quality_lines
+from app.command_line.common import quality_lines, stage_progress
+from app.command_line.options import Command, file, option, place
 from app.command_line.terminal import say
-from gelpolight_core.design.sensor_design import read_design
+from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.design_check.check import check_design
 from gelpolight_core.design_check.reflections import Reflection
+from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.translation import tr
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument("design", type=Path, metavar="FILE")
+@dataclass(frozen=True)
+class Simulate(Command):
+    """A session folder of the virtual sensor, with true depths."""
+
+    output: Path = place("OUT")
+    design: Path | None = file(tr("sensor design (TOML)"))
+    closed: bool = option(
+        tr("background, balls and scale only, as of a sensor that cannot be opened")
+    )
+
+    def run(self) -> None:
+        """Render the session."""
+        design = read_design(self.design) if self.design else SensorDesign()
+        with stage_progress() as progress:
+            simulate_session(design, self.output, closed=self.closed, progress=progress)
+        say(tr("Session saved to {folder}").format(folder=self.output))
 
 
-def run(options: argparse.Namespace) -> int:
-    """Print the check of the design."""
-    result = check_design(read_design(options.design))
-    say("\n".join(quality_lines({tr("design"): result.quality})))
-    say("\n".join(reflection_lines(result.reflections)))
-    return 0
+@dataclass(frozen=True)
+class Check(Command):
+    """The check of a sensor design before it is built."""
+
+    design: Path = place("FILE")
+
+    def run(self) -> None:
+        """Print the check of the design."""
+        result = check_design(read_design(self.design))
+        say("\n".join(quality_lines({tr("design"): result.quality})))
+        say("\n".join(reflection_lines(result.reflections)))
 
 
 def reflection_lines(reflections: Sequence[Reflection]) -> list[str]:

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from tqdm import tqdm
-
-from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
-from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
@@ -32,8 +26,6 @@ class Input:
     ----------
     name : str
         Its name in the result. Without extension, the name of the result's files.
-    stem : str
-        The name without its extension.
     where : str
         Its name in messages.
     read : callable
@@ -41,20 +33,28 @@ class Input:
     """
 
     name: str
-    stem: str
     where: str
     read: Callable[[CameraResponse | None], LinearImage]
 
+    @property
+    def stem(self) -> str:
+        """The name without its extension."""
+        return Path(self.name).stem
 
-class Inputs:
-    """Images and recordings named on the command line. A context manager.
+
+def open_inputs(
+    paths: Sequence[Path], frames: str, opened: ExitStack
+) -> tuple[list[Input], list[Recording]]:
+    """Return the images of files and recordings, and the recordings, which `opened` closes.
 
     Parameters
     ----------
     paths : sequence of Path
         Images and recordings.
     frames : str
-        Frames of the recordings, as "a:b". Empty for all.
+        Frames of the recordings, as "a:b:n". Empty for all.
+    opened : ExitStack
+        Closes the recordings.
 
     Raises
     ------
@@ -62,67 +62,34 @@ class Inputs:
         If a recording cannot be read, the range of frames is invalid or empty, or two inputs would
         have results of the same name.
     """
-
-    def __init__(self, paths: Sequence[Path], frames: str = "") -> None:
-        self._open = ExitStack()
-        self.recordings: list[Recording] = []
-        self.items: list[Input] = []
-        try:
-            for path in paths:
-                if is_recording(path):
-                    self._add_recording(path, frames)
-                else:
-                    read = partial(_read_file, path)
-                    self.items.append(Input(path.name, path.stem, str(path), read))
-            if frames and not self.recordings:
-                raise InputError(
-                    tr("None of the inputs is a recording"),
-                    where="--frames",
-                    advice=Remedy.REMOVE_OPTION,
-                )
-            self._refuse_twins()
-        except BaseException:
-            self._open.close()
-            raise
-
-    def __enter__(self) -> Inputs:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *details: object) -> None:
-        """Close the recordings."""
-        self._open.close()
-
-    def __iter__(self) -> Iterator[Input]:
-        """Return the inputs one by one, with a progress bar."""
-        return iter(tqdm(self.items, file=sys.stderr, unit=tr("image")))
-
-    def require_match(self, calibration: Calibration) -> None:
-        """Refuse recordings of another sensor or image size, and report missing information."""
-        for recording in self.recordings:
-            require_match(recording, calibration)
-            for note in recording_notes(recording):
-                say(f"{recording.path}: {note}", file=sys.stderr)
-
-    def _add_recording(self, path: Path, frames: str) -> None:
-        recording = self._open.enter_context(Recording.open(path))
-        self.recordings.append(recording)
+    inputs: list[Input] = []
+    recordings: list[Recording] = []
+    for path in paths:
+        if not is_recording(path):
+            inputs.append(Input(path.name, str(path), partial(_read_file, path)))
+            continue
+        recording = opened.enter_context(Recording.open(path))
+        recordings.append(recording)
         for index in frame_range(frames, len(recording), where=str(path)):
-            stem = f"{path.stem}_{index:06d}"
+            name = f"{path.stem}_{index:06d}{path.suffix}"
             where = tr("{path}, frame {n}").format(path=path, n=index)
-            read = partial(_read_frame, recording, index, stem)
-            self.items.append(Input(f"{stem}{path.suffix}", stem, where, read))
-
-    def _refuse_twins(self) -> None:
-        # Some file systems ignore case.
-        names = Counter(item.stem.casefold() for item in self.items)
-        twins = [item.stem for item in self.items if names[item.stem.casefold()] > 1]
-        if twins:
-            raise InputError(
-                tr("Two images have the name {name}").format(name=twins[0]),
-                where=tr("IMAGE"),
-                advice=Remedy.SEPARATE_FOLDERS,
-            )
+            inputs.append(Input(name, where, partial(_read_frame, recording, index)))
+    if frames and not recordings:
+        raise InputError(
+            tr("None of the inputs is a recording"),
+            where="--frames",
+            advice=Remedy.REMOVE_OPTION,
+        )
+    # Some file systems ignore case.
+    names = Counter(item.stem.casefold() for item in inputs)
+    twins = [item.stem for item in inputs if names[item.stem.casefold()] > 1]
+    if twins:
+        raise InputError(
+            tr("Two images have the name {name}").format(name=twins[0]),
+            where=tr("IMAGE"),
+            advice=Remedy.SEPARATE_FOLDERS,
+        )
+    return inputs, recordings
 
 
 def frame_range(text: str, count: int, *, where: str) -> range:
@@ -175,7 +142,5 @@ def _read_file(path: Path, response: CameraResponse | None) -> LinearImage:
     return image
 
 
-def _read_frame(
-    recording: Recording, index: int, name: str, response: CameraResponse | None
-) -> LinearImage:
-    return linear_image(recording.frame(index).rgb, name, response=response)
+def _read_frame(recording: Recording, index: int, response: CameraResponse | None) -> LinearImage:
+    return linear_image(recording.frame(index).rgb, str(index), response=response)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import sys
@@ -38,9 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = _log_warning
     try:
-        given = _split_points(sys.argv[1:] if arguments is None else list(arguments))
-        options = _window(given) or _command(given)
-        status: int = options.run(options)
+        status = _run(sys.argv[1:] if arguments is None else list(arguments))
         sys.stdout.flush()
     except InputError as error:
         say(f"gelpolight: {error}", file=sys.stderr)
@@ -61,52 +58,45 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _open_desktop(options: argparse.Namespace) -> int:
+def _run(given: list[str]) -> int:
+    """Run a command, or show the main window, which can open files."""
+    files = [Path(text) for text in given]
+    if all(file.suffix.lower() in OPENED for file in files):
+        for file in files:
+            if not file.is_file():
+                raise InputError(
+                    tr("The file does not exist"), where=file, advice=Remedy.CHECK_NAME
+                )
+        return _open_desktop(given)
+    parsed = build_parser().parse_args(split_numbers(given))
+    if parsed.command is None:
+        return _open_desktop([DEMO])
+    command = parsed.command.of(parsed)
+    command.check_files()
+    return command.run() or 0
+
+
+def _open_desktop(arguments: list[str]) -> int:
     """Show the main window. Imported here, because commands also run without window libraries."""
     from app.services.settings import Settings
 
     use_language(Settings().language)  # before the other modules translate their texts
     from app.desktop import run
 
-    return run([DEMO] if options.demo else [str(file) for file in options.files])
+    return run(arguments)
 
 
-def _window(given: list[str]) -> argparse.Namespace | None:
-    """Return the options of the window, or None if a command is given.
-
-    Raises
-    ------
-    InputError
-        If a file to open does not exist.
-    """
-    if given in ([], [DEMO]):
-        return argparse.Namespace(run=_open_desktop, demo=bool(given), files=())
-    files = tuple(Path(text) for text in given)
-    if any(file.suffix.lower() not in OPENED for file in files):
-        return None
-    for file in files:
-        if not file.is_file():
-            raise InputError(tr("The file does not exist"), where=file, advice=Remedy.CHECK_NAME)
-    return argparse.Namespace(run=_open_desktop, demo=False, files=files)
-
-
-def _command(given: list[str]) -> argparse.Namespace:
-    """Return the options of a command, or of the window if none is given."""
-    parser = build_parser()
-    parser.set_defaults(run=_open_desktop, files=())
-    return parser.parse_args(given)
-
-
-def _split_points(arguments: list[str]) -> list[str]:
-    """Split points such as ``-1,2``, which would be read as an option, into two numbers."""
+def split_numbers(arguments: list[str]) -> list[str]:
+    """Split numbers such as ``-1,2``, which argparse would read as an option."""
     return [
         part
         for argument in arguments
-        for part in (argument.split(",") if _POINT.fullmatch(argument) else [argument])
+        for part in (argument.split(",") if _NUMBERS.fullmatch(argument) else [argument])
     ]
 
 
-_POINT = re.compile(r"-\d*\.?\d+(,-?\d*\.?\d+)+")
+_NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
+_NUMBERS = re.compile(f"{_NUMBER}(,{_NUMBER})+", re.IGNORECASE)
 
 
 def _open_closed_streams() -> None:

@@ -25,34 +25,35 @@ class Parser(argparse.ArgumentParser):
 
 
 class CommandParser(Parser):
-    """The parser of one command; its module is imported when there is something to parse.
+    """The parser of one command, which is imported when there is something to parse.
 
     Parameters
     ----------
-    module : str
-        Module in this package with ``add_arguments(parser)`` and ``run(options)``.
+    command : str
+        Module in this package and class, as ``measure.Measure``.
     **options
         Passed on to :class:`argparse.ArgumentParser`.
     """
 
-    def __init__(self, *, module: str = "", **options: Any) -> None:
+    def __init__(self, *, command: str, **options: Any) -> None:
         super().__init__(**options)
-        self._module = module
+        self._command = command
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Add the command's own arguments, then parse."""
-        if self._module:
-            module = import_module(f"app.command_line.{self._module}")
-            self._module = ""
-            module.add_arguments(self)
-            self.set_defaults(run=module.run)
+        if self._command:
+            module, _, name = self._command.partition(".")
+            command = getattr(import_module(f"app.command_line.{module}"), name)
+            self._command = ""
+            command.add_arguments(self)
+            self.set_defaults(command=command)
         return super().parse_known_args(args, namespace)
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands."""
+    """Return the parser of all commands. The result has the class of the `command`, or None."""
     parser = Parser(
         prog="gelpolight",
         description=tr(
@@ -60,6 +61,7 @@ def build_parser() -> argparse.ArgumentParser:
             "objects. Without a command the desktop program starts."
         ),
     )
+    parser.set_defaults(command=None)
     parser.add_argument("--version", action="version", version=f"gelpolight {__version__}")
     parser.add_argument(
         DEMO, action="store_true", help=tr("start the desktop program on the virtual sensor")
@@ -67,43 +69,59 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(
         title=tr("commands"), metavar=tr("COMMAND"), parser_class=CommandParser
     )
-    for name, module, summary in _commands():
-        commands.add_parser(name, help=summary, module=module)
+    for name, command, summary in _commands():
+        commands.add_parser(name, help=summary, command=command)
     return parser
 
 
 def _commands() -> tuple[tuple[str, str, str], ...]:
-    """Return name, module and summary of each command, in the order of the help text."""
+    """Return name, module and class, and summary of each command, in the order of the help."""
     return (
-        ("simulate", "simulate", tr("create a session folder of the virtual sensor")),
-        ("calibrate", "calibrate", tr("create a calibration from a session folder")),
+        ("simulate", "design.Simulate", tr("create a session folder of the virtual sensor")),
+        ("calibrate", "calibrate.Calibrate", tr("create a calibration from a session folder")),
         (
             "import",
-            "import_folder",
+            "calibrate.Import",
             tr("turn a calibration folder of another library into a closed sensor's session"),
         ),
-        ("inspect", "inspect_calibration", tr("show the content of a calibration or a recording")),
-        ("reconstruct", "reconstruct", tr("turn images and recordings into depth maps in mm")),
+        ("inspect", "inspect_file.Inspect", tr("show the content of a calibration or a recording")),
+        (
+            "reconstruct",
+            "reconstruct.Reconstruct",
+            tr("turn images and recordings into depth maps in mm"),
+        ),
         (
             "batch",
-            "batch",
+            "batch.Batch",
             tr("turn recordings and folders of any size into depth maps, on many cores"),
         ),
-        ("measure", "measure", tr("measure the pressed object, or apply a measuring tool")),
-        ("profile", "profile", tr("write the depth along a line as CSV")),
-        ("evaluate", "evaluate", tr("compare measured presses with their true values")),
-        ("records", "records", tr("list earlier measurements, or write them as CSV")),
-        ("refresh", "refresh", tr("a closed sensor's calibration after its gel was changed")),
+        ("measure", "measure.Measure", tr("measure the pressed object, or apply a measuring tool")),
+        ("profile", "reconstruct.Profile", tr("write the depth along a line as CSV")),
+        ("evaluate", "studies.Evaluate", tr("compare measured presses with their true values")),
+        ("records", "records.List", tr("list earlier measurements, or write them as CSV")),
+        (
+            "refresh",
+            "calibrate.Refresh",
+            tr("a closed sensor's calibration after its gel was changed"),
+        ),
         (
             "drift",
-            "drift",
+            "calibrate.Drift",
             tr("compare an image of the untouched sensor with the calibration's background"),
         ),
-        ("report", "report", tr("write a calibration's report as PDF")),
-        ("benchmark", "benchmark", tr("show the processing time of each step of a frame")),
-        ("work-precision", "work_precision", tr("show error against run time")),
-        ("stability", "stability", tr("run extreme cases")),
-        ("design", "design", tr("check a sensor design before it is built")),
-        ("board", "board", tr("create a checkerboard to print, A4 at true size")),
-        ("cameras", "cameras", tr("list the connected cameras, their formats and settings")),
+        ("report", "report.WriteReport", tr("write a calibration's report as PDF")),
+        (
+            "benchmark",
+            "reconstruct.Benchmark",
+            tr("show the processing time of each step of a frame"),
+        ),
+        ("work-precision", "studies.WorkPrecision", tr("show error against run time")),
+        ("stability", "studies.Stability", tr("run extreme cases")),
+        ("design", "design.Check", tr("check a sensor design before it is built")),
+        ("board", "board.Board", tr("create a checkerboard to print, A4 at true size")),
+        (
+            "cameras",
+            "cameras.Cameras",
+            tr("list the connected cameras, their formats and settings"),
+        ),
     )

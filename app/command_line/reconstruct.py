@@ -1,104 +1,186 @@
-"""``gelpolight reconstruct``: turns images and recordings into height maps."""
+"""``gelpolight reconstruct``, ``profile`` and ``benchmark``: depth maps of images."""
 
 from __future__ import annotations
 
-import argparse
 import sys
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 from tqdm import tqdm
 
-from app.command_line.common import refuse_overwriting
-from app.command_line.inputs import Inputs
+from app.command_line.inputs import open_inputs
+from app.command_line.options import (
+    Command,
+    option,
+    output,
+    place,
+    refuse_overwriting,
+    result,
+)
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import (
-    PREVIEW,
-    add_despite_faults,
-    add_effort,
-    add_format,
-    add_model,
+    despite_faults,
+    effort,
+    formats,
     load_reconstructor,
+    model,
+    read_frame,
     trace_lines,
 )
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.export.heightmap_files import ending, write_heightmap
+from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
 from gelpolight_core.export.preview import write_preview
-from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.export.profile_file import write_profiles
+from gelpolight_core.io.atomic import make_folder, write_json
+from gelpolight_core.measurement.profile import take_profile
+from gelpolight_core.reconstruction.benchmark import benchmark_frame
+from gelpolight_core.recording.matching import recording_notes, require_match
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
+PREVIEW = "preview"
+"""A format for people: an image of the depth map, named like the input with ``.png``."""
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
-    parser.add_argument(
-        "images", type=Path, nargs="+", metavar="IMAGE", help=tr("images and recordings")
+
+@dataclass(frozen=True)
+class Reconstruct(Command):
+    """Images and recordings become height maps."""
+
+    calibration: Path = place("CALIBRATION")
+    images: list[Path] = place("IMAGE", tr("images and recordings"))
+    output: Path = output("OUT", writes=False)
+    format: tuple[str, ...] = formats((*FORMATS, PREVIEW))
+    uncertainty: bool = option(
+        tr("also compute standard deviations, in npz; takes several times as long")
     )
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
-    add_format(parser, preview=True)
-    parser.add_argument(
-        "--uncertainty",
-        action="store_true",
-        help=tr("also compute standard deviations, in npz; takes several times as long"),
-    )
-    parser.add_argument(
-        "--frames",
+    frames: str = option(
+        tr("every N-th frame of a recording from A, counted from 0, up to but not including B"),
         default="",
         metavar="A:B:N",
-        help=tr(
-            "every N-th frame of a recording from A, counted from 0, up to but not including B"
-        ),
     )
-    parser.add_argument(
-        "--explain",
-        action="store_true",
-        help=tr("show the steps of each image, and why steps were skipped"),
-    )
-    add_despite_faults(parser)
-    add_effort(parser)
-    add_model(parser)
+    explain: bool = option(tr("show the steps of each image, and why steps were skipped"))
+    despite_faults: bool = despite_faults()
+    effort: str = effort()
+    model: str | None = model()
 
-
-def run(options: argparse.Namespace) -> int:
-    """Reconstruct every image and write its files."""
-    formats = [name for name in options.format if name != PREVIEW]
-    if options.uncertainty and "npz" not in formats:
-        raise InputError(
-            tr("Only npz can contain standard deviations"),
-            where="--uncertainty",
-            advice=Remedy.REMOVE_OPTION,
-        )
-    endings = ["png" if name == PREVIEW else ending(name) for name in options.format]
-    with Inputs(options.images, options.frames) as inputs:
-        outputs = [options.output / f"{item.stem}.{e}" for item in inputs.items for e in endings]
-        refuse_overwriting(outputs, [options.calibration, *options.images])
-        reconstructor = load_reconstructor(
-            options.calibration, model=options.model, effort=options.effort
-        )
-        inputs.require_match(reconstructor.calibration)
-        make_folder(options.output)
-        refused = 0
-        for item in inputs:
-            image = item.read(reconstructor.calibration.response)
-            health = reconstructor.health(image.rgb, name=item.name)
-            fault = health.meaningless
-            if fault is not None and not options.despite_faults:
-                refused += 1
-                say(f"gelpolight: {item.where}: {fault.line}", file=sys.stderr)
-                continue
-            heightmap = reconstructor.depth(
-                image.rgb, name=item.name, uncertainty=options.uncertainty, health=health
+    def run(self) -> int:
+        """Reconstruct every image and write its files."""
+        files = [name for name in self.format if name != PREVIEW]
+        if self.uncertainty and "npz" not in files:
+            raise InputError(
+                tr("Only npz can contain standard deviations"),
+                where="--uncertainty",
+                advice=Remedy.REMOVE_OPTION,
             )
-            write_heightmap(heightmap, options.output, formats=formats)
-            if options.explain and heightmap.trace is not None:
-                tqdm.write("\n".join([f"{item.where}:", *trace_lines(heightmap.trace)]))
-            for finding in heightmap.findings:
-                tqdm.write(f"{item.where}: {finding.line}", file=sys.stderr)
-            if PREVIEW in options.format:
-                write_preview(heightmap, image.rgb, options.output / f"{item.stem}.png")
-    saved = len(inputs.items) - refused
-    say(tr("{n} depth maps saved to {folder}").format(n=saved, folder=options.output))
-    if refused:
-        text = tr("{n} images were refused. Add --despite-faults to use them anyway.")
-        say(f"gelpolight: {text.format(n=refused)}", file=sys.stderr)
-    return MENDABLE if refused else 0
+        endings = ["png" if name == PREVIEW else ending(name) for name in self.format]
+        with ExitStack() as opened:
+            inputs, recordings = open_inputs(self.images, self.frames, opened)
+            results = [self.output / f"{item.stem}.{e}" for item in inputs for e in endings]
+            refuse_overwriting(results, [self.calibration, *self.images])
+            reconstructor = load_reconstructor(self.calibration, self.model, self.effort)
+            for recording in recordings:
+                require_match(recording, reconstructor.calibration)
+                for note in recording_notes(recording):
+                    say(f"{recording.path}: {note}", file=sys.stderr)
+            make_folder(self.output)
+            refused = 0
+            for item in tqdm(inputs, file=sys.stderr, unit=tr("image")):
+                rgb = item.read(reconstructor.calibration.response).rgb
+                health = reconstructor.health(rgb, name=item.name)
+                fault = health.meaningless
+                if fault is not None and not self.despite_faults:
+                    refused += 1
+                    say(f"gelpolight: {item.where}: {fault.line}", file=sys.stderr)
+                    continue
+                heightmap = reconstructor.depth(
+                    rgb, name=item.name, uncertainty=self.uncertainty, health=health
+                )
+                write_heightmap(heightmap, self.output, formats=files)
+                if self.explain and heightmap.trace is not None:
+                    tqdm.write("\n".join([f"{item.where}:", *trace_lines(heightmap.trace)]))
+                for finding in heightmap.findings:
+                    tqdm.write(f"{item.where}: {finding.line}", file=sys.stderr)
+                if PREVIEW in self.format:
+                    write_preview(heightmap, rgb, self.output / f"{item.stem}.png")
+        saved = len(inputs) - refused
+        say(tr("{n} depth maps saved to {folder}").format(n=saved, folder=self.output))
+        if refused:
+            text = tr("{n} images were refused. Add --despite-faults to use them anyway.")
+            say(f"gelpolight: {text.format(n=refused)}", file=sys.stderr)
+        return MENDABLE if refused else 0
+
+
+_end = partial(option, tr("an end of the line, in mm"), metavar=("X", "Y"))
+
+
+@dataclass(frozen=True)
+class Profile(Command):
+    """The depth along a line, as a table."""
+
+    calibration: Path = place("CALIBRATION")
+    image: Path = place("IMAGE")
+    start: tuple[float, float] = _end("--from")
+    end: tuple[float, float] = _end("--to")
+    width: float = option(tr("average over this width"), default=0.0, metavar="MM")
+    output: Path = output("FILE.csv")
+    model: str | None = model()
+
+    def run(self) -> None:
+        """Reconstruct the image and write its section along the line."""
+        reconstructor = load_reconstructor(self.calibration, self.model)
+        frame = read_frame(self.image, reconstructor)
+        heightmap = reconstructor.depth(
+            frame, name=self.image.name, normals=False, uncertainty=True
+        )
+        profile = take_profile(heightmap, self.start, self.end, width_mm=self.width)
+        write_profiles({1: profile}, self.output)
+        say(
+            tr("{n} points over {length:.3f} mm saved to {path}").format(
+                n=profile.along_mm.size, length=profile.along_mm[-1], path=self.output
+            )
+        )
+
+
+@dataclass(frozen=True)
+class Benchmark(Command):
+    """The time of each processing step of a frame."""
+
+    calibration: Path = place("CALIBRATION")
+    image: Path = place("IMAGE")
+    json: Path | None = result()
+    repeats: int = option(default=25, metavar="N")
+    effort: str = effort()
+    model: str | None = model()
+
+    def run(self) -> None:
+        """Time the frame and print a table."""
+        reconstructor = load_reconstructor(self.calibration, self.model, self.effort)
+        image = read_image(self.image)
+        require_colour(image, where=str(self.image))
+        frame = np.round(image.rgb * (2**image.bit_depth - 1)).astype(f"u{image.bit_depth // 8}")
+        timing = benchmark_frame(reconstructor, frame, repeats=max(self.repeats, 1))
+        step, median, p95, size = tr("step"), tr("median ms"), tr("p95 ms"), tr("MB")
+        say(f"{step:<26}{median:>12}{p95:>10}{size:>8}")
+        for row in (*timing.steps, timing.total):
+            say(f"{row.name:<26}{row.median_ms:12.2f}{row.p95_ms:10.2f}{row.bytes / 1e6:8.1f}")
+        copy = tr("memory copy")
+        say(f"{copy:<26}{timing.copy_floor_ms:12.2f}")
+        floor = timing.total.median_ms / timing.copy_floor_ms
+        say(tr("{floor:.1f} times a memory copy").format(floor=floor))
+        say("\n".join(trace_lines(timing.trace)))
+        if self.json:
+            content = {
+                "total_ms": {"median": timing.total.median_ms, "p95": timing.total.p95_ms},
+                "copy_floor_ms": timing.copy_floor_ms,
+                "steps": [asdict(row) for row in timing.steps],
+                "threads": timing.threads,
+                "model": reconstructor.model,
+                "effort": reconstructor.effort,
+                "plan": timing.trace.as_dicts(),
+                "versions": timing.versions,
+            }
+            write_json(self.json, content)

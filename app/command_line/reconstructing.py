@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.command_line.options import option
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
@@ -20,42 +23,38 @@ from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
-
-def add_model(parser: argparse.ArgumentParser) -> None:
-    """Add ``--model``. By default a calibration's own model is used."""
-    parser.add_argument(
-        "--model",
-        choices=(*MODELS, IN_PLACE),
-        help=tr(
-            "paper: light of the flat membrane, direct integration; full: near "
-            "light, gloss, interreflection, shadows, refracted rays; in-place: a "
-            "closed sensor, from background and balls alone (default: the "
-            "calibration's model)"
-        ),
-    )
-
-
-def add_despite_faults(parser: argparse.ArgumentParser) -> None:
-    """Add ``--despite-faults``."""
-    parser.add_argument(
-        "--despite-faults",
-        action="store_true",
-        help=tr(
-            "also use images whose depth is meaningless, such as one of another sensor or with an "
-            "LED off; by default they are refused"
-        ),
-    )
-
-
-PREVIEW = "preview"
-"""A format for people: an image of the depth map, named like the input with ``.png``."""
+model = partial(
+    option,
+    tr(
+        "paper: light of the flat membrane, direct integration; full: near "
+        "light, gloss, interreflection, shadows, refracted rays; in-place: a "
+        "closed sensor, from background and balls alone (default: the "
+        "calibration's model)"
+    ),
+    choices=(*MODELS, IN_PLACE),
+)
+effort = partial(
+    option,
+    tr(
+        "effort of the full model, which solves the pressed region: best at full scale "
+        "(default), balanced at half scale, fast at quarter scale"
+    ),
+    choices=EFFORTS,
+    default=EFFORTS[-1],
+)
+despite_faults = partial(
+    option,
+    tr(
+        "also use images whose depth is meaningless, such as one of another sensor or with an "
+        "LED off; by default they are refused"
+    ),
+)
 
 
-def add_format(parser: argparse.ArgumentParser, *, preview: bool = False) -> None:
-    """Add ``--format``, a list of formats."""
-    names = (*FORMATS, PREVIEW) if preview else FORMATS
+def formats(names: Iterable[str] = FORMATS) -> Any:
+    """Return the field of ``--format``, a list of some of the names."""
 
-    def formats(text: str) -> tuple[str, ...]:
+    def listed(text: str) -> tuple[str, ...]:
         found = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
         unknown = sorted(set(found) - set(names))
         if unknown or not found:
@@ -66,30 +65,12 @@ def add_format(parser: argparse.ArgumentParser, *, preview: bool = False) -> Non
             )
         return found
 
-    parser.add_argument(
-        "--format",
-        type=formats,
-        default="npz",
-        metavar="LIST",
-        help=tr("comma-separated list of {formats}").format(formats=", ".join(names)),
-    )
-
-
-def add_effort(parser: argparse.ArgumentParser) -> None:
-    """Add ``--effort``."""
-    parser.add_argument(
-        "--effort",
-        choices=EFFORTS,
-        default=EFFORTS[-1],
-        help=tr(
-            "effort of the full model, which solves the pressed region: best at full scale "
-            "(default), balanced at half scale, fast at quarter scale"
-        ),
-    )
+    about = tr("comma-separated list of {formats}").format(formats=", ".join(names))
+    return option(about, type=listed, default="npz", metavar="LIST")
 
 
 def load_reconstructor(
-    path: Path, *, model: str | None = None, effort: str = EFFORTS[-1]
+    path: Path, model: str | None = None, effort: str = EFFORTS[-1]
 ) -> Reconstructor:
     """Read a calibration and prepare its reconstructor, for its own model or another one."""
     calibration = read_calibration(path)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
-from app.command_line.common import check_outputs
+from app.command_line.options import Command, option, refuse_overwriting, result
 from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError, Remedy
@@ -17,37 +17,34 @@ from gelpolight_core.translation import tr
 _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument(
-        "--workspace",
-        type=Path,
+@dataclass(frozen=True)
+class List(Command):
+    """Earlier measurements."""
+
+    workspace: Path = option(
+        tr("the workspace folder (default: {folder})").format(folder=default_folder()),
         default=default_folder(),
         metavar="DIR",
-        help=tr("the workspace folder (default: {folder})").format(folder=default_folder()),
     )
-    parser.add_argument("--sensor", metavar="SERIAL", help=tr("only measurements of this sensor"))
-    parser.add_argument("--csv", type=Path, metavar="FILE", help=tr("also write a table"))
+    sensor: str | None = option(tr("only measurements of this sensor"), metavar="SERIAL")
+    csv: Path | None = result(tr("also write a table"))
 
-
-def run(options: argparse.Namespace) -> int:
-    """Print a table, and write one."""
-    path = options.workspace / NAME
-    if not path.is_file():
-        raise InputError(
-            tr("There are no records"),
-            where=path,
-            advice=Remedy.STATE_WITH.format(option="--workspace"),
-        )
-    check_outputs([options.csv], [path])
-    with Records.open(path) as records:
-        if records.notice:
-            say(records.notice, file=sys.stderr)
-        found = records.measurements(options.sensor)
-        say("\n".join(table_lines(found)))
-        if options.csv is not None:
-            records.export_csv(options.csv, options.sensor)
-    return 0
+    def run(self) -> None:
+        """Print a table, and write one."""
+        file = self.workspace / NAME
+        if not file.is_file():
+            raise InputError(
+                tr("There are no records"),
+                where=file,
+                advice=Remedy.STATE_WITH.format(option="--workspace"),
+            )
+        refuse_overwriting([self.csv] if self.csv else [], [file])
+        with Records.open(file) as records:
+            if records.notice:
+                say(records.notice, file=sys.stderr)
+            say("\n".join(table_lines(records.measurements(self.sensor))))
+            if self.csv:
+                records.export_csv(self.csv, self.sensor)
 
 
 def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:

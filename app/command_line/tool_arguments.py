@@ -2,134 +2,151 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import numbers, points
+from app.command_line.options import Command, option
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import parse_json, read_file
+from gelpolight_core.measurement.indenter_tools import AUTO
+from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
 from gelpolight_core.translation import tr
 
 
-def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
-    """Add the tool to a group of alternatives, and its geometry to the parser."""
-    what.add_argument(
-        "--tool",
-        metavar="NAME",
-        help=tr("one of {names}; or a JSON file of tools, or of saved results").format(
+@dataclass(frozen=True)
+class ToolArguments(Command):
+    """What is measured: the pressed object, or what a measuring tool finds."""
+
+    shape: str | None = option(one_of=True, choices=(*SHAPES, AUTO))
+    tool: Path | None = option(
+        tr("one of {names}; or a JSON file of tools, or of saved results").format(
             names=", ".join(TOOLS)
         ),
+        one_of=True,
+        metavar="NAME",
     )
-    parser.add_argument(
-        "--at",
-        type=numbers,
-        nargs="+",
-        metavar="X Y",
-        default=[],
-        help=tr(
+    at: list[float] = option(
+        tr(
             "the tool's points in mm, in the order of the clicks on the Measure page; of a tool "
             "with a rectangle, its centre; with --shape, a point on the object to measure, where "
             "several are pressed"
         ),
-    )
-    parser.add_argument(
-        "--size",
-        type=float,
-        nargs="+",
-        metavar="MM",
+        metavar="X Y",
         default=[],
-        help=tr(
+    )
+    size: list[float] = option(
+        tr(
             "sides A B in mm of the area of rectangle, pit and step height; a third number is its "
             "rotation in degrees"
         ),
-    )
-    parser.add_argument(
-        "--set",
-        nargs="+",
-        metavar="KEY=VALUE",
+        metavar="MM",
         default=[],
-        help=tr(
+    )
+    set: list[str] = option(
+        tr(
             "other values of the tool, named as in its JSON: width_mm=0.4, level_mm=0.2, "
             "first_mm=1,2, edge=placed"
         ),
+        metavar="KEY=VALUE",
+        default=[],
     )
 
+    def tools(self) -> tuple[Tool, ...]:
+        """Return the tools. None with ``--shape``.
 
-def chosen_tools(options: argparse.Namespace) -> tuple[Tool, ...]:
-    """Return the tools of the arguments. None with ``--shape``.
+        Raises
+        ------
+        InputError
+            If something is missing or does not belong to the tool.
+        """
+        if self.tool is None:
+            self._refuse("size", "set")
+            return ()
+        if str(self.tool) in TOOLS:
+            return (tool_from_dict({"tool": str(self.tool), **self._geometry(str(self.tool))}),)
+        self._refuse("at", "size", "set")
+        return tools_from_json(read_tools(self.tool))
 
-    Raises
-    ------
-    InputError
-        If something is missing or does not belong to the tool.
-    """
-    if options.tool in TOOLS:
-        return (tool_from_dict({"tool": options.tool, **_geometry(options)}),)
-    if options.tool is not None:
-        _refuse_options(options, "at", "size", "set")
-        return tools_from_json(_read(Path(options.tool)))
-    _refuse_options(options, "size", "set")
-    return ()
-
-
-def _geometry(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the tool's geometry in the form of :func:`tool_from_dict`."""
-    types = {field.name: str(field.type) for field in places(TOOLS[options.tool])}
-    placed = points(options.at, where="--at") if options.at else []
-    if POINTS in types.values():
-        content: dict[str, Any] = dict.fromkeys(types, placed)
-    else:
-        if len(placed) > len(types):
+    def seed(self) -> tuple[float, float] | None:
+        """Return the point on the object to measure, if one is given."""
+        points = self._points()
+        if len(points) > 1:
             raise InputError(
-                tr("Number of points: {n} instead of {least}").format(
-                    n=len(placed), least=len(types)
-                ),
-                where=tr("Measuring tool {name}").format(name=options.tool),
-                advice=Remedy.STATE_WITH.format(option="--at X Y ..."),
+                tr("Number of points: {n} instead of one").format(n=len(points)),
+                where="--at",
+                advice=Remedy.CORRECT_VALUE,
             )
-        content = dict(zip(types, placed, strict=False))
-    if "Rectangle" not in types.values():
-        _refuse_options(options, "size")
-    elif len(options.size) not in (2, 3):
-        raise InputError(
-            tr("The size in mm is missing"),
-            where=tr("Measuring tool {name}").format(name=options.tool),
-            advice=Remedy.STATE_WITH.format(option="--size A B"),
-        )
-    for name in content:
-        if types[name] == "Rectangle":
-            a, b, yaw = (*options.size, 0.0)[:3]
-            content[name] = {"centre_mm": content[name], "sides_mm": (a, b), "yaw_deg": yaw}
-    for text in options.set:
-        key, _, value = text.partition("=")
-        content[key] = _value(value)
-    return content
+        return points[0] if points else None
+
+    def _points(self) -> list[tuple[float, float]]:
+        if len(self.at) % 2:
+            raise InputError(
+                tr("Number of values: {n}, but each point needs two").format(n=len(self.at)),
+                where="--at",
+                advice=Remedy.CORRECT_VALUE,
+            )
+        return list(zip(self.at[::2], self.at[1::2], strict=True))
+
+    def _geometry(self, tool: str) -> dict[str, Any]:
+        """Return the tool's geometry in the form of :func:`tool_from_dict`."""
+        types = {field.name: str(field.type) for field in places(TOOLS[tool])}
+        where = tr("Measuring tool {name}").format(name=tool)
+        points = self._points()
+        if POINTS in types.values():
+            content: dict[str, Any] = dict.fromkeys(types, points)
+        else:
+            if len(points) > len(types):
+                raise InputError(
+                    tr("Number of points: {n} instead of {least}").format(
+                        n=len(points), least=len(types)
+                    ),
+                    where=where,
+                    advice=Remedy.STATE_WITH.format(option="--at X Y ..."),
+                )
+            content = dict(zip(types, points, strict=False))
+        if "Rectangle" not in types.values():
+            self._refuse("size")
+        elif len(self.size) not in (2, 3):
+            raise InputError(
+                tr("The size in mm is missing"),
+                where=where,
+                advice=Remedy.STATE_WITH.format(option="--size A B"),
+            )
+        for name in content:
+            if types[name] == "Rectangle":
+                a, b, yaw = (*self.size, 0.0)[:3]
+                content[name] = {"centre_mm": content[name], "sides_mm": (a, b), "yaw_deg": yaw}
+        for text in self.set:
+            key, _, value = text.partition("=")
+            content[key] = _value(value)
+        return content
+
+    def _refuse(self, *names: str) -> None:
+        """Raise an error for an option that would be ignored."""
+        for name in names:
+            if getattr(self, name):
+                raise InputError(
+                    tr("This option cannot be used with {name}").format(
+                        name=self.tool or "--shape"
+                    ),
+                    where=f"--{name}",
+                    advice=Remedy.REMOVE_OPTION,
+                )
 
 
 def _value(text: str) -> Any:
     """Return a number, several numbers, or a word."""
     try:
-        found = numbers(text)
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
         return text
-    return found[0] if len(found) == 1 else found
+    return numbers[0] if len(numbers) == 1 else numbers
 
 
-def _refuse_options(options: argparse.Namespace, *names: str) -> None:
-    """Raise an error for an option that would be ignored."""
-    for name in names:
-        if getattr(options, name):
-            raise InputError(
-                tr("This option cannot be used with {name}").format(name=options.tool or "--shape"),
-                where=f"--{name}",
-                advice=Remedy.REMOVE_OPTION,
-            )
-
-
-def _read(path: Path) -> Any:
+def read_tools(path: Path) -> Any:
     """Read a JSON file."""
     try:
         return parse_json(read_file(path, 50_000_000))

@@ -14,7 +14,7 @@ import cv2
 import fuzz_mutations as spoil
 import numpy as np
 
-from app.command_line.tool_arguments import _read as read_tools
+from app.command_line.tool_arguments import read_tools
 from app.services.settings import Settings
 from app.workspace.indenters import first_indenters, read_indenters, write_indenters
 from app.workspace.sessions import read_session_entry

@@ -1,0 +1,164 @@
+"""``gelpolight evaluate``, ``work-precision`` and ``stability``: how well presses are measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from tqdm import tqdm
+
+from app.command_line.common import stage_progress
+from app.command_line.options import Command, file, option, output, place
+from app.command_line.reconstructing import load_reconstructor, model
+from app.command_line.terminal import say
+from gelpolight_core.batch.workers import processes
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.io.atomic import make_folder, refuse_unwritable
+from gelpolight_core.measurement.evaluation_run import (
+    evaluate_presses,
+    measure_with,
+    press_measurement,
+)
+from gelpolight_core.measurement.protocol_run import presses_folder
+from gelpolight_core.report.evaluation import evaluation_table, write_evaluation_files
+from gelpolight_core.session.session import read_session
+from gelpolight_core.studies.stability import (
+    Outcome,
+    chosen_cases,
+    run_case,
+    summary_line,
+    write_stability,
+)
+from gelpolight_core.studies.stability_cases import all_cases
+from gelpolight_core.studies.work_precision import (
+    REPEATS,
+    measure_session,
+    measure_virtual,
+    point_table,
+    write_work_precision,
+)
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True)
+class Evaluate(Command):
+    """The paper's evaluation on a folder of presses with true values."""
+
+    calibration: Path = place("CALIBRATION")
+    presses: Path = place(
+        "PRESSES", tr("folder of images with truth.csv, or folder of a protocol run")
+    )
+    output: Path = output("OUT", writes=False)
+    model: str | None = model()
+    workers: int = option(
+        tr("number of images processed at the same time, one process each"),
+        choices=range(1, 65),
+        default=1,
+        metavar="N",
+    )
+
+    def run(self) -> None:
+        """Measure every press, write the report's files and print the table."""
+        reconstructor = load_reconstructor(self.calibration, self.model)
+        presses = presses_folder(self.presses)  # before a folder is created for nothing
+        make_folder(self.output)
+        with stage_progress() as progress:
+            if self.workers > 1:
+                remote = partial(measure_with, self.calibration, self.model)
+                with processes(self.workers) as pool:
+                    evaluation = evaluate_presses(
+                        presses, remote, progress=progress, submit=pool.submit
+                    )
+            else:
+                measure = press_measurement(reconstructor)
+                evaluation = evaluate_presses(presses, measure, progress=progress)
+        written = write_evaluation_files(
+            evaluation, self.output, calibration=reconstructor.calibration
+        )
+        say(evaluation_table(evaluation))
+        _say_saved(written)
+        if len(evaluation.failed) == len(evaluation.results):
+            raise InputError(
+                tr("None of the {n} presses could be measured ({reason})").format(
+                    n=len(evaluation.results), reason=str(evaluation.failed[0].outcome).rstrip(".")
+                ),
+                where=presses,
+                advice=Remedy.SAME_SENSOR,
+            )
+
+
+@dataclass(frozen=True)
+class WorkPrecision(Command):
+    """Error against run time of every mode."""
+
+    session: Path | None = place(
+        "SESSION", tr("folder with presses and their true depth (default: the virtual sensor)")
+    )
+    output: Path = output("OUT", writes=False)
+    calibration: Path | None = file(tr("measure with this calibration (default: calibrate first)"))
+    repeats: int = option(default=REPEATS, metavar="N")
+    seed: int = option(tr("seed of the virtual sensor"), default=0, metavar="N")
+
+    def run(self) -> None:
+        """Measure all modes, print the table, and write table and figure."""
+        session = None if self.session is None else read_session(self.session)
+        calibration = None if self.calibration is None else read_calibration(self.calibration)
+        _make_folder_for(self.output / "work-precision.csv")
+        repeats = max(self.repeats, 1)
+        with stage_progress() as progress:
+            if session is None:
+                points = measure_virtual(
+                    SensorDesign(), calibration, repeats=repeats, seed=self.seed, progress=progress
+                )
+            else:
+                if calibration is None:
+                    calibration = calibrate(session, progress=progress).calibration
+                points = measure_session(
+                    session.folder, calibration, repeats=repeats, progress=progress
+                )
+        say(point_table(points), end="\n\n")
+        _say_saved(write_work_precision(points, self.output))
+
+
+@dataclass(frozen=True)
+class Stability(Command):
+    """Stiff and extreme cases. Each must be solved correctly or refused."""
+
+    output: Path = output("OUT", writes=False)
+    only: str | None = option(
+        tr("only these cases or subjects, separated by commas: {names}").format(
+            names=", ".join(dict.fromkeys(case.subject for case in all_cases()))
+        ),
+        metavar="NAMES",
+    )
+
+    def run(self) -> int:
+        """Run the cases, print a line for each, and write table and figure."""
+        cases = chosen_cases(all_cases(), self.only)
+        _make_folder_for(self.output / "stability.csv")
+        results = []
+        with stage_progress() as progress:
+            for number, case in enumerate(cases):
+                progress(case.name, number / len(cases))
+                results.append(run_case(case))
+                with tqdm.external_write_mode():
+                    say(results[-1].line, flush=True)
+            progress("", 1.0)
+        say("\n" + summary_line(results))
+        _say_saved(write_stability(results, self.output))
+        return 1 if any(result.outcome is Outcome.FAILED for result in results) else 0
+
+
+def _make_folder_for(file: Path) -> None:
+    """Create the folder of a file, before hours of work for nothing."""
+    make_folder(file.parent)
+    refuse_unwritable(file)
+
+
+def _say_saved(files: Iterable[Path]) -> None:
+    say(tr("Saved: {files}").format(files=", ".join(map(str, files))))
