@@ -95,10 +95,6 @@ class BenchPanel(QWidget):
         self.destroyed.connect(lambda: forget())
         self._show_bench()
 
-    def drag_to(self, u: float, v: float) -> None:
-        """Move the object to a point of the image (pixels)."""
-        self._bench.drag_to(u, v)
-
     def _fill_scene(self) -> None:
         self._item = named(ComboBox(), "bench.item", tr("Object on the sensor"))
         for item, name in item_names().items():

@@ -207,14 +207,6 @@ class Settings:
         self._store.setValue("window/geometry", geometry)
         self._store.setValue("window/state", state)
 
-    def layout(self, page: str) -> QByteArray:
-        """Return the layout of a page's views. Empty at first."""
-        return self._bytes(f"layout/{page}")
-
-    def keep_layout(self, page: str, state: QByteArray) -> None:
-        """Save the layout of a page's views."""
-        self._store.setValue(f"layout/{page}", state)
-
     def display(self, name: str) -> str:
         """Return the display settings of a view, as text for that view. Empty at first."""
         return self._text(name)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.sources.source import Frame, Rgb, Setting, closed, no_setting
+from app.sources.source import Frame, Rgb, Setting, closed
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.session.images import SUFFIXES, read_image
 from gelpolight_core.translation import tr
@@ -76,16 +76,8 @@ class FolderSource:
         return Frame(rgb, self._number - 1, now)
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return the only setting, the rate."""
-        return (Setting("rate_hz", tr("Frame rate"), "Hz", 0.5, 60.0, 0.5, self._rate_hz),)
-
-    def set(self, key: str, value: float) -> float:
-        """Change the rate."""
-        (rate,) = self.settings()
-        if key != rate.key:
-            raise no_setting(key, (rate,), self.name)
-        self._rate_hz = rate.nearest(value)
-        return self._rate_hz
+        """Return none."""
+        return ()
 
     def close(self) -> None:
         """Discard the images."""

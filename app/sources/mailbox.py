@@ -15,13 +15,11 @@ class Mailbox(Generic[T]):
         self._filled = threading.Condition()
         self._item: T | None = None
 
-    def put(self, item: T) -> bool:
-        """Store an item in place of an older one; return whether an older one was lost."""
+    def put(self, item: T) -> None:
+        """Store an item in place of an older one."""
         with self._filled:
-            lost = self._item is not None
             self._item = item
             self._filled.notify()
-        return lost
 
     def take(self, timeout_s: float = 0.0) -> T | None:
         """Return and remove the item, waiting for it if necessary; None if none arrives in time."""

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import logging
-import statistics
 import threading
-import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -89,7 +86,6 @@ class Processor(Worker, Generic[T]):
         self._lock = threading.Lock()
         self._function, self._generation = function, 0
         self._reported = -1
-        self._done: deque[float] = deque(maxlen=60)
 
     @property
     def generation(self) -> int:
@@ -102,14 +98,7 @@ class Processor(Worker, Generic[T]):
         with self._lock:
             self._function = function
             self._generation += 1
-            self._done.clear()
             return self._generation
-
-    @property
-    def median_ms(self) -> float:
-        """Median time of the function in use, of its last 60 frames; 0 before the first."""
-        with self._lock:
-            return statistics.median(self._done) if self._done else 0.0
 
     def _run(self, end: threading.Event) -> None:
         lower_priority(PROCESSING)
@@ -121,14 +110,8 @@ class Processor(Worker, Generic[T]):
     def _process(self, frame: Frame, end: threading.Event) -> None:
         with self._lock:
             function, generation = self._function, self._generation
-        began = time.perf_counter()
         item = self._apply(function, generation, frame)
-        took_ms = 1e3 * (time.perf_counter() - began)
-        with self._lock:
-            stale = generation != self._generation
-            if not stale:
-                self._done.append(took_ms)
-        if not stale and not end.is_set():
+        if generation == self.generation and not end.is_set():
             self._outbox.put(item)
 
     def _apply(

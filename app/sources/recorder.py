@@ -33,12 +33,9 @@ class RecorderFigures:
     ----------
     frames : int
         Frames in the file.
-    waiting : int
-        Frames that wait to be written.
-    missed : int
-        Frames that the source made but that did not arrive.
-    overrun : int
-        Frames that arrived while the queue was full, because the disk or processor was too slow.
+    lost : int
+        Frames that the source made but that did not arrive, or that arrived while the queue was
+        full, because the disk or processor was too slow.
     size_bytes : int
         Size of the file.
     seconds : float
@@ -50,18 +47,11 @@ class RecorderFigures:
     """
 
     frames: int = 0
-    waiting: int = 0
-    missed: int = 0
-    overrun: int = 0
+    lost: int = 0
     size_bytes: int = 0
     seconds: float = 0.0
     failure: str | None = None
     finished: bool = False
-
-    @property
-    def lost(self) -> int:
-        """Frames missing in the recording, for either reason."""
-        return self.missed + self.overrun
 
 
 def header_for(source: Source, *, serial: str = "", calibration_id: str = "") -> RecordingHeader:
@@ -112,7 +102,8 @@ class Recorder:
         self._queue: deque[tuple[Frame, int]] = deque()
         self._ending = self._finished = False
         self._failure: str | None = None
-        self._frames = self._size_bytes = self._missed = self._overrun = 0
+        self._frames = self._size_bytes = self._lost = 0
+        self._overrun = False
         self._raw_number: int | None = None
         self._number = -1
         self._first_s = self._last_s = 0.0
@@ -146,9 +137,7 @@ class Recorder:
         with self._changed:
             return RecorderFigures(
                 frames=self._frames,
-                waiting=len(self._queue),
-                missed=self._missed,
-                overrun=self._overrun,
+                lost=self._lost,
                 size_bytes=self._size_bytes,
                 seconds=self._last_s - self._first_s,
                 failure=self._failure,
@@ -167,18 +156,17 @@ class Recorder:
                 # A reopened source counts from 0 again; how many frames it made meanwhile is not
                 # known.
                 step = max(frame.number - self._raw_number, 1)
-            self._missed += step - 1
+            self._lost += step - 1
             self._number += step
             self._raw_number, self._last_s = frame.number, frame.time_s
             if len(self._queue) >= max(LEAST_QUEUE, self._queue_bytes // frame.rgb.nbytes):
-                self._overrun += 1
-                first = self._overrun == 1
+                self._lost += 1
+                if not self._overrun:
+                    self._overrun = True
+                    _LOG.warning("The disk is too slow for %s: frames are lost", self.path)
             else:
                 self._queue.append((frame, self._number))
                 self._changed.notify_all()
-                first = False
-        if first:
-            _LOG.warning("The disk is too slow for %s: frames are lost and counted", self.path)
 
     def _run(self) -> None:
         failure: str | None = None
@@ -198,7 +186,7 @@ class Recorder:
         with self._changed:
             self._ending = self._finished = True
             self._failure = failure
-            self._overrun += len(self._queue)  # frames that wait now are never written
+            self._lost += len(self._queue)  # frames that wait now are never written
             self._queue.clear()
 
     def _write_all(self, writer: RecordingWriter) -> None:

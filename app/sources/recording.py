@@ -7,10 +7,11 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from app.sources.source import Frame, Rgb, Setting, closed, no_setting
+from app.sources.source import Frame, Rgb, Setting, closed
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
@@ -37,31 +38,22 @@ class Playback:
         Number of frames in the recording; 0 while it is closed.
     time_s, duration_s : float
         Time from the first frame.
-    number : int
-        Frame number from the source that was recorded.
     playing, loop : bool
         Whether it is playing, and whether it restarts at the end.
     speed : float
         1 is the original speed.
     damaged : int
         Unreadable frames skipped so far.
-    lost : int
-        Frames of the source that are missing in the recording.
-    truncated : bool
-        Whether the recording is incomplete or damaged.
     """
 
     position: int = 0
     count: int = 0
     time_s: float = 0.0
     duration_s: float = 0.0
-    number: int = 0
     playing: bool = True
     loop: bool = True
     speed: float = 1.0
     damaged: int = 0
-    lost: int = 0
-    truncated: bool = False
 
 
 class RecordingSource:
@@ -144,18 +136,14 @@ class RecordingSource:
         return None if rgb is None else Frame(rgb, number, time.monotonic(), index=at)
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return the only setting, the speed."""
-        return (Setting("speed", tr("Speed"), "x", 0.1, 4.0, 0.1, self._speed),)
+        """Return none."""
+        return ()
 
-    def set(self, key: str, value: float) -> float:
-        """Change the speed."""
-        (speed,) = self.settings()
-        if key != speed.key:
-            raise no_setting(key, (speed,), self.name)
+    def set(self, key: Literal["speed"], value: float) -> None:
+        """Change the speed; 1 is the original one."""
         with self._changed:
-            self._speed = speed.nearest(value)
+            self._speed = value
             self._changed.notify_all()
-        return self._speed
 
     def close(self) -> None:
         """Close the file."""
@@ -178,13 +166,10 @@ class RecordingSource:
                 count=len(recording),
                 time_s=float(recording.times_s[at] - recording.times_s[0]),
                 duration_s=recording.duration_s,
-                number=int(recording.numbers[at]),
                 playing=self._playing,
                 loop=self._loop,
                 speed=self._speed,
                 damaged=len(self._damaged),
-                lost=recording.lost,
-                truncated=recording.truncated,
             )
 
     def play(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -67,7 +67,7 @@ class Setting:
     value : float
         Value as read back from the source.
     writable : bool
-        Whether :meth:`Source.set` may change it now.
+        Whether it can be changed now.
     """
 
     key: str
@@ -78,13 +78,6 @@ class Setting:
     step: float
     value: float
     writable: bool = True
-
-    def nearest(self, value: float) -> float:
-        """Return the nearest value that can be set."""
-        steps = round((value - self.low) / self.step) if self.step > 0.0 else 0
-        wanted = self.low + steps * self.step if self.step > 0.0 else value
-        # Ten digits hide the binary rounding error of a step such as 0.1.
-        return round(min(max(wanted, self.low), self.high), 10)
 
 
 class SourceLost(InputError):
@@ -100,20 +93,11 @@ class SourceAway(Exception):
     """No images for now: the source tries to reconnect. Its text is a complete sentence."""
 
 
-def no_setting(key: str, settings: Iterable[Setting], where: str) -> InputError:
-    """Return the refusal of a setting that a source does not have."""
-    return InputError(
-        tr("there is no setting {key}").format(key=key),
-        where=where,
-        advice=Remedy.ONE_OF.format(names=", ".join(s.key for s in settings)),
-    )
-
-
 class Source(Protocol):
     """An image source.
 
-    `open`, `frame` and `close` are called by one thread, that of the stream; `settings` and `set`
-    may be called by any thread while the source is open.
+    `open`, `frame` and `close` are called by one thread, that of the stream; `settings` by any
+    thread while the source is open.
     """
 
     @property
@@ -152,16 +136,7 @@ class Source(Protocol):
         """
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return the settings with their present values."""
-
-    def set(self, key: str, value: float) -> float:
-        """Change a setting; return the value that the source really uses.
-
-        Raises
-        ------
-        InputError
-            If there is no such setting or it cannot be changed.
-        """
+        """Return the settings with their present values; none if it has none."""
 
     def close(self) -> None:
         """Release all resources within a second; no effect if closed."""

@@ -30,21 +30,15 @@ class StreamFigures:
     ----------
     rate_hz : float
         Frames received per second, over the last two seconds.
-    made : int
-        Frames that the source made since it was opened.
     dropped : int
-        Frames among them that did not arrive.
-    unseen : int
-        Frames that arrived but were replaced in `Stream.newest` before they were read.
+        Frames that the source made since it was opened and that did not arrive.
     lost : str or None
         Why there are no frames, as a sentence; None if frames arrive, also after a lost source
         is back.
     """
 
     rate_hz: float = 0.0
-    made: int = 0
     dropped: int = 0
-    unseen: int = 0
     lost: str | None = None
 
 
@@ -90,11 +84,6 @@ class Stream(Worker):
         self._restart()
         super().start()
 
-    def reopen(self) -> None:
-        """Try a lost source again."""
-        self.stop()
-        self.start()
-
     def add_tap(self, tap: Tap) -> None:
         """Pass every frame to `tap`, in the capture thread; it must return quickly."""
         with self._lock:
@@ -131,15 +120,13 @@ class Stream(Worker):
             times = [t for t in self._times if now - t < 2.0]
             rate = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
             lost = None if self._lost is None else str(self._lost)
-            made = self._last_number + 1
-            return StreamFigures(rate, made, made - self._received, self._unseen, lost)
+            return StreamFigures(rate, self._last_number + 1 - self._received, lost)
 
     def _restart(self) -> None:
         with self._lock:
             self._times: deque[float] = deque(maxlen=1000)
             self._last_number = -1
             self._received = 0
-            self._unseen = 0
             self._lost: InputError | None = None
 
     def _run(self, end: threading.Event) -> None:
@@ -196,13 +183,12 @@ class Stream(Worker):
         _fail(captures, reason)
 
     def _hand_on(self, frame: Frame) -> None:
-        unseen = self.newest.put(frame)
+        self.newest.put(frame)
         with self._lock:
             self._lost = None
             self._times.append(time.monotonic())
             self._last_number = max(self._last_number, frame.number)
             self._received += 1
-            self._unseen += unseen
             taps, captures = tuple(self._taps), tuple(self._captures)
         for tap in taps:
             try:

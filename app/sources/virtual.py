@@ -15,7 +15,7 @@ from app.sources.bench import CONDITION_RANGES, NOMINAL_EXPOSURE_MS, Bench, Cond
 from app.sources.bench_faults import with_faults
 from app.sources.noise import NoiseLevel, noisy, rgb_of
 from app.sources.rendering import Renderer, Rendering
-from app.sources.source import Frame, Rgb, Setting, SourceLost, closed, no_setting
+from app.sources.source import Frame, Rgb, Setting, SourceLost, closed
 from gelpolight_core.errors import Remedy
 from gelpolight_core.translation import tr
 
@@ -97,13 +97,6 @@ class VirtualSource:
             for key, (label, unit, step) in _SETTINGS.items()
         )
 
-    def set(self, key: str, value: float) -> float:
-        """Change a setting of the bench; return the value that was really set."""
-        for setting in self.settings():
-            if setting.key == key:
-                return float(getattr(self.bench.adjust(**{key: setting.nearest(value)}), key))
-        raise no_setting(key, self.settings(), self.name)
-
     def close(self) -> None:
         """Stop rendering."""
         self._closed.set()
@@ -127,12 +120,10 @@ class VirtualSource:
         return self._due_s <= limit_s and not self._closed.is_set()
 
     def _advance(self, period_s: float) -> int:
-        """Return the number of the frame that is due; frames not read in time are lost."""
-        missed = max(0, math.floor((time.monotonic() - self._due_s) / period_s))
-        number = self._next_number + missed
-        self._next_number = number + 1
-        self._due_s += (missed + 1) * period_s
-        return number
+        """Return the number of the frame that is due; a late one delays those that follow."""
+        self._due_s = max(self._due_s + period_s, time.monotonic())
+        self._next_number += 1
+        return self._next_number - 1
 
     def _develop(self, rendering: Rendering, conditions: Conditions) -> _Developed:
         old = self._developed

@@ -9,12 +9,11 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import platformdirs
 
-from app.sources.camera.applying import Applied, CameraState, apply_settings, format_of, locked
+from app.sources.camera.applying import CameraState, apply_settings, format_of, locked
 from app.sources.camera.driver import (
     CameraDriver,
     CameraGone,
@@ -47,13 +46,6 @@ UNSETTLED_FRAMES = 5
 """A driver buffers up to four images from before a setting changed."""
 
 Reader = Callable[[Frame], object]
-
-
-@dataclass(slots=True)
-class _Change:
-    values: Mapping[str, float] | None
-    """None: lock the present settings."""
-    future: Future[tuple[Applied, ...]] = field(default_factory=Future)
 
 
 class Camera:
@@ -95,7 +87,8 @@ class Camera:
         self._state = CameraState()
         self._wanted: CameraSettings | None = None
         self._readers: list[Reader] = []
-        self._changes: list[_Change] = []
+        # None: lock the present settings.
+        self._changes: list[Mapping[str, float] | None] = []
         self._thread: threading.Thread | None = None
         self._end = threading.Event()
         self._reopen = threading.Event()
@@ -189,25 +182,19 @@ class Camera:
         else:
             self.change(settings.controls)
 
-    def change(self, values: Mapping[str, float]) -> Future[tuple[Applied, ...]]:
-        """Change some settings between two images; the future returns the results."""
-        return self._submit(_Change(dict(values)))
+    def change(self, values: Mapping[str, float]) -> None:
+        """Change some settings between two images; no effect while there are none."""
+        self._submit(dict(values))
 
-    def lock(self) -> Future[tuple[Applied, ...]]:
-        """Fix all automatic settings at their values of that moment, now and whenever it is opened.
+    def lock(self) -> None:
+        """Fix all automatic settings at their present values, now and whenever it is opened."""
+        self._submit(None)
 
-        The future returns the results.
-        """
-        return self._submit(_Change(None))
-
-    def _submit(self, change: _Change) -> Future[tuple[Applied, ...]]:
+    def _submit(self, change: Mapping[str, float] | None) -> None:
         with self._lock:
             if self._state.phase == "live":
                 self._changes.append(change)
                 self._pending += 1
-                return change.future
-        change.future.set_exception(self._away())
-        return change.future
 
     def settings_now(self) -> CameraSettings:
         """Return the present settings, to be stored."""
@@ -249,7 +236,7 @@ class Camera:
         with self._lock:
             if self._end is end:
                 self._state = replace(self._state, phase="closed", sentence="")
-        self._fail_changes()
+        self._forget_changes()
 
     def _use(self, end: threading.Event) -> None:
         """Open the camera and pass its images on until it goes away or must be reopened."""
@@ -277,7 +264,7 @@ class Camera:
                     self._next_image(opened, end)
                     self._carry_out_changes(opened)
             finally:
-                self._fail_changes()
+                self._forget_changes()
                 opened.close()
 
     def _first_image(
@@ -327,8 +314,7 @@ class Camera:
     def _carry_out_changes(self, opened: OpenCamera) -> None:
         with self._lock:
             changes, self._changes = self._changes, []
-        for change in changes:
-            values = change.values
+        for values in changes:
             if values is None:
                 values = locked(opened.controls())
                 with self._lock:
@@ -341,8 +327,6 @@ class Camera:
                     self._state, controls=opened.controls(), applied=tuple(done.values())
                 )
                 self._pending -= 1
-            if change.future.set_running_or_notify_cancel():
-                change.future.set_result(applied)
         if changes:
             self._on_change()
         elif time.monotonic() - self._checked_s > self._check_s:
@@ -360,23 +344,12 @@ class Camera:
     def _went_away(self, sentence: str) -> None:
         with self._lock:
             self._state = replace(self._state, phase="away", sentence=sentence)
-        self._fail_changes()
+        self._forget_changes()
         self._on_change()
 
-    def _fail_changes(self) -> None:
+    def _forget_changes(self) -> None:
         with self._lock:
-            changes, self._changes = self._changes, []
-            self._pending = 0
-        for change in changes:
-            if change.future.set_running_or_notify_cancel():
-                change.future.set_exception(self._away())
-
-    def _away(self) -> InputError:
-        return CameraGone(
-            tr("the camera delivers no images now and cannot be set"),
-            where=self.device.name,
-            advice=Remedy.WAIT,
-        )
+            self._changes, self._pending = [], 0
 
     def _silent(self, silent_s: float) -> CameraGone:
         return CameraGone(

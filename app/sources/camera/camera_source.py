@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from concurrent.futures import TimeoutError as Late
-
 from app.sources.camera.camera import Camera
 from app.sources.mailbox import Mailbox
-from app.sources.source import Frame, Setting, SourceAway, closed, no_setting
-from gelpolight_core.errors import InputError, Remedy
+from app.sources.source import Frame, Setting, SourceAway, closed
 from gelpolight_core.translation import tr
-
-SET_S = 2.0
 
 
 class CameraSource:
@@ -66,20 +61,6 @@ class CameraSource:
     def settings(self) -> tuple[Setting, ...]:
         """Return the settings as last reported by the camera."""
         return self.camera.state.controls
-
-    def set(self, key: str, value: float) -> float:
-        """Change a setting; return the value that the camera has now."""
-        try:
-            (applied,) = self.camera.change({key: value}).result(SET_S) or (None,)
-        except Late as error:
-            raise InputError(
-                tr("the camera has not responded for {s:g} seconds").format(s=SET_S),
-                where=self.name,
-                advice=Remedy.CHECK_CABLE,
-            ) from error
-        if applied is None or applied.read is None:
-            raise no_setting(key, self.settings(), self.name)
-        return applied.read
 
     def close(self) -> None:
         """Release the camera; may be called twice."""

@@ -71,10 +71,6 @@ class ScriptedCamera:
         """Return no settings."""
         return ()
 
-    def set(self, key: str, value: float) -> float:
-        """Refuse every setting."""
-        raise KeyError(key, value)
-
     def close(self) -> None:
         """Do nothing."""
 

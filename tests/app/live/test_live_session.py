@@ -35,9 +35,6 @@ class Camera:
     def settings(self) -> tuple[Setting, ...]:
         return ()
 
-    def set(self, key: str, value: float) -> float:
-        raise NotImplementedError
-
     def frame(self, timeout_s: float) -> Frame | None:
         if self.lost.is_set():
             raise SourceLost("it was unplugged", where=self.name, advice="Plug it in")

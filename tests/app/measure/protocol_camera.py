@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any
 
 import numpy as np
 import scene
@@ -74,10 +73,6 @@ class SceneCamera:
     def settings(self) -> tuple[Setting, ...]:
         """Return none."""
         return ()
-
-    def set(self, key: str, value: float) -> Any:
-        """Refuse."""
-        raise KeyError(key, value)
 
     def close(self) -> None:
         """Do nothing."""

@@ -54,10 +54,6 @@ class ByHand:
         """Return none."""
         return ()
 
-    def set(self, key: str, value: float) -> float:
-        """Change nothing."""
-        return value
-
     def close(self) -> None:
         """Record the call."""
         self.calls.append("close")
@@ -86,11 +82,11 @@ def lost_sentence(stream: Stream) -> str:
     raise AssertionError("the stream was not lost")
 
 
-def test_a_mailbox_holds_the_newest_and_reports_losses() -> None:
+def test_a_mailbox_holds_the_newest() -> None:
     box: Mailbox[str] = Mailbox()
     assert box.take() is None
-    assert not box.put("old")
-    assert box.put("new")
+    box.put("old")
+    box.put("new")
     assert box.take() == "new"
     assert box.take(0.01) is None
 
@@ -101,9 +97,7 @@ def test_missing_frames_are_counted(source: ByHand, stream: Stream) -> None:
     for number in numbers:
         source.next.put(frame(number))
     capture.result(WAIT_S)
-    figures = stream.figures()
-    assert (figures.made, figures.dropped) == (10, 5)
-    assert figures.unseen == 4  # nobody read it, and the mailbox holds the last one
+    assert stream.figures().dropped == 5
 
 
 def test_a_capture_contains_only_settled_frames_after_the_call(
@@ -140,7 +134,8 @@ def test_a_lost_source_reports_why_and_can_be_reopened(source: ByHand, stream: S
         waiting.result(WAIT_S)
     with pytest.raises(SourceLost, match="unplugged"):
         stream.capture(1).result(WAIT_S)
-    stream.reopen()
+    stream.stop()
+    stream.start()
     again = stream.capture(1)
     source.next.put(frame(0))
     assert len(again.result(WAIT_S)) == 1

@@ -96,15 +96,14 @@ def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSourc
 def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
     source.bench.adjust(noise=0.0)
     usual = settled(source).rgb.astype(float)
-    assert source.set("exposure_ms", 5.0) == 5.0
+    source.bench.adjust(exposure_ms=5.0)
     half = settled(source).rgb.astype(float)
     assert np.abs(half - 0.5 * usual).max() <= 1.0
-    assert source.set("exposure_ms", 10.0) == 10.0
-    assert source.set("gain_db", 6.02) == 6.0
+    source.bench.adjust(exposure_ms=10.0, gain_db=6.0)
     factor = 10.0 ** (6.0 / 20.0)
     double = settled(source).rgb.astype(float)
     assert np.abs(double - np.minimum(255.0, factor * usual)).max() <= 0.5 * factor + 0.5
-    source.set("gain_db", 24.0)
+    source.bench.adjust(gain_db=24.0)
     bright = settled(source).rgb
     assert bright.max() == 255
     assert (bright == 255).mean() > 0.1
@@ -143,3 +142,9 @@ def test_closing_does_not_wait_for_a_slow_image() -> None:
         pass
     source.close()  # waits for a second, and leaves behind what has not ended then
     assert not any(thread.name == "virtual sensor" for thread in threading.enumerate())
+
+
+def test_a_frame_that_was_never_rendered_is_not_lost(source: VirtualSource) -> None:
+    first = settled(source)
+    time.sleep(0.3)  # nobody reads it meanwhile
+    assert settled(source).number == first.number + 1
