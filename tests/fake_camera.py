@@ -167,9 +167,9 @@ class OpenFake:
             raise InputError("the camera refuses", where=camera.device.name, advice="Leave it")
         if key not in camera.ignores and free[key]:
             setting = camera.settings[key]
-            steps = round((value - setting.low) / setting.step)
-            possible = min(max(setting.low + steps * setting.step, setting.low), setting.high)
-            camera.settings[key] = replace(setting, value=round(possible, 10))
+            nearest = round(setting.step * round(value / setting.step), 10)
+            within = min(max(nearest, setting.low), setting.high)
+            camera.settings[key] = replace(setting, value=within)
 
     def close(self) -> None:
         """Note it."""

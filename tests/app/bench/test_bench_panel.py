@@ -96,7 +96,7 @@ def test_dragging_on_the_image_moves_the_object_and_its_numbers(
     panel: BenchPanel, bench: Bench
 ) -> None:
     choose(panel, "ball")
-    panel.drag_to(200.0, 100.0)
+    bench.drag_to(200.0, 100.0)
     scene = bench.scene
     assert scene.x_mm > 0.0 > scene.y_mm
     assert find(panel, QDoubleSpinBox, "x_mm").value() == pytest.approx(scene.x_mm, abs=0.005)
