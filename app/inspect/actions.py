@@ -21,7 +21,7 @@ from app.services.file_dialogs import ask_open, ask_save
 from app.sources.recording import RecordingSource
 from app.sources.source import Frame
 from app.view2d.quantities import Reference
-from app.view3d.saving import ImageChoice, Played, ViewSaving, image_dialog
+from app.view3d.saving import ImageChoice, Played, image_dialog
 from app.view3d.surface import Surface
 from app.widgets.actions import make_action
 from gelpolight_core.export.profile_file import write_profiles
@@ -63,13 +63,13 @@ class FileActions(QObject):
             owner, "inspect.save_profile", tr("Profile…"), self.save_profile,
             tip=tr("Save the profiles of all section lines as a table (CSV)"),
         )  # fmt: skip
-        self.saving = ViewSaving(
-            views.surface, owner, settings=context.settings, player=self._player
-        )
-        self.saving.reported.connect(self._report)
-        views.surface.menu.reference_wanted.connect(self.take_reference)
-        views.processing.hold_wanted.connect(self.hold_reference)
-        views.section.save_wanted.connect(self.save_profile)
+        references = {
+            "hold": tr("Use the current frame"),
+            "load": tr("Load from a file…"),
+            "clear": tr("Clear"),
+        }
+        title, take = tr("Reference for differences"), self.take_reference
+        views.surface.menu.add_choices(title, "reference", references, take)
 
     # Profiles
 
@@ -127,7 +127,7 @@ class FileActions(QObject):
                 difference(self._depth.last.raw, heightmap)
             self._views.compare_with(Reference(heightmap, path.name))
 
-    def _player(self) -> Played | None:
+    def player(self) -> Played | None:
         """Return the frames of the open recording for a movie, if there is one."""
         source, reconstructor = self._depth.live.source, self._depth.reconstructor
         if not isinstance(source, RecordingSource) or reconstructor is None:
@@ -149,14 +149,12 @@ class FileActions(QObject):
     def screenshot(self) -> None:
         """Ask which image to save and in which size."""
         kinds = ("views",) if self._views.surface.view is None else ("views", "surface")
-        dialog = image_dialog(self._views.size(), kinds, self._owner)
-        dialog.chosen.connect(self.save_screenshot)
-        dialog.open()
+        image_dialog(self._views.size(), kinds, self.save_screenshot, self._owner).open()
 
     def save_screenshot(self, choice: ImageChoice) -> None:
         """Ask for a file, and save all views or the surface in it."""
         if choice.what == "surface":
-            self.saving.ask_image_file(choice)
+            self._views.surface.saving.ask_image_file(choice)
             return
         image = self._views.grab().toImage()
         name = f"inspect-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.png"

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QDialogButtonBox,
-    QFileDialog,
-    QFormLayout,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QDialogButtonBox, QSpinBox, QWidget
 
 from app.context.context import AppContext
 from app.live.depth import LiveDepth
@@ -23,54 +16,53 @@ from app.services.jobs import Job, Jobs
 from app.sources.recording import RecordingSource
 from app.sources.source import Frame, Source
 from app.widgets.actions import make_action
-from app.widgets.buttons import push_button
 from app.widgets.dialog import Dialog
-from app.widgets.inputs import SpinBox
-from app.widgets.layout import hbox
-from app.widgets.naming import named
+from app.widgets.fields import folder as folder_field
+from app.widgets.fields import number, switch
+from app.widgets.forms import Form, form_dialog
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
+MOST_FRAMES = 10_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class ExportChoice:
-    """The export settings of the user.
+    """The export settings of the user: formats, destination, and which frames of a recording."""
 
-    Attributes
-    ----------
-    folder : Path
-        Destination folder.
-    formats : tuple of str
-        Some of FORMATS.
-    stride : int
-        Meshes use every n-th row and column.
-    frames : (first, last) or None
-        Frame numbers in the recording, from 0. None: the current frame.
-    """
+    npz: bool = switch(True, "", tr("npz: all data, for NumPy"))
+    tif: bool = switch(True, "", tr("tif: depth, 32-bit float"))
+    png: bool = switch(False, "", tr("png: depth, 16-bit with its scale"))
+    gsf: bool = switch(False, "", tr("gsf: depth, for Gwyddion"))
+    csv: bool = switch(False, "", tr("csv: depth as a table, for spreadsheets"))
+    xyz: bool = switch(False, "", tr("xyz: one point per line, for point cloud programs"))
+    vtp: bool = switch(False, "", tr("vtp: mesh, for ParaView"))
+    ply: bool = switch(False, "", tr("ply: mesh with normals"))
+    stl: bool = switch(False, "", tr("stl: mesh only, for 3D printing"))
+    glb: bool = switch(False, "", tr("glb: glTF mesh in metres, for 3D viewers and web pages"))
+    stride: int = number(
+        1,
+        tr("Mesh: every n-th node"),
+        1,
+        16,
+        tip=tr("Meshes use every n-th row and column, which makes smaller files"),
+    )
+    folder: str = folder_field("", tr("Folder"), relative=True)
+    part: bool = switch(False, "", tr("Frames"), tr("Export a range of frames"))
+    first: int = number(1, tr("First frame"), 1, MOST_FRAMES, when=lambda c: c.part)
+    last: int = number(1, tr("Last frame"), 1, MOST_FRAMES, when=lambda c: c.part)
 
-    folder: Path
-    formats: tuple[str, ...]
-    stride: int = 1
-    frames: tuple[int, int] | None = None
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """The chosen ones of FORMATS."""
+        return tuple(name for name in FORMATS if getattr(self, name))
 
-
-def format_words() -> dict[str, str]:
-    """Return the use of each format."""
-    words = {
-        "npz": tr("npz: all data, for NumPy"),
-        "tif": tr("tif: depth, 32-bit float"),
-        "png": tr("png: depth, 16-bit with its scale"),
-        "gsf": tr("gsf: depth, for Gwyddion"),
-        "csv": tr("csv: depth as a table, for spreadsheets"),
-        "xyz": tr("xyz: one point per line, for point cloud programs"),
-        "vtp": tr("vtp: mesh, for ParaView"),
-        "ply": tr("ply: mesh with normals"),
-        "stl": tr("stl: mesh only, for 3D printing"),
-        "glb": tr("glb: glTF mesh in metres, for 3D viewers and web pages"),
-    }
-    return {name: words.get(name, name) for name in FORMATS}
+    @property
+    def frames(self) -> range | None:
+        """Frame numbers in the recording, from 0. None: the current frame."""
+        return range(self.first - 1, self.last) if self.part else None
 
 
 def frame_name(frame: Frame, source: Source | None, *, processed: bool = False) -> str:
@@ -93,8 +85,13 @@ def frame_name(frame: Frame, source: Source | None, *, processed: bool = False) 
 
 def export_frame(heightmap: HeightMap, choice: ExportChoice, name: str) -> list[Path]:
     """Write the height map of one frame."""
-    named = replace(heightmap, source=name)
-    return write_heightmap(named, choice.folder, formats=choice.formats, stride=choice.stride)
+    return _write(replace(heightmap, source=name), choice)
+
+
+def _write(heightmap: HeightMap, choice: ExportChoice) -> list[Path]:
+    return write_heightmap(
+        heightmap, Path(choice.folder), formats=choice.formats, stride=choice.stride
+    )
 
 
 def export_recording(
@@ -127,113 +124,56 @@ def export_recording(
     written: list[Path] = []
     recording = Recording.open(path)
     try:
-        indices: Sequence[int] = range(choice.frames[0], choice.frames[1] + 1)
-        for done, index in enumerate(indices):
-            progress(done / len(indices))
+        for done, index in enumerate(choice.frames):
+            progress(done / len(choice.frames))
             frame = recording.frame(index)
             heightmap = reconstructor.depth(frame.rgb, name=f"{path.stem}-{index:05d}.png")
-            written += write_heightmap(
-                heightmap, choice.folder, formats=choice.formats, stride=choice.stride
-            )
+            written += _write(heightmap, choice)
     finally:
         recording.close()
     return written
 
 
-FIRST_FORMATS = ("npz", "tif")
-
-
-class ExportDialog(Dialog):
-    """Lets the user choose formats, folder and frames.
+def export_dialog(
+    folder: Path,
+    chosen: Callable[[ExportChoice], object],
+    *,
+    count: int = 0,
+    at: int = 0,
+    parent: QWidget,
+) -> Dialog:
+    """Return a dialog that lets the user choose formats, folder and frames.
 
     Parameters
     ----------
     folder : Path
         Proposed folder.
+    chosen : callable
+        Called with the choice.
     count : int
         Number of frames of the open recording. 0: there is none.
     at : int
         The current frame of the recording.
-
-    Signals
-    -------
-    chosen(object)
-        An ExportChoice.
+    parent : QWidget
+        The page.
     """
+    last = max(count, 1)
+    form = Form(ExportChoice(folder=str(folder), first=at + 1, last=last), "inspect.export")
+    form.inputs["folder"].setMinimumWidth(360)
+    form.show_row("part", count > 1)
+    dialog = form_dialog(form, "inspect.export.dialog", tr("Export the depth"), chosen, parent)
+    first_box, last_box = (cast(QSpinBox, form.inputs[name]) for name in ("first", "last"))
+    first_box.setMaximum(last)
+    last_box.setMaximum(last)
 
-    chosen = Signal(object)
+    def check() -> None:
+        last_box.setMinimum(form.value.first)
+        save = dialog.buttons.button(QDialogButtonBox.StandardButton.Save)
+        save.setEnabled(bool(form.value.formats))
 
-    def __init__(self, folder: Path, *, count: int = 0, at: int = 0, parent: QWidget) -> None:
-        kinds = QDialogButtonBox.StandardButton
-        super().__init__(
-            parent,
-            "inspect.export.dialog",
-            tr("Export the depth"),
-            kinds.Save | kinds.Cancel,
-            once=True,
-        )
-        self._beside = folder.parent
-        self._formats: dict[str, QCheckBox] = {}
-        for name, words in format_words().items():
-            box = named(QCheckBox(words), f"inspect.export.{name}", words)
-            box.setChecked(name in FIRST_FORMATS)
-            box.toggled.connect(self._check)
-            self._formats[name] = box
-        form = QFormLayout()
-        self._stride = named(SpinBox(), "inspect.export.stride", tr("Use every n-th node"))
-        self._stride.setRange(1, 16)
-        self._stride.setToolTip(
-            tr("Meshes use every n-th row and column, which makes smaller files")
-        )
-        form.addRow(tr("Mesh: every n-th node"), self._stride)
-        self._folder = named(QLineEdit(str(folder)), "inspect.export.folder", tr("Folder"))
-        self._folder.setMinimumWidth(360)
-        self._folder.textChanged.connect(self._check)
-        browse = push_button(
-            "inspect.export.browse", tr("Browse…"), self._browse, accessible=tr("Choose folder")
-        )
-        form.addRow(tr("Folder"), hbox((self._folder, 1), browse))
-        self._range = named(
-            QCheckBox(tr("Frames")), "inspect.export.range", tr("Export a range of frames")
-        )
-        self._first, self._last = SpinBox(), SpinBox()
-        named(self._first, "inspect.export.first", tr("First frame"))
-        named(self._last, "inspect.export.last", tr("Last frame"))
-        for ends, value in ((self._first, at + 1), (self._last, count)):
-            ends.setRange(1, max(count, 1))
-            ends.setValue(value)
-            ends.setEnabled(False)
-            self._range.toggled.connect(ends.setEnabled)
-        self._range.toggled.connect(self._check)
-        self._first.valueChanged.connect(self._last.setMinimum)
-        form.addRow(self._range, hbox(self._first, self._last))
-        form.setRowVisible(self._range, count > 1)
-        self.accepted.connect(lambda: self.chosen.emit(self.choice))
-        self.fill(*self._formats.values(), form)
-        self._check()
-
-    @property
-    def choice(self) -> ExportChoice:
-        """The current settings."""
-        frames = None
-        if self._range.isChecked():
-            frames = self._first.value() - 1, self._last.value() - 1
-        return ExportChoice(
-            # A name without a path is a folder next to the proposed one.
-            folder=self._beside / Path(self._folder.text()).expanduser(),
-            formats=tuple(name for name, box in self._formats.items() if box.isChecked()),
-            stride=self._stride.value(),
-            frames=frames,
-        )
-
-    def _check(self) -> None:
-        good = bool(self.choice.formats) and bool(self._folder.text().strip())
-        self.buttons.button(QDialogButtonBox.StandardButton.Save).setEnabled(good)
-
-    def _browse(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, tr("Folder"), self._folder.text())
-        if chosen:
-            self._folder.setText(chosen)
+    form.changed.connect(check)
+    check()
+    return dialog
 
 
 class ExportControl(QObject):
@@ -272,15 +212,13 @@ class ExportControl(QObject):
             now = source.playback()
             count, at = now.count, now.position
         folder = self._context.settings.folder("height_map") / "depth"
-        dialog = ExportDialog(folder, count=count, at=at, parent=self._owner)
-        dialog.chosen.connect(self.run)
-        dialog.open()
+        export_dialog(folder, self.run, count=count, at=at, parent=self._owner).open()
 
     def run(self, choice: ExportChoice) -> None:
         """Write the chosen files."""
         last, source = self._depth.last, self._depth.live.source
         reconstructor = self._depth.reconstructor
-        self._context.settings.keep_folder("height_map", choice.folder.parent)
+        self._context.settings.keep_folder("height_map", Path(choice.folder).parent)
         if choice.frames is not None and isinstance(source, RecordingSource):
             path = source.path
             if reconstructor is None:

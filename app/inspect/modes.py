@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from statistics import median
 
-from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QObject, QSignalBlocker, Qt
 from PySide6.QtWidgets import QComboBox
 
 from app.context.context import AppContext
@@ -73,19 +73,22 @@ class ModeChoice(QObject):
         Runs slow preparation.
     parent : QObject
         Owner.
+    on_chosen : callable
+        Called with the reconstructors for live and for frozen images, or None.
     context : AppContext
         Holds the settings, which store the mode.
-
-    Signals
-    -------
-    chosen(object, object)
-        Reconstructors for live and for frozen images, or None.
     """
 
-    chosen = Signal(object, object)
-
-    def __init__(self, jobs: Jobs, parent: QObject, *, context: AppContext) -> None:
+    def __init__(
+        self,
+        jobs: Jobs,
+        parent: QObject,
+        on_chosen: Callable[[Reconstructor | None, Reconstructor | None], object],
+        *,
+        context: AppContext,
+    ) -> None:
         super().__init__(parent)
+        self._chosen = on_chosen
         self._jobs, self._context = jobs, context
         self.box = ModeBox()
         self.box.activated.connect(self._on_chosen)
@@ -139,13 +142,13 @@ class ModeChoice(QObject):
     def _choose(self) -> None:
         mode, live, best = self.box.currentData(), self._live, self._best
         if live is None or mode is None:
-            self.chosen.emit(None, None)
+            self._chosen(None, None)
         elif mode.model == live.model:
-            self.chosen.emit(best if mode.effort == "best" else live.at_effort(mode.effort), best)
+            self._chosen(best if mode.effort == "best" else live.at_effort(mode.effort), best)
         elif self._paper is not None:
-            self.chosen.emit(self._paper, self._paper)
+            self._chosen(self._paper, self._paper)
         else:
-            self.chosen.emit(live, best)  # until the other one is ready
+            self._chosen(live, best)  # until the other one is ready
             self._make_paper(live)
 
     def _make_paper(self, live: Reconstructor) -> None:

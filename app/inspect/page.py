@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
@@ -28,7 +25,6 @@ from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
-from app.view2d.map_point import PixelMap, read_at
 from app.widgets.actions import action_button, make_action
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
@@ -57,9 +53,9 @@ class InspectPage(QWidget):
         self.live = LiveSession(context=context, name="inspect", parent=self)
         self.live_depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.zero = ZeroControl(self.live, self.jobs, context=context)
-        self.modes = ModeChoice(self.jobs, self, context=context)
+        self.modes = ModeChoice(self.jobs, self, self.live_depth.choose, context=context)
         idle = tr("Press an object into the membrane. Press Space to freeze it at full detail.")
-        self.banner = Banner(self.jobs, idle=idle)
+        self.banner = Banner(self.jobs, idle=idle, on_act=self._on_act)
         self._value = named(PlainLabel(), "inspect.depth", tr("Depth under the cursor"))
         make_bold(self._value, size=1.7)
         self._readout = named(
@@ -69,8 +65,6 @@ class InspectPage(QWidget):
         show_meaning(self._readout, "muted")
         self._rate = named(PlainLabel(wrap=True), "inspect.rate", tr("Rate and processing time"))
         show_meaning(self._rate, "muted")
-        self._cursor = (math.nan, math.nan)
-        self._pixel_map: PixelMap | None = None
         self._shown: Shown | None = None
         self._recorded = ""
         self._lay_out()
@@ -80,17 +74,17 @@ class InspectPage(QWidget):
     def _lay_out(self) -> None:
         self.pause_action = make_action(
             self, "inspect.pause", tr("Freeze"), lambda: self.pause(not self.live.paused),
-            keys=("Space",), tip=tr("Freeze the image at full detail"),
+            keys=("Space",), tip=tr("Freeze the image at full detail"), checkable=True,
+            inside=True,  # other pages use the space bar for something else
         )  # fmt: skip
-        self.pause_action.setCheckable(True)
-        # Other pages use the space bar for something else.
-        self.pause_action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         zero_action = make_action(
             self, "inspect.zero", tr("Zero"), self.zero.set_zero, keys=("Ctrl+0",),
             icon_name="zero", tip=tr("Use the current image as the zero reference"),
         )  # fmt: skip
-        self.recorder = RecordControl(self.live_depth, self, context=self.context)
-        self.stream = DepthStream(self.live_depth, self, context=self.context)
+        self.recorder = RecordControl(
+            self.live_depth, self, self._on_recorded, context=self.context
+        )
+        self.stream = DepthStream(self.live_depth, self, self._on_stream, context=self.context)
         self.export = ExportControl(self.live_depth, self.jobs, self, context=self.context)
         self.views = Views(
             self.jobs,
@@ -100,34 +94,29 @@ class InspectPage(QWidget):
                 action_button(self.recorder.action),
                 action_button(self.pause_action, primary=True),
             ),
+            on_wanted=self._want,
+            on_pointed=self._show_texts,
+            on_hold=lambda: self.file_actions.hold_reference(),
+            on_save=lambda: self.file_actions.save_profile(),
+            player=lambda: self.file_actions.player(),
             context=self.context,
         )
         self.file_actions = FileActions(self.live_depth, self.views, self, context=self.context)
-        surface_menu = self.views.surface.menu
-        surface_menu.mesh_wanted.connect(self.export.ask)
-        surface_menu.offer_mesh()
-        self.replay = ReplayBar()
-        self.processed = ProcessedLine()
+        self.views.surface.menu.add("mesh", tr("Export mesh…"), self.export.ask)
+        self.replay = ReplayBar("inspect")
+        self.processed = ProcessedLine(self.views.processing.reset)
         parts = self.banner, self.processed, (self.views, 1), self.replay
         vbox(*parts, of=self, margins=0, spacing=0)
 
     def _connect(self) -> None:
-        self.views.wanted_changed.connect(self._want)
-        self.processed.reset_wanted.connect(self.views.processing.reset)
-        self.views.pointed.connect(self._on_pointed)
-        self.views.image_pointed.connect(self._on_image_pointed)
         self.live.source_changed.connect(self._on_source)
         self.live.switched.connect(self._on_switched)
         self.live_depth.shown.connect(self._show)
         self.live_depth.calibration_loaded.connect(self.modes.offer)
         self.live_depth.calibration_switched.connect(self._on_calibration)
         self.live_depth.changed.connect(self._advise)
-        self.modes.chosen.connect(self.live_depth.choose)
         self.context.requests.preferences_changed.connect(self._show_again)
-        self.stream.changed.connect(self._on_stream)
-        self.recorder.reported.connect(self._on_recorded)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
-        self.banner.act_wanted.connect(self._on_act)
         self._texts = QTimer(self, interval=250)
         self._texts.timeout.connect(self._show_texts)
 
@@ -206,31 +195,12 @@ class InspectPage(QWidget):
     def _on_calibration(self) -> None:
         """Show the depth through another calibration, or none."""
         used = self.live_depth.live_reconstructor
-        self._pixel_map = None if used is None else PixelMap(used.calibration.table)
+        self.views.stage.use(None if used is None else used.calibration)
         if used is not None:
             self.views.prepare()
         self._forget()
 
-    # The cursor
-
-    def _on_pointed(self, x_mm: float, y_mm: float) -> None:
-        self._cursor = (x_mm, y_mm)
-        self.views.show_cursor(x_mm, y_mm)
-        pixel = None
-        if self._pixel_map is not None and math.isfinite(x_mm):
-            pixel = self._pixel_map.pixel_of(x_mm, y_mm, self._depth())
-        self.views.show_pixel(pixel)
-        self._show_texts()
-
-    def _on_image_pointed(self, u: float, v: float) -> None:
-        point = None if self._pixel_map is None else self._pixel_map.point_of(u, v, self._depth())
-        self._cursor = point or (math.nan, math.nan)
-        self.views.show_cursor(*self._cursor)
-        self._show_texts()
-
-    def _depth(self) -> NDArray[np.float32] | None:
-        heightmap = None if self._shown is None else self._shown.heightmap
-        return None if heightmap is None else heightmap.depth_mm
+    # Texts
 
     def _show_texts(self) -> None:
         self.modes.follow(self.live_depth.last)
@@ -239,9 +209,7 @@ class InspectPage(QWidget):
         self._rate.setText("\n".join(filter(None, texts)))
         self._rate.setToolTip(plain_tip(self.live_depth.trace_text()))
         heightmap = None if self._shown is None else self._shown.heightmap
-        reading = None
-        if heightmap is not None and math.isfinite(self._cursor[0]):
-            reading = read_at(heightmap, *self._cursor)
+        reading = self.views.stage.reading
         self._value.setText(" " if reading is None else in_unit(reading.depth_mm))
         text = "" if heightmap is None else tr("Point at a view to read the depth there.")
         self._readout.setText(text if reading is None else reading.detail())

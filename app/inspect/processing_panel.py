@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QCheckBox, QSizePolicy, QWidget
 
 from app.view2d.display import Display
 from app.view2d.processing import Processing
 from app.view2d.quantities import Reference
-from app.widgets.buttons import push_button
+from app.widgets.buttons import Slot, push_button
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
@@ -25,20 +25,16 @@ Points = tuple[tuple[float, float], ...]
 class ProcessingPanel(QWidget):
     """Lets the user choose mask, levelling, filter and a reference to subtract.
 
-    Signals
-    -------
-    changed()
-        A choice changed.
-    hold_wanted()
-        The height map of now is wanted as the reference.
+    Parameters
+    ----------
+    on_changed, on_hold : callable
+        Called when a choice changed, and when the height map of now is wanted as the reference.
     """
 
-    changed = Signal()
-    hold_wanted = Signal()
-
-    def __init__(self) -> None:
+    def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:
         super().__init__()
         named(self, "inspect.processing", tr("Processing"))
+        self._changed = on_changed
         self._reference: Reference | None = None
         self.form = Form(Processing(), "inspect.processing")
         self.form.changed.connect(self._on_changed)
@@ -49,7 +45,7 @@ class ProcessingPanel(QWidget):
         hold = push_button(
             "inspect.processing.hold",
             tr("Hold"),
-            self.hold_wanted.emit,
+            on_hold,
             accessible=tr("Hold as the reference"),
             tip=tr("Use the current height map, as reconstructed, as the reference"),
         )
@@ -68,7 +64,7 @@ class ProcessingPanel(QWidget):
             tip=tr("Show the height map as reconstructed"),
         )
         vbox(self.form, self._state, self._reset, of=self, margins=0)
-        self.show_reference(None)
+        self._show_reference()
 
     def processing(self, rectangle: Rectangle, points_mm: Points) -> Processing:
         """Return what is to be done, with the rectangle and the points on the map."""
@@ -84,6 +80,11 @@ class ProcessingPanel(QWidget):
     def show_reference(self, reference: Reference | None) -> None:
         """Offer a reference to subtract, or none."""
         self._reference = reference
+        self._show_reference()
+        self._on_changed()
+
+    def _show_reference(self) -> None:
+        reference = self._reference
         text = tr("There is no reference. Hold a height map first.")
         if reference is not None:
             text = tr("Show the difference from the reference: {name}").format(name=reference.name)
@@ -91,7 +92,7 @@ class ProcessingPanel(QWidget):
         self._subtract.setEnabled(reference is not None)
         if reference is None:
             self._subtract.setChecked(False)
-        self._on_changed()
+        self._reset.setEnabled(self._does_something)
 
     def reset(self) -> None:
         """Do nothing to the height map. The reference is kept."""
@@ -104,23 +105,25 @@ class ProcessingPanel(QWidget):
         """Show why the choices have no effect on a live image."""
         self._state.setVisible(not still)
 
+    @property
+    def _does_something(self) -> bool:
+        return not self.form.value.does_nothing or self._subtract.isChecked()
+
     def _on_changed(self) -> None:
-        self._reset.setEnabled(not self.form.value.does_nothing or self._subtract.isChecked())
-        self.changed.emit()
+        self._reset.setEnabled(self._does_something)
+        self._changed()
 
 
 class ProcessedLine(QWidget):
     """Says above the views what was done to the height map. Hidden if nothing was done.
 
-    Signals
-    -------
-    reset_wanted()
-        The height map is wanted as reconstructed.
+    Parameters
+    ----------
+    on_reset : callable
+        Called when the height map is wanted as reconstructed.
     """
 
-    reset_wanted = Signal()
-
-    def __init__(self) -> None:
+    def __init__(self, on_reset: Slot) -> None:
         super().__init__()
         named(self, "inspect.processed", tr("Processed height map"))
         self._text = named(PlainLabel(), "inspect.processed.steps", tr("Steps of the processing"))
@@ -128,7 +131,7 @@ class ProcessedLine(QWidget):
         reset = push_button(
             "inspect.processed.reset",
             tr("Reset"),
-            self.reset_wanted.emit,
+            on_reset,
             accessible=tr("Reset the processing"),
         )
         hbox((self._text, 1), reset, of=self, margins=(10, 2, 10, 2))
@@ -146,17 +149,16 @@ class ProcessedLine(QWidget):
 class DisplayPanel(QWidget):
     """Lets the user choose the display settings of depth.
 
-    Signals
-    -------
-    changed()
-        The display settings changed.
+    Parameters
+    ----------
+    on_changed : callable
+        Called when the display settings changed.
     """
 
-    changed = Signal()
-
-    def __init__(self) -> None:
+    def __init__(self, on_changed: Slot) -> None:
         super().__init__()
         named(self, "inspect.display", tr("Display"))
+        self._changed = on_changed
         self._range = 0.0, 1.0
         self._form = Form(Display(), "inspect.display")
         self._form.changed.connect(self._on_changed)
@@ -196,4 +198,4 @@ class DisplayPanel(QWidget):
         if name == "locked" and self.display.locked:
             low, high = self._range
             self._form.show_value(replace(self.display, low_mm=low, high_mm=high))
-        self.changed.emit()
+        self._changed()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from app.live.frame_results import Shown
 from app.view2d.map_point import flag_words
 from app.view2d.map_view import MapView, extent_of
 from app.view2d.quantities import FLAG_COLOURS, STEEPEST_DEG
+from app.widgets.buttons import Slot
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.layout import vbox
@@ -21,36 +23,63 @@ TELL_EVERY = 10
 """Frames between two updates of the legend, so that it can be read."""
 
 
-class QualityPanel(QWidget):
-    """Shows flags, how well the depth explains the image, or the uncertainty while paused.
+class ChosenMap(QWidget):
+    """A map of one of several quantities, with a legend below it.
 
-    Signals
-    -------
-    chosen()
-        Another quantity was selected.
+    Parameters
+    ----------
+    name, title : str
+        The widget's name, and its text for screen readers.
+    quantities : mapping of str to str
+        What can be chosen, with its text.
+    on_chosen : callable
+        Called when another quantity was chosen.
     """
 
-    chosen = Signal()
-
-    def __init__(self) -> None:
+    def __init__(
+        self, name: str, title: str, quantities: Mapping[str, str], on_chosen: Slot
+    ) -> None:
         super().__init__()
-        named(self, "inspect.quality", tr("Quality"))
-        self.map = MapView("inspect.quality.map", tr("Quality of the depth"))
-        self._what = named(ComboBox(), "inspect.quality.what", tr("Quantity shown"))
-        self._what.addItem(tr("Flags"), "flags")
-        self._what.addItem(tr("Misfit of the image"), "misfit")
-        self._what.addItem(tr("Uncertainty (when paused)"), "uncertainty")
-        self._what.currentIndexChanged.connect(self._on_chosen)
-        self._legend = named(MarkupLabel(wrap=True), "inspect.quality.legend", tr("Legend"))
+        named(self, name, title)
+        self.map = MapView(f"{name}.map", title)
+        self._on_chosen = on_chosen
+        self._what = named(ComboBox(), f"{name}.what", tr("Quantity shown"))
+        for key, text in quantities.items():
+            self._what.addItem(text, key)
+        self._what.currentIndexChanged.connect(self._choose)
+        self._legend = named(MarkupLabel(wrap=True), f"{name}.legend", tr("Legend"))
         self._legend.setContentsMargins(6, 2, 6, 2)
         vbox(self._what, (self.map, 1), self._legend, of=self, margins=0, spacing=2)
         self.map.say(tr("No depth yet."))
-        self._count = 0
 
     @property
     def what(self) -> str:
-        """The shown quantity: ``flags``, ``misfit`` or ``uncertainty``."""
+        """The shown quantity."""
         return str(self._what.currentData())
+
+    def say(self, text: str) -> None:
+        """Show a text instead of the image and its legend."""
+        self.map.say(text)
+        self._legend.clear()
+
+    def _choose(self) -> None:
+        # The image, colours and legend of another quantity would be misread.
+        if self.map.has_image:
+            self.say(tr("Please wait."))
+        self._on_chosen()
+
+
+class QualityPanel(ChosenMap):
+    """Shows flags, how well the depth explains the image, or the uncertainty while paused."""
+
+    def __init__(self, on_chosen: Slot) -> None:
+        quantities = {
+            "flags": tr("Flags"),
+            "misfit": tr("Misfit of the image"),
+            "uncertainty": tr("Uncertainty (when paused)"),
+        }
+        super().__init__("inspect.quality", tr("Quality"), quantities, on_chosen)
+        self._count = 0
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show the quality of a frame."""
@@ -64,8 +93,7 @@ class QualityPanel(QWidget):
                 sentence = tr("This model gives no uncertainty. Calibrate with the full model.")
             elif still:
                 sentence = tr("Computing the uncertainty of this image…")
-            self.map.say(sentence)
-            self._legend.clear()
+            self.say(sentence)
             return
         self.map.set_image(shown.quality, extent_of(shown.heightmap))
         if self.what == "uncertainty":
@@ -77,27 +105,10 @@ class QualityPanel(QWidget):
         if shown.misfit is not None:
             self.map.show_colours("inferno", 0.0, 100.0 * shown.quality_top, "%")
         self._count += 1
-        if still or self._count % TELL_EVERY == 1:
+        if still or self._count % TELL_EVERY == 1 or not self._legend.text():
             misfit = shown.misfit
             text = legend(shown.heightmap.flags) if misfit is None else misfit_text(misfit)
             self._legend.setText(text)
-
-    def say(self, text: str) -> None:
-        """Show a text instead of the image and its legend."""
-        self._forget_colours()
-        self.map.say(text)
-
-    def _forget_colours(self) -> None:
-        self.map.bar.hide()
-        self._legend.clear()
-        self._count = 0
-
-    def _on_chosen(self) -> None:
-        # The image, colours and legend of another quantity would be misread.
-        self._forget_colours()
-        if self.map.has_image:
-            self.map.say(tr("Please wait."))
-        self.chosen.emit()
 
 
 def misfit_text(misfit: np.ndarray) -> str:
@@ -123,42 +134,17 @@ def legend(flags: np.ndarray) -> str:
     return "&nbsp;&nbsp; ".join(parts) or tr("No flags: all pixels are measured normally.")
 
 
-class NormalsPanel(QWidget):
-    """Shows the normals as colours, or the slope.
+class NormalsPanel(ChosenMap):
+    """Shows the normals as colours, or the slope."""
 
-    Signals
-    -------
-    chosen()
-        The other quantity was selected.
-    """
+    def __init__(self, on_chosen: Slot) -> None:
+        quantities = {"normals": tr("Normals: x in red, y in green"), "slope": tr("Slope")}
+        super().__init__("inspect.normals", tr("Normals"), quantities, on_chosen)
+        self._legend.hide()
 
-    chosen = Signal()
-
-    def __init__(self) -> None:
-        super().__init__()
-        named(self, "inspect.normals", tr("Normals"))
-        self.map = MapView("inspect.normals.map", tr("Normals"))
-        self._what = named(ComboBox(), "inspect.normals.what", tr("Quantity shown"))
-        self._what.addItem(tr("Normals: x in red, y in green"), "normals")
-        self._what.addItem(tr("Slope"), "slope")
-        self._what.currentIndexChanged.connect(self._on_chosen)
-        vbox(self._what, (self.map, 1), of=self, margins=0, spacing=2)
-        self.map.say(tr("No depth yet."))
-
-    @property
-    def what(self) -> str:
-        """The shown quantity: ``normals`` or ``slope``."""
-        return str(self._what.currentData())
-
-    def show_frame(self, shown: Shown) -> None:
+    def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show a frame."""
         if shown.normals is not None and shown.heightmap is not None:
             self.map.set_image(shown.normals, extent_of(shown.heightmap))
             if self.what == "slope":
                 self.map.show_colours("magma", 0.0, STEEPEST_DEG, "°")
-
-    def _on_chosen(self) -> None:
-        # The colours of one quantity are meaningless for the other.
-        if self.map.has_image:
-            self.map.say(tr("Please wait."))
-        self.chosen.emit()

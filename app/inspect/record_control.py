@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, QTimer
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
@@ -25,27 +26,29 @@ class RecordControl(QObject):
         Holds the open source.
     owner : QWidget
         Gets the action.
+    report : callable
+        Called with the status of the recording. Empty if there is none.
     context : AppContext
         Holds the library and the messages.
-
-    Signals
-    -------
-    reported(str)
-        Status of the recording. Empty if there is none.
     """
 
-    reported = Signal(str)
-
-    def __init__(self, depth: LiveDepth, owner: QWidget, *, context: AppContext) -> None:
+    def __init__(
+        self,
+        depth: LiveDepth,
+        owner: QWidget,
+        report: Callable[[str], object],
+        *,
+        context: AppContext,
+    ) -> None:
         super().__init__(owner)
+        self._report = report
         self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
         self._warned = False
         self.action: QAction = make_action(
             owner, "inspect.record", tr("Record"), self.toggle, keys=("R",),
-            icon_name="record", tip=tr("Record every frame without loss"),
+            icon_name="record", tip=tr("Record every frame without loss"), checkable=True,
         )  # fmt: skip
-        self.action.setCheckable(True)
         self._timer = QTimer(self, interval=300)
         self._timer.timeout.connect(self._poll)
         depth.live.switched.connect(self._on_switched)
@@ -118,7 +121,7 @@ class RecordControl(QObject):
             return
         if not self.action.isChecked():
             self.action.setText(tr("Writing…"))
-            self.reported.emit(tr("Writing: {words}").format(words=recorder_text(figures)))
+            self._report(tr("Writing: {words}").format(words=recorder_text(figures)))
             return
         room = room_for(
             figures,
@@ -129,7 +132,7 @@ class RecordControl(QObject):
             tr("{time}, {left}").format(time=time_text(figures.seconds), left=left_text(room))
         )
         words = tr("Recording: {words}, {left}")
-        self.reported.emit(words.format(words=recorder_text(figures), left=left_text(room)))
+        self._report(words.format(words=recorder_text(figures), left=left_text(room)))
         self._heed(room)
 
     def _heed(self, room: Room) -> None:
@@ -152,7 +155,7 @@ class RecordControl(QObject):
         self._timer.stop()
         self.action.setChecked(False)
         self.action.setText(tr("Record"))
-        self.reported.emit("")
+        self._report("")
         if figures.failure:
             self._context.toasts.show(figures.failure, "fail")
             return

@@ -3,282 +3,170 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-import pyqtgraph as pg
-from PySide6.QtCore import QObject, QPointF, Qt, Signal
-from PySide6.QtGui import QColor, QPolygonF
-from PySide6.QtWidgets import QGraphicsPolygonItem
 
+from app.live.grips import Grip, rectangle_grips, rectangle_moved
+from app.live.tool_layer import DrawnTool
 from app.view2d.cuts import Line, Point
-from app.view2d.map_view import MapView
+from app.view2d.map_view import Extent
 from app.view2d.profile_plot import LINE_COLOURS, line_colour
-from app.widgets.plots import own_handle_menus
 from gelpolight_core.measurement.area import Rectangle
 
-REGION_INK = "#ff5c2e"
+REGION_INK, POINT_INK = "#ff5c2e", "#5ad7ff"
 LEAST_MM = 0.05
 APART_MM = 1.5
 """Distance of a new line from the chosen one."""
+REACH = 0.75
+"""Distance of the first points from the middle of the map, of half its shorter side."""
 
 
-class SectionLines(QObject):
-    """One or more lines on the map; the readings belong to the chosen one.
+class SectionMarks:
+    """One or more lines on the map, a rectangle, and three points of a plane.
 
-    Signals
-    -------
-    moved()
-        The ends of a line have moved.
-    changed()
-        A line was added, removed or chosen.
+    The readings belong to the chosen line. A user of :class:`app.live.tool_layer.ToolLayer`.
+
+    Parameters
+    ----------
+    on_chosen, on_moved : callable
+        Called when a line was added, removed or chosen, and when something was dragged.
+
+    Attributes
+    ----------
+    lines : dict of int to Line
+        By their numbers.
+    chosen : int
+        Number of the chosen line.
+    rectangle : Rectangle
+        The measured rectangle.
+    points_mm : tuple of (x, y)
+        Three points.
     """
 
-    moved = Signal()
-    changed = Signal()
-
-    def __init__(self, view: MapView) -> None:
-        super().__init__(view)
-        self._view = view
-        self._lines: dict[int, _LineItem] = {}
-        self._chosen = 1
-        self._width_mm = 0.0
-        self._on = False
-        self._add(Line())
-
-    def __iter__(self) -> Iterator[Line]:
-        """Go through the lines, by their numbers."""
-        return (self._lines[number].line for number in sorted(self._lines))
-
-    @property
-    def chosen(self) -> int:
-        """Number of the chosen line."""
-        return self._chosen
+    def __init__(self, on_chosen: Callable[[], object], on_moved: Callable[[], object]) -> None:
+        self._on_chosen, self._on_moved = on_chosen, on_moved
+        self.lines = {1: Line()}
+        self.chosen = 1
+        self.rectangle = Rectangle((0.0, 0.0), (4.0, 4.0))
+        self.points_mm: tuple[Point, ...] = ()
 
     @property
     def may_add(self) -> bool:
         """Whether there is a colour for one more line."""
-        return len(self._lines) < len(LINE_COLOURS)
+        return len(self.lines) < len(LINE_COLOURS)
 
     @property
     def may_remove(self) -> bool:
         """Whether a line is left after removing one."""
-        return len(self._lines) > 1
+        return len(self.lines) > 1
 
     def add(self) -> None:
         """Add a line beside the chosen one, and choose it."""
         if not self.may_add:
             return
-        free = next(n for n in range(1, len(LINE_COLOURS) + 1) if n not in self._lines)
-        beside = self._lines[self._chosen].line
-        start, end = (np.array(p) for p in (beside.start_mm, beside.end_mm))
-        along = (end - start) / np.linalg.norm(end - start)
-        shift = APART_MM * np.array([-along[1], along[0]])
-        self._add(Line(_point(start + shift), _point(end + shift), free))
-        self.choose(free)
+        free = next(n for n in range(1, len(LINE_COLOURS) + 1) if n not in self.lines)
+        beside = self.lines[self.chosen]
+        new = Line(*_shifted(beside, APART_MM), free)
+        self.lines = dict(sorted({**self.lines, free: new}.items()))
+        self.on_tool(free)
 
     def remove(self) -> None:
         """Remove the chosen line, and choose the one before it."""
-        if not self.may_remove:
+        if self.may_remove:
+            before = [number for number in self.lines if number < self.chosen]
+            del self.lines[self.chosen]
+            self.on_tool(max(before, default=min(self.lines)))
+
+    def spread(self, extent: Extent) -> None:
+        """Place the points around the middle of the first map."""
+        if self.points_mm:
             return
-        numbers = sorted(self._lines)
-        at = numbers.index(self._chosen)
-        self._lines.pop(self._chosen).discard()
-        self.choose(numbers[at - 1] if at else numbers[1])
-
-    def choose(self, number: int) -> None:
-        """Choose a line for the readings."""
-        self._chosen = number
-        self._draw()
-        self.changed.emit()
-
-    def set_width(self, width_mm: float) -> None:
-        """Show the width that is averaged over."""
-        self._width_mm = width_mm
-        self._draw()
-
-    def show(self, on: bool) -> None:
-        """Show or hide them."""
-        self._on = on
-        self._draw()
-
-    def _add(self, line: Line) -> None:
-        item = _LineItem(self._view, line)
-        item.touched.connect(self._on_touched)
-        item.moved.connect(self.moved)
-        self._lines[line.number] = item
-
-    def _draw(self) -> None:
-        for number, item in self._lines.items():
-            item.draw(self._width_mm, chosen=number == self._chosen, on=self._on)
-
-    def _on_touched(self, number: int) -> None:
-        if number != self._chosen:
-            self.choose(number)
-
-
-class _LineItem(QObject):
-    """A line with its number and the band that is averaged over."""
-
-    moved = Signal()
-    touched = Signal(int)
-
-    def __init__(self, view: MapView, line: Line) -> None:
-        super().__init__(view)
-        self._box, self._number = view.box, line.number
-        self._width_mm = 0.0
-        self._colour = line_colour(line.number)
-        self._roi = pg.LineSegmentROI(
-            [line.start_mm, line.end_mm],
-            hoverPen=pg.mkPen("#ffffff", width=2),
-            handlePen=pg.mkPen(self._colour, width=2),
-        )
-        own_handle_menus(self._roi, view)
-        self._roi.setAcceptedMouseButtons(Qt.MouseButton.LeftButton)
-        band = QColor(self._colour)
-        band.setAlpha(60)
-        self._band = QGraphicsPolygonItem()
-        self._band.setBrush(band)
-        self._band.setPen(pg.mkPen(None))
-        self._label = pg.TextItem(str(line.number), color=self._colour, anchor=(1.2, 0.5))
-        for level, item in enumerate((self._band, self._label, self._roi)):
-            item.setZValue(28 + level)
-            item.setVisible(False)
-            self._box.addItem(item, ignoreBounds=True)
-        self._roi.sigClicked.connect(lambda *_: self.touched.emit(self._number))
-        self._roi.sigRegionChanged.connect(self._on_moved)
-
-    @property
-    def line(self) -> Line:
-        """Both ends, and the number."""
-        points = [self._roi.mapToParent(p) for p in self._roi.listPoints()]
-        (start, end) = ((float(p.x()), float(p.y())) for p in points)
-        if math.dist(start, end) < LEAST_MM:
-            end = (start[0] + LEAST_MM, start[1])
-        return Line(start, end, self._number)
-
-    def draw(self, width_mm: float, *, chosen: bool, on: bool) -> None:
-        """Show it with this width, thicker if it is the chosen one."""
-        self._width_mm = width_mm
-        self._roi.setPen(pg.mkPen(self._colour, width=3 if chosen else 1.5))
-        for item in (self._band, self._label, self._roi):
-            item.setVisible(on)
-        self._lay_band()
-
-    def discard(self) -> None:
-        """Take it off the map."""
-        for item in (self._band, self._label, self._roi):
-            self._box.removeItem(item)
-        for handle in self._roi.getHandles():
-            handle.menu.deleteLater()
-        self.deleteLater()
-
-    def _on_moved(self) -> None:
-        self._lay_band()
-        self.touched.emit(self._number)
-        self.moved.emit()
-
-    def _lay_band(self) -> None:
-        line = self.line
-        start, end = (np.array(p) for p in (line.start_mm, line.end_mm))
-        along = (end - start) / np.linalg.norm(end - start)
-        across = 0.5 * self._width_mm * np.array([-along[1], along[0]])
-        corners = (start + across, end + across, end - across, start - across)
-        self._band.setPolygon(QPolygonF([QPointF(float(x), float(y)) for x, y in corners]))
-        self._label.setPos(*line.start_mm)
-
-
-def _point(at: np.ndarray) -> Point:
-    return float(at[0]), float(at[1])
-
-
-class RegionBox(QObject):
-    """A rectangle whose roughness is measured.
-
-    Signals
-    -------
-    moved()
-        The rectangle was moved or resized.
-    """
-
-    moved = Signal()
-
-    def __init__(self, view: MapView) -> None:
-        super().__init__(view)
-        self._roi = pg.RectROI(
-            [-2.0, -2.0],
-            [4.0, 4.0],
-            pen=pg.mkPen(REGION_INK, width=2),
-            hoverPen=pg.mkPen("#ffffff", width=2),
-            handlePen=pg.mkPen(REGION_INK, width=2),
-        )
-        own_handle_menus(self._roi, view)
-        self._roi.setZValue(27)
-        self._roi.setVisible(False)
-        view.box.addItem(self._roi, ignoreBounds=True)
-        self._roi.sigRegionChanged.connect(self.moved)
-
-    @property
-    def rectangle(self) -> Rectangle:
-        """The rectangle in mm."""
-        at, size = self._roi.pos(), self._roi.size()
-        wide, high = (max(abs(float(v)), LEAST_MM) for v in (size.x(), size.y()))
-        return Rectangle((float(at.x()) + 0.5 * wide, float(at.y()) + 0.5 * high), (wide, high))
-
-    def show(self, on: bool) -> None:
-        """Show or hide it."""
-        self._roi.setVisible(on)
-
-
-INK = "#5ad7ff"
-REACH = 0.75
-"""Distance of the first places from the middle of the map, of half its shorter side."""
-
-
-class LevelPoints(QObject):
-    """Three numbered points.
-
-    Signals
-    -------
-    moved()
-        A point was moved.
-    """
-
-    moved = Signal()
-
-    def __init__(self, view: MapView) -> None:
-        super().__init__(view)
-        self._points = []
-        self._placed = False
-        for number in (1, 2, 3):
-            point = pg.TargetItem(
-                size=14, pen=pg.mkPen(INK, width=2), hoverPen=pg.mkPen("#ffffff", width=2),
-                label=str(number), labelOpts={"color": INK, "offset": (8, -8)},
-            )  # fmt: skip
-            point.setZValue(31)
-            point.setVisible(False)
-            view.box.addItem(point, ignoreBounds=True)
-            point.sigPositionChanged.connect(self.moved)
-            self._points.append(point)
-
-    @property
-    def points_mm(self) -> tuple[tuple[float, float], ...]:
-        """The points (x, y)."""
-        return tuple((float(p.pos().x()), float(p.pos().y())) for p in self._points)
-
-    def spread(self, extent_mm: tuple[float, float, float, float]) -> None:
-        """Place them around the middle of the first map: left, top, right, bottom."""
-        if self._placed:
-            return
-        self._placed = True
-        left, top, right, bottom = extent_mm
+        left, top, right, bottom = extent
         reach = 0.5 * REACH * min(right - left, bottom - top)
-        for point, degrees in zip(self._points, (210.0, 330.0, 90.0), strict=True):
-            angle = math.radians(degrees)
-            x = 0.5 * (left + right) + reach * math.cos(angle)
-            point.setPos(x, 0.5 * (top + bottom) + reach * math.sin(angle))
+        turns = np.radians([210.0, 330.0, 90.0])
+        x = 0.5 * (left + right) + reach * np.cos(turns)
+        y = 0.5 * (top + bottom) + reach * np.sin(turns)
+        self.points_mm = tuple(zip(x.tolist(), y.tolist(), strict=True))
 
-    def show(self, on: bool) -> None:
-        """Show or hide them."""
-        for point in self._points:
-            point.setVisible(on)
+    def drawn(
+        self, *, lines: bool, rectangle: bool, points: bool, width_mm: float
+    ) -> tuple[tuple[DrawnTool, ...], tuple[Grip, ...]]:
+        """Return what is drawn on the map, and the grips; a line shows the width of its mean."""
+        tools, grips = list[DrawnTool](), list[Grip]()
+        if lines:
+            tools += [self._drawn_line(line, width_mm) for line in self.lines.values()]
+            line = self.lines[self.chosen]
+            grips += [Grip("start", line.start_mm), Grip("middle", _middle(line))]
+            grips.append(Grip("end", line.end_mm))
+        if rectangle:
+            corners = tuple((float(x), float(y)) for x, y in self.rectangle.outline_mm)
+            tools.append(DrawnTool(0, (corners,), REGION_INK))
+            grips += rectangle_grips(self.rectangle)
+        if points:
+            for number, at in enumerate(self.points_mm, start=1):
+                tools.append(DrawnTool(0, ((at,),), POINT_INK, str(number)))
+                grips.append(Grip(str(number), at))
+        return tuple(tools), tuple(grips)
+
+    def _drawn_line(self, line: Line, width_mm: float) -> DrawnTool:
+        first, second = (_shifted(line, half) for half in (0.5 * width_mm, -0.5 * width_mm))
+        return DrawnTool(
+            line.number,
+            ((line.start_mm, line.end_mm),),
+            line_colour(line.number),
+            str(line.number),
+            width=3.0 if line.number == self.chosen else 1.5,
+            band=(*first, *reversed(second)),
+        )
+
+    # Called by the layer
+
+    def on_point(self, at_mm: Point) -> None:
+        """Do nothing: no tool is placed by clicks."""
+
+    def on_tool(self, key: int) -> None:
+        """Choose a line for the readings."""
+        self.chosen = key
+        self._on_chosen()
+
+    def on_grip(self, name: str) -> None:
+        """Do nothing: no grip is moved by keys."""
+
+    def on_drag(self, name: str, to_mm: Point, *, ended: bool) -> None:
+        """Move an end or the middle of the chosen line, the rectangle or a point."""
+        line = self.lines[self.chosen]
+        if name.isdigit():
+            at = int(name) - 1
+            self.points_mm = (*self.points_mm[:at], to_mm, *self.points_mm[at + 1 :])
+        elif name in ("start", "middle", "end"):
+            self.lines[self.chosen] = _line_moved(line, name, to_mm)
+        else:
+            self.rectangle = rectangle_moved(self.rectangle, name, to_mm)
+        self._on_moved()
+
+
+def _middle(line: Line) -> Point:
+    (x0, y0), (x1, y1) = line.start_mm, line.end_mm
+    return 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+
+
+def _line_moved(line: Line, grip: str, to_mm: Point) -> Line:
+    """Return a line with an end moved, or all of it by its middle."""
+    if grip == "middle":
+        dx, dy = np.subtract(to_mm, _middle(line)).tolist()
+        (x0, y0), (x1, y1) = line.start_mm, line.end_mm
+        return replace(line, start_mm=(x0 + dx, y0 + dy), end_mm=(x1 + dx, y1 + dy))
+    other = line.end_mm if grip == "start" else line.start_mm
+    if math.dist(to_mm, other) < LEAST_MM:
+        to_mm = (other[0] + LEAST_MM, other[1])
+    return replace(line, start_mm=to_mm) if grip == "start" else replace(line, end_mm=to_mm)
+
+
+def _shifted(line: Line, by_mm: float) -> tuple[Point, Point]:
+    """Return the ends of a line, moved across it."""
+    (x0, y0), (x1, y1) = line.start_mm, line.end_mm
+    length = math.dist(line.start_mm, line.end_mm)
+    dx, dy = -by_mm * (y1 - y0) / length, by_mm * (x1 - x0) / length
+    return (x0 + dx, y0 + dy), (x1 + dx, y1 + dy)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pyqtgraph as pg
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QColor, QIcon, QPixmap
 from PySide6.QtWidgets import QWidget
 
-from app.inspect.section_line import SectionLines
+from app.inspect.section_line import SectionMarks
 from app.view2d.cuts import Cut, Section
 from app.view2d.profile_plot import ProfilePlot, line_colour
-from app.widgets.buttons import push_button, tool_button
+from app.widgets.buttons import Slot, push_button, tool_button
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped
@@ -29,31 +29,30 @@ DEG = "deg"
 class SectionPanel(QWidget):
     """Shows the profiles, with two ranges to compare, and the level of the width.
 
-    Signals
-    -------
-    changed()
-        A range, the width, the level, or whether the rectangle is measured has changed.
-    save_wanted()
-        The user wants to save the profiles.
+    Parameters
+    ----------
+    marks : SectionMarks
+        The lines.
+    on_changed : callable
+        Called when a range, the width, the level, or whether the rectangle is measured has changed.
+    on_save : callable
+        Called when the profiles are to be saved.
     """
 
-    changed = Signal()
-    save_wanted = Signal()
-
-    def __init__(self) -> None:
+    def __init__(self, marks: SectionMarks, *, on_changed: Slot, on_save: Slot) -> None:
         super().__init__()
         named(self, "inspect.section", tr("Cross-section"))
         self._length = 12.0
         self.cut = Cut()
-        self._make_plot()
-        self.choice = LineChoice()
+        self._make_plot(on_changed)
+        self.choice = LineChoice(marks)
         self.form = Form(Section(), "inspect.section")
-        self.form.changed.connect(self.changed)
+        self.form.changed.connect(lambda _name: on_changed())
         self._plot.level_dragged.connect(lambda depth_mm: self.form.change(level_mm=depth_mm))
         save = push_button(
             "inspect.section.save",
             tr("Save…"),
-            self.save_wanted.emit,
+            on_save,
             accessible=tr("Save the profiles"),
             tip=tr("Save all lines as a table (CSV)"),
         )
@@ -66,7 +65,7 @@ class SectionPanel(QWidget):
         scrolled.setFixedWidth(210)
         hbox((self._plot, 1), figures, scrolled, of=self, margins=(8, 4, 8, 4), spacing=8)
 
-    def _make_plot(self) -> None:
+    def _make_plot(self, on_changed: Slot) -> None:
         self._plot = ProfilePlot("inspect.section.plot")
         self._plot.setToolTip(
             tr(
@@ -80,7 +79,7 @@ class SectionPanel(QWidget):
             region = pg.LinearRegionItem(
                 [share[0] * self._length, share[1] * self._length], brush=brush
             )
-            region.sigRegionChanged.connect(self.changed)
+            region.sigRegionChanged.connect(lambda _region: on_changed())
             self._plot.addItem(region)
             self._ranges.append(region)
 
@@ -141,55 +140,36 @@ def figure_text(figure: Measured, where: str = "") -> str:
 
 
 class LineChoice(QWidget):
-    """The list of the lines in their colours, with buttons to add and remove one.
+    """The list of the lines in their colours, with buttons to add and remove one."""
 
-    Signals
-    -------
-    chosen(int)
-        The line of this number was chosen.
-    add_wanted(), remove_wanted()
-        The buttons.
-    """
-
-    chosen = Signal(int)
-    add_wanted = Signal()
-    remove_wanted = Signal()
-
-    def __init__(self) -> None:
+    def __init__(self, marks: SectionMarks) -> None:
         super().__init__()
+        self._marks = marks
         self._box = named(
             ComboBox(), "inspect.section.line", tr("Line whose values are shown"),
             tr("The values below belong to this line. A click on a line also selects it"),
         )  # fmt: skip
-        self._box.activated.connect(lambda at: self.chosen.emit(self._box.itemData(at)))
-        add, remove = tr("Add a line"), tr("Remove this line")
-        self._add = tool_button(
-            "inspect.section.line.add",
-            "",
-            self.add_wanted.emit,
-            icon_name="add",
-            accessible=add,
-            tip=add,
-        )
-        self._remove = tool_button(
-            "inspect.section.line.remove",
-            "",
-            self.remove_wanted.emit,
-            icon_name="remove",
-            accessible=remove,
-            tip=remove,
+        self._box.activated.connect(lambda at: marks.on_tool(self._box.itemData(at)))
+        self._add, self._remove = (
+            tool_button(
+                f"inspect.section.line.{name}", "", slot, icon_name=name, accessible=text, tip=text
+            )
+            for name, text, slot in (
+                ("add", tr("Add a line"), marks.add),
+                ("remove", tr("Remove this line"), marks.remove),
+            )
         )
         hbox((self._box, 1), self._add, self._remove, of=self, margins=0, spacing=2)
 
-    def show_lines(self, lines: SectionLines) -> None:
+    def refresh(self) -> None:
         """Show the lines, and which of them is chosen."""
+        marks = self._marks
         with QSignalBlocker(self._box):
             self._box.clear()
-            for line in lines:
+            for number in marks.lines:
                 sample = QPixmap(12, 12)
-                sample.fill(QColor(line_colour(line.number)))
-                text = tr("Line {n}").format(n=line.number)
-                self._box.addItem(QIcon(sample), text, line.number)
-            self._box.setCurrentIndex(self._box.findData(lines.chosen))
-        self._add.setEnabled(lines.may_add)
-        self._remove.setEnabled(lines.may_remove)
+                sample.fill(QColor(line_colour(number)))
+                self._box.addItem(QIcon(sample), tr("Line {n}").format(n=number), number)
+            self._box.setCurrentIndex(self._box.findData(marks.chosen))
+        self._add.setEnabled(marks.may_add)
+        self._remove.setEnabled(marks.may_remove)

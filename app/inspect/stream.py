@@ -6,13 +6,13 @@ import ipaddress
 from collections.abc import Sequence
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QFormLayout, QWidget
 
 from app.context.context import AppContext
 from app.live.depth import LiveDepth
 from app.live.frame_results import Shown
-from app.widgets.buttons import push_button
+from app.widgets.buttons import Slot, push_button
 from app.widgets.dialog import Dialog
 from app.widgets.inputs import ComboBox, SpinBox
 from app.widgets.label import PlainLabel
@@ -41,19 +41,17 @@ class DepthStream(QObject):
         Computes the frames.
     owner : QWidget
         The page.
+    on_changed : callable
+        Called when it was started or stopped.
     context : AppContext
         Shared by all pages.
-
-    Signals
-    -------
-    changed()
-        It was started or stopped.
     """
 
-    changed = Signal()
-
-    def __init__(self, depth: LiveDepth, owner: QWidget, *, context: AppContext) -> None:
+    def __init__(
+        self, depth: LiveDepth, owner: QWidget, on_changed: Slot, *, context: AppContext
+    ) -> None:
         super().__init__(owner)
+        self._on_changed = on_changed
         self._depth, self._owner, self._context = depth, owner, context
         self._publisher: Publisher | None = None
         self._dialog: StreamDialog | None = None
@@ -101,14 +99,19 @@ class DepthStream(QObject):
         self.stop()
         self._publisher = Publisher(ANY_HOST if network else HOST, port, network=network)
         self._network, self._sent, self.count = network, -1, 0
-        self.changed.emit()
+        self._changed()
 
     def stop(self) -> None:
         """Send nothing more."""
         publisher, self._publisher = self._publisher, None
         if publisher is not None:
             publisher.close()
-            self.changed.emit()
+            self._changed()
+
+    def _changed(self) -> None:
+        if self._dialog is not None:
+            self._dialog.refresh()
+        self._on_changed()
 
     def close(self) -> None:
         """Stop at the end of the program."""
@@ -164,7 +167,6 @@ class StreamDialog(Dialog):
         form.addRow(tr("&Port"), self.port)
         form.addRow(self.state)
         self.fill(form, add=(self.button,))
-        stream.changed.connect(self.refresh)
         self.refresh()
 
     def refresh(self) -> None:

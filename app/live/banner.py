@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.live.advice import BUTTONS, action_of
@@ -29,16 +31,11 @@ class Banner(QWidget):
         Their progress is shown, and they can be stopped.
     idle : str
         Shown in muted colour if there is no advice.
-
-    Signals
-    -------
-    act_wanted(str)
-        The button next to the advice was clicked. Its name.
+    on_act : callable
+        Called with the name of the advised action when its button is clicked.
     """
 
-    act_wanted = Signal(str)
-
-    def __init__(self, jobs: Jobs, *, idle: str) -> None:
+    def __init__(self, jobs: Jobs, *, idle: str, on_act: Callable[[str], object]) -> None:
         super().__init__()
         named(self, "inspect.banner", tr("What to do next"))
         self._advice: Finding | None = None
@@ -46,7 +43,7 @@ class Banner(QWidget):
         self._text = named(PlainLabel(wrap=True), "inspect.advice", tr("Advice"))
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._button = named(QPushButton(), "inspect.advised", tr("Do this"))
-        self._button.clicked.connect(lambda: self.act_wanted.emit(action_of(self._advice)))
+        self._button.clicked.connect(lambda: on_act(action_of(self._advice)))
         self._bar = named(QProgressBar(), "inspect.progress", tr("Progress"))
         self._bar.setFixedWidth(220)
         self._stop = push_button(

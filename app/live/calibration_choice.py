@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from app.context.calibration_status import put_into_use
@@ -34,20 +34,19 @@ class CalibrationChoice(QObject):
         Runs the reading.
     owner : QWidget
         The page.
+    on_loaded : callable
+        Called with the reconstructors of the calibration in use, for live and for frozen images.
+        None if there is none, or until it is read.
     context : AppContext
         Holds the workspace.
-
-    Signals
-    -------
-    loaded(object, object)
-        Reconstructors of the calibration in use, for live and for frozen images. None if there is
-        none, or until it is read.
     """
 
-    loaded = Signal(object, object)
-
-    def __init__(self, jobs: Jobs, owner: QWidget, *, context: AppContext) -> None:
+    def __init__(
+        self, jobs: Jobs, owner: QWidget, on_loaded: Callable[[Any, Any], object], *,
+        context: AppContext,
+    ) -> None:  # fmt: skip
         super().__init__(owner)
+        self._loaded = on_loaded
         self._jobs, self._owner, self._context = jobs, owner, context
         self._state: tuple[object, ...] = ()
         self._reading: Job | None = None
@@ -72,7 +71,7 @@ class CalibrationChoice(QObject):
         if used is not None:
             self._read(used.path)
         # The previous calibration must not be used under the new name, even if reading fails.
-        self.loaded.emit(None, None)
+        self._loaded(None, None)
 
     @property
     def is_reading(self) -> bool:
@@ -122,7 +121,7 @@ class CalibrationChoice(QObject):
                 return  # requested again: the file may have changed
             self._reading = None
             if self._state[:1] == found[:1]:
-                self.loaded.emit(*found[1:])
+                self._loaded(*found[1:])
 
         title = tr("Preparing the calibration")
         failed = partial(self._context.toasts.show, verdict="fail")

@@ -75,7 +75,7 @@ class LiveDepth(QObject):
     ) -> None:
         super().__init__(live)
         self.live, self._jobs, self._context = live, jobs, context
-        self.calibrations = CalibrationChoice(jobs, owner, context=context)
+        self.calibrations = CalibrationChoice(jobs, owner, self.load, context=context)
         self.last: Shown | None = None
         self._maker = Maker(None)
         self._chosen: tuple[Reconstructor | None, Reconstructor | None] = None, None
@@ -92,7 +92,6 @@ class LiveDepth(QObject):
         live.source_changed.connect(self._on_source)
         live.switched.connect(self._on_switched)
         live.lost.connect(self._on_lost)
-        self.calibrations.loaded.connect(self._on_loaded)
         jobs.progressed.connect(self._on_progress)
 
     # Called by the page
@@ -299,7 +298,8 @@ class LiveDepth(QObject):
 
     # The calibration
 
-    def _on_loaded(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+    def load(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Take the reconstructors of another calibration in use. None: there is none yet."""
         self._chosen = None, None
         self._restart_health()
         self._use(None, None)

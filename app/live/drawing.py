@@ -31,7 +31,7 @@ from app.live.overlay import (
 )
 
 # Distinguishable without red-green vision, too: the colours differ in brightness.
-ROLE_COLOURS: dict[Role, str] = {
+ROLE_COLOURS: dict[str, str] = {
     "good": "#3ddc84",
     "bad": "#ff6b5e",
     "expected": "#ffd54a",
@@ -164,6 +164,11 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
             painter.drawImage(position, image)
 
 
+def colour_of(role: str) -> QColor:
+    """Return the colour of a role. Any other text is a colour itself."""
+    return QColor(ROLE_COLOURS.get(role, role))
+
+
 def _mask_image(mask: Mask) -> tuple[QRectF, QImage]:
     """Return a tint for the true pixels, one byte per pixel with a colour table, and its position.
 
@@ -175,20 +180,17 @@ def _mask_image(mask: Mask) -> tuple[QRectF, QImage]:
     padded = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
     padded[:, :columns] = mask.area[top : top + rows, left : left + columns]
     image = QImage(padded.data, columns, rows, padded.shape[1], QImage.Format.Format_Indexed8)
-    tint = QColor(ROLE_COLOURS[mask.role])
+    tint = colour_of(mask.role)
     tint.setAlpha(95)
     image.setColorTable([0, tint.rgba()])
     return QRectF(left - 0.5, top - 0.5, columns, rows), image.copy()
 
 
-def _stroke(painter: QPainter, role: Role, draw: Any, *, width: float = 1.6) -> None:
-    """Draw twice: a dark halo, then the role's colour; expected items are dashed."""
+def stroke(painter: QPainter, role: str, draw: Any, *, width: float = 1.6) -> None:
+    """Draw twice: a dark halo, then the colour of a role; expected items are dashed."""
     dashed = Qt.PenStyle.DashLine if role == "expected" else Qt.PenStyle.SolidLine
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    for pen in (
-        QPen(HALO, width + 2.0),
-        QPen(QColor(ROLE_COLOURS[role]), width, dashed),
-    ):
+    for pen in (QPen(HALO, width + 2.0), QPen(colour_of(role), width, dashed)):
         painter.setPen(pen)
         draw()
 
@@ -199,22 +201,22 @@ def _paint_line(painter: QPainter, line: Line, to_screen: QTransform) -> None:
     # Information stays thin: there may be a dozen earlier views.
     if line.role == "info":
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        faint = QColor(ROLE_COLOURS["info"])
+        faint = colour_of("info")
         faint.setAlpha(120)
         painter.setPen(QPen(faint, 1.0))
         draw(polygon)
         return
-    _stroke(painter, line.role, lambda: draw(polygon))
+    stroke(painter, line.role, lambda: draw(polygon))
 
 
 def _paint_circle(painter: QPainter, circle: Circle, to_screen: QTransform, selected: bool) -> None:
     centre = to_screen.map(QPointF(circle.u, circle.v))
     edge = to_screen.map(QPointF(circle.u + circle.radius_px, circle.v))
     radius = abs(edge.x() - centre.x())
-    _stroke(painter, circle.role, lambda: painter.drawEllipse(centre, radius, radius))
+    stroke(painter, circle.role, lambda: painter.drawEllipse(centre, radius, radius))
     if circle.handle:
-        _paint_grip(painter, centre, circle.role, selected)
-        _paint_grip(painter, edge, circle.role, selected)
+        paint_grip(painter, centre, circle.role, selected)
+        paint_grip(painter, edge, circle.role, selected)
 
 
 def _paint_ring(painter: QPainter, ring: Ring, to_screen: QTransform) -> None:
@@ -230,11 +232,12 @@ def _paint_ring(painter: QPainter, ring: Ring, to_screen: QTransform) -> None:
         painter.drawArc(box, 90 * 16, round(-360 * 16 * share))
 
 
-def _paint_grip(painter: QPainter, at: QPointF, role: Role, selected: bool) -> None:
+def paint_grip(painter: QPainter, at: QPointF, role: str, selected: bool) -> None:
+    """Draw the square that is dragged; the keys move the selected one."""
     size = 4.0 + (2.0 if selected else 0.0)
     box = QRectF(at.x() - size, at.y() - size, 2 * size, 2 * size)
     painter.setPen(QPen(QColor(0, 0, 0), 1.0))
-    painter.setBrush(QColor("white") if selected else QColor(ROLE_COLOURS[role]))
+    painter.setBrush(QColor("white") if selected else colour_of(role))
     painter.drawRect(box)
 
 
@@ -255,10 +258,10 @@ def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, sele
             case "dot":
                 painter.drawEllipse(at, 2.0, 2.0)
 
-    _stroke(painter, marker.role, draw)
+    stroke(painter, marker.role, draw)
     if marker.handle:
         ring = s + 5.0
-        _stroke(
+        stroke(
             painter,
             "info" if selected else marker.role,
             lambda: painter.drawRect(QRectF(x - ring, y - ring, 2 * ring, 2 * ring)),
@@ -279,9 +282,13 @@ def _paint_text(painter: QPainter, at: QPointF, text: str, role: Role, *, gap: f
     if left + width > view.right():
         left = at.x() - gap - width
     top = min(max(top, 0.0), view.bottom() - height)
-    plate = QRectF(left, top, width, height)
+    paint_plate(painter, QRectF(left, top, width, height), text, role)
+
+
+def paint_plate(painter: QPainter, plate: QRectF, text: str, role: str) -> None:
+    """Write on a dark plate."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(PLATE)
     painter.drawRoundedRect(plate, 3.0, 3.0)
-    painter.setPen(QColor(ROLE_COLOURS[role]))
+    painter.setPen(colour_of(role))
     painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, text)

@@ -118,6 +118,8 @@ class Shown:
         Why the height map could not be processed.
     range_mm : (low, high)
         Depths at the ends of the colours.
+    colours : str
+        Colour map of the height map.
     camera : (rows, columns, 3) uint8 or None
         The camera image, reduced in size while live.
     height, normals, quality : (rows, columns, 3) uint8 or None
@@ -142,6 +144,7 @@ class Shown:
     processed: tuple[str, ...] = ()
     refused: str = ""
     range_mm: tuple[float, float] = (0.0, 1.0)
+    colours: str = Display().colours
     camera: NDArray[np.uint8] | None = None
     height: NDArray[np.uint8] | None = None
     normals: NDArray[np.uint8] | None = None
@@ -205,6 +208,7 @@ class Maker:
             processed=done.steps,
             refused=done.refused,
             range_mm=shown.range_mm,
+            colours=wanted.display.colours,
             camera=camera,
             height=shown.height() if wanted.height else None,
             normals=shown.normals() if wanted.normals else None,

@@ -6,6 +6,7 @@ Coordinates are the core's: (u, v) with pixel centres at integers, v down.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -28,11 +29,9 @@ FLASH = QColor(255, 255, 255, 150)
 class _Box(pg.ViewBox):  # type: ignore[misc]
     """A view box that passes on drags with the left button if requested."""
 
-    dragged = Signal(str, float, float)
-
-    def __init__(self) -> None:
+    def __init__(self, on_dragged: Callable[[str, float, float], object]) -> None:
         super().__init__(lockAspect=1.0, invertY=True, enableMenu=False)
-        self.hands_drags_on = False
+        self.hands_drags_on, self._on_dragged = False, on_dragged
 
     def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
         if not self.hands_drags_on or event.button() != Qt.MouseButton.LeftButton:
@@ -45,7 +44,7 @@ class _Box(pg.ViewBox):  # type: ignore[misc]
 
     def _report(self, phase: str, at: Any) -> None:
         position = self.mapToView(at)
-        self.dragged.emit(phase, position.x(), position.y())
+        self._on_dragged(phase, position.x(), position.y())
 
 
 class ImageView(pg.GraphicsView):  # type: ignore[misc]
@@ -79,8 +78,7 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._size = self._drawn = (0, 0)
         self._fitted = True
-        self._box = _Box()
-        self._box.dragged.connect(self.dragged)
+        self._box = _Box(self.dragged.emit)
         self._box.disableAutoRange()
         self.setCentralItem(self._box)
         self._image = pg.ImageItem(axisOrder="row-major")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from PySide6.QtCore import QStandardPaths, Qt, QTimer, Signal
-from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtCore import QSize, QStandardPaths, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
 from app.live.checks_bar import ChecksBar, Histogram
@@ -26,9 +26,11 @@ from app.live.image_checks import (
 )
 from app.live.image_view import ImageView
 from app.live.overlay import Handle, Overlay, move, next_name, resize
-from app.live.tools import ImageTools
 from app.sources.stream import Stream
-from app.widgets.layout import vbox
+from app.widgets.actions import icon_button, make_action
+from app.widgets.buttons import Slot
+from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_ground
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
@@ -45,6 +47,16 @@ LARGE_NUDGE_PX = 2.0
 NUDGE_END_MS = 250
 ZOOM_STEP = 1.25
 CORNER_PX = 10
+# name: (label, key, stays pressed, icon)
+TOOLS = {
+    "fit": (tr("Fit to view"), "F", False, "fit"),
+    "full_size": (tr("Full size, 100 %"), "1", False, "full-size"),
+    "freeze": (tr("Freeze"), "Space", True, "pause"),
+    "snapshot": (tr("Save snapshot"), "P", False, "picture"),
+    "zebra": (tr("Mark saturated pixels"), "Z", True, "zebra"),
+    "histogram": (tr("Histogram"), "H", True, "histogram"),
+    "overlay": (tr("Show marks"), "O", True, "marks"),
+}
 
 
 class LiveView(QWidget):
@@ -54,8 +66,8 @@ class LiveView(QWidget):
     ----------
     image : ImageView
         The image.
-    tools : ImageTools
-        Its buttons.
+    tools : dict of str to QAction
+        The actions of TOOLS.
     shown_frames : int
         Number of images shown so far.
 
@@ -93,27 +105,52 @@ class LiveView(QWidget):
         self._checked_s = -math.inf
         self._pointer = (math.nan, math.nan)
         self.shown_frames = 0
-        self.tools = ImageTools(self)
         self.image = ImageView()
+        self._make_tools()
         self._checks = ChecksBar()
         self._histogram = Histogram(self.image)
         self._histogram.hide()
         vbox((self.image, 1), of=self, margins=0, spacing=0)
-        for floating in (self.tools, self._checks):  # over the image: they cost no picture
+        for floating in (self._bar, self._checks):  # over the image: they cost no picture
             floating.setParent(self.image)
             show_ground(floating, "image")
-        self.tools.pressed.connect(self._on_tool)
-        self.tools.switched.connect(self._on_switch)
         self.image.pointed.connect(self._on_pointed)
         self.image.clicked.connect(self.clicked)
         self.image.dragged.connect(self.dragged)
-        self.image.zoomed.connect(self.tools.show_zoom)
+        self.image.zoomed.connect(self._show_zoom)
         self.image.resized.connect(self._place)
         self.image.overlay.handle_moved.connect(self._on_handle_moved)
         self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=16)
         self._tick.timeout.connect(self._show_newest_frame)
         self._nudge_end = QTimer(self, singleShot=True, interval=NUDGE_END_MS)
         self._nudge_end.timeout.connect(self._end_nudge)
+
+    def _make_tools(self) -> None:
+        slots: dict[str, Slot] = {
+            "fit": self.image.fit,
+            "full_size": self.image.full_size,
+            "freeze": lambda: None,
+            "snapshot": self.save_snapshot,
+            "zebra": self._render,
+            "histogram": self._show_histogram,
+            "overlay": self._draw_overlay,
+        }
+        self.tools: dict[str, QAction] = {}
+        self._bar = named(QWidget(), "live.tools", tr("Image tools"))
+        row = hbox(of=self._bar, margins=(4, 2, 8, 2), spacing=2)
+        for name, (text, key, stays, sign) in TOOLS.items():
+            self.tools[name] = make_action(
+                self, f"live.{name}", text, slots[name], keys=(key,), icon_name=sign,
+                checkable=stays, inside=True,
+            )  # fmt: skip
+            button = icon_button(self.tools[name])
+            button.setAutoRaise(True)
+            button.setIconSize(QSize(20, 20))
+            row.addWidget(button)
+        self._zoom = named(PlainLabel(), "live.zoom", tr("Magnification"))
+        self._zoom.setFixedWidth(self._zoom.fontMetrics().horizontalAdvance("0000 %"))
+        row.addWidget(self._zoom)
+        self.tools["overlay"].setChecked(True)
 
     # Called by the pages
 
@@ -184,7 +221,7 @@ class LiveView(QWidget):
     # Frames
 
     def _show_newest_frame(self) -> None:
-        if self._stream is None or self.tools.is_on("freeze"):
+        if self._stream is None or self.tools["freeze"].isChecked():
             return
         frame = self._stream.newest.take()
         now_s = time.monotonic()
@@ -211,7 +248,7 @@ class LiveView(QWidget):
     def _render(self) -> None:
         if self._rgb is None:
             return
-        striped = self.tools.is_on("zebra")
+        striped = self.tools["zebra"].isChecked()
         shown = with_zebra(self._rgb, self.shown_frames) if striped else eight_bits(self._rgb)
         self.image.show_rgb(shown)
 
@@ -222,7 +259,7 @@ class LiveView(QWidget):
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
     def _draw_overlay(self) -> None:
-        shown = self._overlay if self.tools.is_on("overlay") else Overlay()
+        shown = self._overlay if self.tools["overlay"].isChecked() else Overlay()
         self.image.overlay.set_overlay(shown, self._drawing_size())
 
     def _drawing_size(self) -> tuple[int, int]:
@@ -231,21 +268,16 @@ class LiveView(QWidget):
 
     # Tools
 
-    def _on_tool(self, name: str) -> None:
-        image = self.image
-        {"fit": image.fit, "full_size": image.full_size, "snapshot": self.save_snapshot}[name]()
+    def _show_histogram(self) -> None:
+        on = self.tools["histogram"].isChecked()
+        self._histogram.setVisible(on)
+        self._checked_s = -math.inf
+        if on and self._rgb is not None:
+            self._check(self._rgb, time.monotonic())
 
-    def _on_switch(self, name: str, on: bool) -> None:
-        match name:
-            case "zebra":
-                self._render()
-            case "overlay":
-                self._draw_overlay()
-            case "histogram":
-                self._histogram.setVisible(on)
-                self._checked_s = -math.inf
-                if on and self._rgb is not None:
-                    self._check(self._rgb, time.monotonic())
+    def _show_zoom(self, scale: float) -> None:
+        """Show the magnification, 1 for full size; NaN if there is no image."""
+        self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
 
     def _on_pointed(self, u: float, v: float) -> None:
         self._pointer = (u, v)
@@ -326,7 +358,7 @@ class LiveView(QWidget):
     def _place(self) -> None:
         """Put the tools into the upper left corner, and the checks along the lower edge."""
         room, checks = self.image.rect(), self._checks.sizeHint().height()
-        self.tools.adjustSize()
+        self._bar.adjustSize()
         self._checks.setGeometry(0, room.height() - checks, room.width(), checks)
         self._histogram.move(
             room.width() - self._histogram.width() - CORNER_PX,

@@ -59,10 +59,13 @@ class Circle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A line through `points` (N, 2) of (u, v); `closed` joins the last to the first."""
+    """A line through `points` (N, 2) of (u, v); `closed` joins the last to the first.
+
+    Its role may also be a colour, #rrggbb.
+    """
 
     points: NDArray[np.float64]
-    role: Role
+    role: str
     closed: bool = False
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer
 from PySide6.QtWidgets import (
     QCheckBox,
-    QToolButton,
     QWidget,
 )
 
 from app.sources.recording import Playback, RecordingSource
-from app.widgets.actions import make_action
+from app.widgets.actions import icon_button, make_action
+from app.widgets.buttons import Slot
 from app.widgets.inputs import ComboBox, Slider
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
@@ -25,18 +25,14 @@ class ReplayBar(QWidget):
     ----------
     page : str
         First part of its object name.
-
-    Signals
-    -------
-    moved()
-        The user moved to another frame or started playing.
+    on_moved : callable, optional
+        Called when the user moved to another frame or started playing.
     """
 
-    moved = Signal()
-
-    def __init__(self, page: str = "inspect") -> None:
+    def __init__(self, page: str, on_moved: Slot = lambda: None) -> None:
         super().__init__()
         named(self, f"{page}.replay", tr("Replay"))
+        self._moved = on_moved
         self._source: RecordingSource | None = None
         row = hbox(of=self, margins=(8, 2, 8, 2))
         for name, text, slot, keys, icon_name in (
@@ -47,8 +43,7 @@ class ReplayBar(QWidget):
             action = make_action(
                 self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name,
             )  # fmt: skip
-            button = named(QToolButton(), f"{page}.replay.{name}", text)
-            button.setDefaultAction(action)
+            button = icon_button(action)
             button.setAutoRaise(True)
             row.addWidget(button)
             if name == "play":
@@ -107,18 +102,18 @@ class ReplayBar(QWidget):
             (self._source.pause if playing else self._source.play)()
             self._poll()
             if not playing:
-                self.moved.emit()
+                self._moved()
 
     def _step(self, count: int) -> None:
         if self._source is not None:
             self._source.step(count)
             self._poll()
-            self.moved.emit()
+            self._moved()
 
     def _seek(self, index: int) -> None:
         if self._source is not None:
             self._source.seek(index)
-            self.moved.emit()
+            self._moved()
 
     def _set_speed(self, index: int) -> None:
         if self._source is not None:

@@ -8,21 +8,26 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.live.frame_results import Shown
 from app.sources.source import Frame
+from app.view2d import shading
 from app.view2d.display import Display
-from app.view2d.shading import MapImage, map_image
+from app.view2d.quantities import depth_scale, difference_scale
+from app.view2d.shading import map_image
+from app.view3d.surface import surface_of
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.measurement.fitted import fit_residual
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.proposal import Proposal, propose
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tools import Tool, ToolResult
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -31,6 +36,8 @@ from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
+# Fine enough for any tool, and fast to build.
+NODES = 400
 _LOG = logging.getLogger(__name__)
 
 
@@ -97,6 +104,14 @@ class MeasureRequest:
     propose: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer of a tool: its result, or why there is none. Neither while it is measured."""
+
+    result: ToolResult | None = None
+    refused: str = ""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageResults:
     """The results.
@@ -105,20 +120,17 @@ class ImageResults:
     ----------
     heightmap : HeightMap
         Of the image, with its uncertainty.
-    map_image : MapImage
+    shown : Shown
         How it is shown.
-    linear : (rows, columns, 3) float32
-        The camera image, linear light.
-    results : mapping of int to ToolResult or str
-        By the tools' keys. A sentence if a tool could not be applied.
+    answers : mapping of int to Answer
+        By the tools' keys.
     proposal : Proposal or None
         The detected object, if requested and found.
     """
 
     heightmap: HeightMap
-    map_image: MapImage
-    linear: NDArray[np.float32]
-    results: Mapping[int, ToolResult | str] = field(default_factory=lambda: MappingProxyType({}))
+    shown: Shown
+    answers: Mapping[int, Answer] = field(default_factory=lambda: MappingProxyType({}))
     proposal: Proposal | None = None
 
 
@@ -134,8 +146,8 @@ class Measuring:
     def _forget(self) -> None:
         self._reconstructor: Reconstructor | None = None
         self._image: MeasuredImage | None = None
-        self._shown: tuple[HeightMap, MapImage, NDArray[np.float32]] | None = None
-        self._results: dict[Tool, ToolResult | str] = {}
+        self._shown: tuple[HeightMap, Shown] | None = None
+        self._answers: dict[Tool, Answer] = {}
 
     def __call__(self, request: MeasureRequest | None) -> ImageResults | None:
         """Measure.
@@ -148,24 +160,24 @@ class Measuring:
         if request is None:
             self._forget()
             return None
-        heightmap, shown, linear = self._depth_of(request)
-        results = {}
+        heightmap, shown = self._depth_of(request)
+        answers = {}
         for key, tool in request.sheet.items():
-            if tool not in self._results:
-                self._results[tool] = apply_tool(tool, heightmap)
-            results[key] = self._results[tool]
+            if tool not in self._answers:
+                self._answers[tool] = apply_tool(tool, heightmap)
+            answers[key] = self._answers[tool]
         proposal = propose(heightmap) if request.propose else None
-        return ImageResults(heightmap, shown, linear, MappingProxyType(results), proposal)
+        return ImageResults(heightmap, shown, MappingProxyType(answers), proposal)
 
-    def _depth_of(self, request: MeasureRequest) -> tuple[HeightMap, MapImage, NDArray[np.float32]]:
+    def _depth_of(self, request: MeasureRequest) -> tuple[HeightMap, Shown]:
         reconstructor = self._reconstructor_for(request)
         if request.image is not self._image or self._shown is None:
             self._image = None
             _require_sensor(request.image, request.calibration)
             image = request.image.image(request.calibration.response)
             heightmap = measurable_depth(reconstructor, image.rgb, name=request.image.name)
-            self._shown = heightmap, map_image(heightmap, Display()), image.rgb
-            self._image, self._results = request.image, {}
+            self._shown = heightmap, _shown(heightmap, image)
+            self._image, self._answers = request.image, {}
         return self._shown
 
     def _reconstructor_for(self, request: MeasureRequest) -> Reconstructor:
@@ -195,14 +207,42 @@ def _require_sensor(image: MeasuredImage, calibration: Calibration) -> None:
         )
 
 
-def apply_tool(tool: Tool, heightmap: HeightMap) -> ToolResult | str:
-    """Return the result of a tool on a map, or why there is none."""
+def _shown(heightmap: HeightMap, image: LinearImage) -> Shown:
+    """Return a measured image for all views."""
+    depth = map_image(heightmap, Display())
+    camera = np.clip(255.0 * image.rgb + 0.5, 0.0, 255.0).astype(np.uint8)
+    scale = depth_scale(Display().colours, depth.range_mm)
+    return Shown(
+        Frame(camera, 0, 0.0),
+        heightmap,
+        heightmap,
+        range_mm=depth.range_mm,
+        camera=camera,
+        height=depth.rgb,
+        surface=surface_of(heightmap, depth.rgb, scale, range_mm=depth.range_mm, largest=NODES),
+    )
+
+
+def with_residual(shown: Shown, measurement: Measurement | None) -> Shown:
+    """Return a measured image with a surface that shows the residual of the fitted object."""
+    heightmap, surface = shown.heightmap, shown.surface
+    if measurement is None or heightmap is None or surface is None:
+        return shown
+    residual = fit_residual(heightmap, measurement)
+    known = np.isfinite(residual)
+    scale = difference_scale(residual[known], tr("residual [mm]"))
+    coloured = shading.coloured(np.nan_to_num(residual), scale.table, scale.low, scale.high)
+    texture = np.where(known[..., None], coloured, np.uint8(128))
+    return replace(shown, surface=replace(surface, texture=texture, scale=scale))
+
+
+def apply_tool(tool: Tool, heightmap: HeightMap) -> Answer:
+    """Return the answer of a tool on a map."""
     try:
-        return judged(tool.apply(heightmap), heightmap)
+        return Answer(judged(tool.apply(heightmap), heightmap))
     except InputError as error:
-        return str(error)
+        return Answer(refused=str(error))
     except Exception as error:  # a tool that fails must not remove the figures of the others
         _LOG.exception("The tool %s failed", tool.name)
-        return tr("Internal error: {kind}. See the log for details.").format(
-            kind=type(error).__name__
-        )
+        text = tr("Internal error: {kind}. See the log for details.")
+        return Answer(refused=text.format(kind=type(error).__name__))

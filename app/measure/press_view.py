@@ -3,42 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QListWidget, QListWidgetItem, QToolButton, QWidget
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
 from app.live.banner import Banner
 from app.live.depth import LiveDepth
-from app.live.frame_results import Shown
+from app.live.frame_results import Shown, Wanted
+from app.live.grips import grips_of
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
+from app.live.stage import Layout, Stage
 from app.live.zero import ZeroControl
 from app.measure.figures_text import figure_text
 from app.measure.inspector import Inspector
 from app.measure.judging import record_of
-from app.measure.measuring import MeasuredImage
+from app.measure.measuring import MeasuredImage, with_residual
 from app.measure.palette import Palette
 from app.measure.placing import kind_label
-from app.measure.stage import Stage
+from app.measure.solid import solid_of
 from app.measure.state import PressState, advice_of, resolve
 from app.measure.steady import SteadyPress
 from app.measure.tool_map import ToolMap
+from app.measure.tool_section import ToolSection
 from app.measure.work import Work
 from app.services.file_dialogs import ask_open
 from app.services.jobs import Jobs
 from app.theme.icons import icon
-from app.view3d.saving import ViewSaving
-from app.widgets.actions import action_button, make_action
+from app.widgets.actions import action_button, icon_button, make_action
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
@@ -49,6 +53,8 @@ IMAGES = (".png", ".tif", ".tiff")
 TOOLS_WIDTH = 148
 INSPECTOR_SHARE, INSPECTOR_PX = 0.26, (272, 380)
 """Width of the inspector: a share of the page, and its limits."""
+QUANTITIES = {"depth": tr("Depth"), "residual": tr("Residual of the fitted object")}
+"""What colours the surface in 3D."""
 KEY = Qt.ItemDataRole.UserRole
 
 
@@ -91,8 +97,22 @@ class PressView(QWidget):
         self._steady = SteadyPress()
         self._best: Reconstructor | None = None
         self._shown: Shown | None = None
+        self._frozen: Shown | None = None
+        self._measurement: Measurement | None = None
+        self._colour_by = "depth"
         self.map = ToolMap(self.work, self._on_placed)
-        self.stage = Stage(self.map, jobs, self._want, settings=context.settings)
+        self.section = ToolSection()
+        self.stage = Stage(
+            "measure",
+            jobs,
+            self.map,
+            self.section,
+            on_arranged=self._on_arranged,
+            on_pointed=lambda: self.map.show_reading(self.stage.reading),
+            context=context,
+        )
+        colours, menu = tr("Colour by"), self.stage.surface.menu
+        menu.add_choices(colours, "colour", QUANTITIES, self._on_colour, self._colour_by)
         self.palette_ = Palette(self, self._place)
         self._make_actions()
         self._bench = BenchArea(context.source)
@@ -104,13 +124,13 @@ class PressView(QWidget):
             on_edit=on_edit,
             on_records=on_records,
         )
-        self._saving = ViewSaving(self.stage.surface, self, settings=context.settings)
         idle = tr("Place a tool, or detect the object. Press Space for the next object.")
-        self.banner = Banner(jobs, idle=idle)
-        self.replay = ReplayBar("measure")
+        self.banner = Banner(jobs, idle=idle, on_act=self._on_act)
+        self.replay = ReplayBar("measure", self._on_replayed)
         self._lay_out()
         self._connect()
         self.state = self._resolved()
+        self.stage.arrange(Layout("height", section=False))
         self._render()
 
     def _make_actions(self) -> None:
@@ -130,10 +150,10 @@ class PressView(QWidget):
             self, "measure.remove", tr("Remove"), lambda: self.work.remove(self.work.chosen),
             icon_name="remove", tip=tr("Remove the chosen tool (Del)"),
         )  # fmt: skip
-        make_action(self, "measure.fit", tr("Whole map"), self.map.view.fit, keys=("F",))
+        make_action(self, "measure.fit", tr("Whole map"), self.map.map.fit, keys=("F",))
         open_action = make_action(
             self, "measure.open", tr("Open image…"), self.choose_file, keys=("Ctrl+P",),
-            tip=tr("Measure on an image from a file"),
+            icon_name="folder", tip=tr("Measure on an image from a file"),
         )  # fmt: skip
         undo = make_action(
             self, "measure.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",), icon_name="undo",
@@ -145,12 +165,8 @@ class PressView(QWidget):
         for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
             action.setEnabled(False)
             can.connect(action.setEnabled)
-        for action in (undo, redo):
-            button = named(QToolButton(), f"{action.objectName()}.button", action.text())
-            button.setDefaultAction(action)
-            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
-            self.stage.bar.addWidget(button)
-        self.stage.bar.addWidget(action_button(open_action))
+        for action in (undo, redo, open_action):
+            self.stage.bar.addWidget(icon_button(action))
 
     def _lay_out(self) -> None:
         self.placed = named(QListWidget(), "measure.tools", tr("Tools on the image"))
@@ -177,10 +193,7 @@ class PressView(QWidget):
         self.live_depth.shown.connect(self._on_live)
         self.live_depth.calibration_loaded.connect(self._use)
         self.live_depth.changed.connect(self._advise)
-        self.banner.act_wanted.connect(self._on_act)
         self.work.changed.connect(self._render)
-        self._saving.reported.connect(self.inspector.say)
-        self.replay.moved.connect(self._on_replayed)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give the inspector its share of the width."""
@@ -215,7 +228,7 @@ class PressView(QWidget):
 
     def show_again(self) -> None:
         """Show the values in another unit, and with other limits."""
-        self.stage.show_frozen()
+        self._show_frozen()
         self._render()
 
     def open_file(self, path: Path) -> None:
@@ -281,7 +294,7 @@ class PressView(QWidget):
         self._steady.hold(None)
         self.work.take(None)
         self._want()
-        if self.live.stream is None or not self.map.view.has_image:
+        if self.live.stream is None or not self.map.map.has_image:
             self._say_what_comes()
 
     def _take(self, image: MeasuredImage, *, propose: bool = False) -> None:
@@ -297,7 +310,14 @@ class PressView(QWidget):
         """Compute from live frames only what is needed, and nothing beside the measurement."""
         image = self.work.image
         self.live.pause(image is not None and (image.path is not None or self.work.busy))
-        self.live_depth.want(self.stage.wanted(frozen=image is not None))
+        live, shows = image is None, self.stage.shows
+        self.live_depth.want(
+            Wanted(height=True, surface=live and shows("surface"), camera=live and shows("camera"))
+        )
+
+    def _on_arranged(self) -> None:
+        self._want()
+        self._show_frozen()
 
     def _say_what_comes(self) -> None:
         """Show a text instead of the map."""
@@ -310,7 +330,7 @@ class PressView(QWidget):
     def _on_live(self, shown: Shown) -> None:
         image, heightmap = self.work.image, shown.heightmap
         if image is None:
-            self.stage.show_live(shown)
+            self.stage.show_frame(shown)
         elif image.frame is None or self.work.busy:
             return
         before, self._shown = self._shown, None if heightmap is None else shown
@@ -351,14 +371,17 @@ class PressView(QWidget):
 
     def _place(self, kind: str) -> None:
         """Let the user place a tool on the frozen image. Empty: none."""
+        if kind and not self.state.measurable:
+            self.palette_.clear()
+            return
         if kind:
-            self.stage.show_view("map")
+            self.stage.arrange(replace(self.stage.arranged, stage="height"))
             if self.work.image is None:
                 self.freeze()
         self.map.place(kind)
 
     def _on_placed(self, problem: str) -> None:
-        self.palette_.choose("")
+        self.palette_.clear()
         self.inspector.say(problem, "warn")
 
     # What is shown
@@ -377,7 +400,7 @@ class PressView(QWidget):
         """Show the present state."""
         state = self.state = self._resolved()
         self._want()
-        self.stage.show_work(self.work)
+        self._show_work()
         if self.work.refused:
             self.stage.say(tr("This image cannot be measured."))
         self.inspector.show_state(state)
@@ -393,17 +416,44 @@ class PressView(QWidget):
         self.save_action.setText(earlier if state.earlier else tr("Save to records"))
         self.remove_action.setEnabled(bool(state.kind))
         if not state.frozen:
-            self.palette_.choose("")
+            self.palette_.clear()
         self._show_placed()
         self._advise()
+
+    def _show_work(self) -> None:
+        """Show the frozen image, its tools and their section."""
+        work, results = self.work, self.work.image_results
+        grips = () if work.tool is None else grips_of(work.tool)
+        self.stage.show_tools(self.map.drawn(), grips, work.grip)
+        self.section.show_work(work)
+        before = self._frozen, self._measurement
+        self._frozen = None if results is None else results.shown
+        fit = self._measurement = None if work.result is None else work.result.measurement
+        if fit is not before[1]:
+            self.stage.surface.show_solid(None if fit is None else partial(solid_of, fit))
+        if self._frozen is not before[0] or (
+            fit is not before[1] and self._colour_by == "residual"
+        ):
+            self._show_frozen()
+
+    def _show_frozen(self) -> None:
+        """Show the frozen image in the visible views."""
+        if (shown := self._frozen) is not None:
+            if self._colour_by == "residual":
+                shown = with_residual(shown, self._measurement)
+            self.stage.show_frame(shown, still=True)
+
+    def _on_colour(self, quantity: str) -> None:
+        self._colour_by = quantity
+        self._show_frozen()
 
     def _show_placed(self) -> None:
         self.placed.clear()
         for key, tool in self.work.sheet.items():
-            found = self.work.results.get(key)
-            value = "" if isinstance(found, str) else "…"
-            if isinstance(found, ToolResult):
-                value = figure_text(found.figures[0]).partition(" ")[0]
+            answer = self.work.answer_of(key)
+            value = "" if answer.refused else "…"
+            if answer.result is not None:
+                value = figure_text(answer.result.figures[0]).partition(" ")[0]
             item = QListWidgetItem(icon(f"tool-{tool.name}"), f"{kind_label(tool.name)} {value}")
             item.setData(KEY, key)
             self.placed.addItem(item)

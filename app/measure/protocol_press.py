@@ -159,7 +159,8 @@ class PressingView(QWidget):
         problem = why_not_bare(frames[-1], self._work.calibration)
         if problem:
             self._show_next()
-            self.panel.show_live(problem)
+            # The line beside the image already asks for the same, and changes with every frame.
+            self._context.toasts.show(tr("Refused: {why}").format(why=problem), "fail")
             return
         self._bare = frames[-1]
         self._aim()

@@ -107,7 +107,7 @@ def resolve(
     freezable, earlier : bool
         As in the state.
     """
-    tool, found = work.tool, work.results.get(work.chosen)
+    tool, answer = work.tool, work.answer_of(work.chosen)
     state = PressState(
         frozen=work.image is not None,
         earlier=earlier,
@@ -119,14 +119,14 @@ def resolve(
         title="" if tool is None else kind_label(tool.name),
         kind="" if tool is None else tool.name,
     )
-    if isinstance(found, ToolResult):
+    if (found := answer.result) is not None:
         first = found.figures[0]
         asked = tr("mean side") if found.tool.name == "cuboid" else first.label
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
         if found.tool == tool:
             return _with_result(state, found, quantities_of(found, reference, limits))
-    if isinstance(found, str):
-        return replace(state, reason=found, role="fail")
+    if answer.refused:
+        return replace(state, reason=answer.refused, role="fail")
     return replace(state, reason=tr("Measuring…") if tool and state.measurable else "")
 
 

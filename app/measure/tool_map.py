@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QWidget
 
-from app.live.frame_results import Shown
+from app.live.grips import Point, grips_of, outline_of
 from app.live.height_panel import HeightPanel
+from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.figures_text import figure_text
-from app.measure.grips import Point, grips_of, outline_of
-from app.measure.measuring import ImageResults
+from app.measure.measuring import Answer
 from app.measure.placing import first_points, kinds, make_tool
-from app.measure.tool_layer import DrawnTool, ToolLayer
 from app.measure.work import Work
-from app.view2d.display import Display
-from app.view2d.map_point import read_at
+from app.view2d.map_point import Reading
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox
 from app.widgets.naming import named
 from app.widgets.units import in_unit
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.tools import Tool, ToolResult
-from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.measurement.tools import Tool
 from gelpolight_core.translation import tr
 
 NUDGE_MM = 0.02
@@ -38,7 +33,7 @@ _ARROWS = {
 }
 
 
-class ToolMap(QWidget):
+class ToolMap(HeightPanel):
     """The map, and a line of text below it.
 
     Parameters
@@ -47,50 +42,18 @@ class ToolMap(QWidget):
         Holds the tools and results.
     on_placed : callable
         Called when no tool is placed any more: with why not, or an empty text.
-
-    Attributes
-    ----------
-    drawn : tuple of DrawnTool
-        The tools as they are drawn.
     """
 
     def __init__(self, work: Work, on_placed: Callable[[str], object]) -> None:
-        super().__init__()
+        super().__init__(self)
         named(self, "measure.map", tr("Height map with tools"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._work, self._on_placed = work, on_placed
         self._kind = ""
         self._points: list[Point] = []
-        self._heightmap: HeightMap | None = None
-        self.drawn: tuple[DrawnTool, ...] = ()
-        self.panel = HeightPanel()
-        self.view = self.panel.map
-        self.layer = ToolLayer(self)
-        self.view.box.addItem(self.layer, ignoreBounds=True)
         self.hint = named(PlainLabel(), "measure.hint", tr("What to do next on the map"))
         self.readout = named(PlainLabel(), "measure.readout", tr("Values under the pointer"))
-        foot = hbox((self.hint, 1), self.readout, margins=(12, 4, 12, 4))
-        vbox((self.panel, 1), foot, of=self, margins=0, spacing=0)
-        self.view.pointed.connect(self._on_pointed)
-
-    # The image
-
-    def show_live(self, shown: Shown, display: Display) -> None:
-        """Show the depth of a live frame while no image is frozen."""
-        if shown.heightmap is not None:
-            self._heightmap = shown.heightmap
-            self.panel.show_frame(shown, display.colours, still=False)
-
-    def say(self, text: str) -> None:
-        """Show a text instead of the map."""
-        self._heightmap = None
-        self.view.say(text)
-
-    def show_results(self, shown: ImageResults) -> None:
-        """Show the depth of the frozen image."""
-        self._heightmap = shown.heightmap
-        image = shown.map_image
-        self.panel.show_image(image.rgb, shown.heightmap, Display().colours, image.range_mm)
+        self.column.addLayout(hbox((self.hint, 1), self.readout, margins=(12, 4, 12, 4)))
 
     # Placing
 
@@ -138,13 +101,14 @@ class ToolMap(QWidget):
 
     # Drawing
 
-    def draw(self) -> None:
-        """Draw the tools as they are now."""
+    def drawn(self) -> tuple[DrawnTool, ...]:
+        """Return the tools as they are now."""
         work = self._work
-        self.drawn = tuple(_drawn(k, tool, work.results.get(k)) for k, tool in work.sheet.items())
-        grips = () if work.tool is None else grips_of(work.tool)
-        self.layer.show_tools(self.drawn, work.chosen, grips, work.grip)
         self._report()
+        return tuple(
+            _drawn(key, tool, work.answer_of(key), chosen=key == work.chosen)
+            for key, tool in work.sheet.items()
+        )
 
     def on_tool(self, key: int) -> None:
         """Choose a tool that was clicked."""
@@ -159,10 +123,8 @@ class ToolMap(QWidget):
         """Move a grip of the chosen tool."""
         (self._work.drop if ended else self._work.drag)(name, to_mm)
 
-    def _on_pointed(self, x_mm: float, y_mm: float) -> None:
-        reading = None
-        if self._heightmap is not None and math.isfinite(x_mm):
-            reading = read_at(self._heightmap, x_mm, y_mm)
+    def show_reading(self, reading: Reading | None) -> None:
+        """Show the values under the pointer. None: there is nothing under it."""
         words = "" if reading is None else tr("x {x:.2f} mm  y {y:.2f} mm  depth {d}").format(
             x=reading.x_mm, y=reading.y_mm, d=in_unit(reading.depth_mm)
         )  # fmt: skip
@@ -183,7 +145,7 @@ class ToolMap(QWidget):
             case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp:
                 self.choose_next_grip(1 if key == Qt.Key.Key_PageDown else -1)
             case Qt.Key.Key_Return | Qt.Key.Key_Enter if self._kind:
-                middle = self.view.box.viewRect().center()
+                middle = self.map.box.viewRect().center()
                 self._add_tool(first_points(self._kind, (middle.x(), middle.y())))
             case Qt.Key.Key_Delete | Qt.Key.Key_Backspace if self._work.chosen:
                 self._work.remove(self._work.chosen)
@@ -203,11 +165,13 @@ class ToolMap(QWidget):
             work.choose(work.chosen, names[(at + step) % len(names)])
 
 
-def _drawn(key: int, tool: Tool, found: ToolResult | str | None) -> DrawnTool:
+def _drawn(key: int, tool: Tool, answer: Answer, *, chosen: bool) -> DrawnTool:
     """Return a tool as it is drawn: as measured, or as it was placed."""
-    if isinstance(found, ToolResult) and found.tool == tool:
+    found, role, text = answer.result, "bad" if answer.refused else MEASURED, ""
+    if found is not None and found.tool == tool:
         lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
-        state = "ok" if found.verdict == "ok" else "doubtful"
-        return DrawnTool(key, lines, state, figure_text(found.figures[0]))
-    lines = outline_of(tool) or (tuple(grip.at_mm for grip in grips_of(tool)),)
-    return DrawnTool(key, lines, "refused" if isinstance(found, str) else "ok", "")
+        role = MEASURED if found.verdict == "ok" else "expected"
+        text = figure_text(found.figures[0])
+    else:
+        lines = outline_of(tool) or (tuple(grip.at_mm for grip in grips_of(tool)),)
+    return DrawnTool(key, lines, CHOSEN if chosen else role, text, role)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from app.measure.grips import grips_of, moved
-from app.measure.measuring import ImageResults, MeasuredImage, MeasureRequest, Measuring
+from app.live.grips import grips_of, moved
+from app.measure.measuring import Answer, ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.placing import kind_label
 from app.services.newest_wins import Finished, NewestWins
 from gelpolight_core.errors import InputError
@@ -85,10 +84,10 @@ class Work(QObject):
         """Depth of the image."""
         return None if self.image_results is None else self.image_results.heightmap
 
-    @property
-    def results(self) -> Mapping[int, ToolResult | str]:
-        """Results of the tools by key. Those of tools that were just moved are missing."""
-        return MappingProxyType({}) if self.image_results is None else self.image_results.results
+    def answer_of(self, key: int) -> Answer:
+        """Return the answer of a tool. That of a tool that was just moved may be an earlier one."""
+        answers = {} if self.image_results is None else self.image_results.answers
+        return answers.get(key, Answer())
 
     @property
     def tool(self) -> Tool | None:
@@ -98,8 +97,8 @@ class Work(QObject):
     @property
     def result(self) -> ToolResult | None:
         """Current result of the chosen tool."""
-        found = self.results.get(self.chosen)
-        return found if isinstance(found, ToolResult) and found.tool == self.tool else None
+        found = self.answer_of(self.chosen).result
+        return found if found is not None and found.tool == self.tool else None
 
     # The image
 

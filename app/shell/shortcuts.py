@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QShortcut
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QScrollArea, QWidget
 
 from app.widgets.dialog import Dialog
 from app.widgets.label import MarkupLabel, escaped, key_text
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
-from app.widgets.tool_key import PURPOSE
 from gelpolight_core.translation import tr
 
 # Titles of groups whose internal name differs from the name in the user interface.
@@ -34,7 +33,7 @@ class Shortcut:
 def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
     """Return the shortcuts of a window that can be used, in the order of their groups.
 
-    They come from named actions and from tools. The group is the first part of the object name
+    They come from named actions. The group is the first part of the object name
     (``sensors.import``).
     """
     found = []
@@ -43,12 +42,6 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
         if keys and action.objectName() and action.isEnabled():
             group = action.objectName().partition(".")[0]
             found.append(Shortcut(group, keys, action.text().replace("&", "").rstrip(".… ")))
-    for shortcut in below(window, QShortcut):
-        purpose = shortcut.property(PURPOSE)
-        if purpose and shortcut.isEnabled():
-            group = shortcut.objectName().partition(".")[0]
-            keys = key_text(shortcut.key())
-            found.append(Shortcut(group, keys, purpose))
     return tuple(sorted(dict.fromkeys(found), key=lambda s: s.group))
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QInputDialog, QMenu
 
@@ -41,130 +40,89 @@ class ViewMenu(QMenu):
         The panel that it controls.
     settings : Settings
         Store saved viewpoints.
-
-    Signals
-    -------
-    colour_chosen(str)
-        Another quantity was selected for the colours.
-    reference_wanted(str)
-        ``hold``, ``load`` or ``clear`` the reference of the difference.
-    copy_wanted(), image_wanted(), movie_wanted(), mesh_wanted()
-        Copy the image, or save an image, a movie, or the mesh.
     """
-
-    colour_chosen = Signal(str)
-    reference_wanted = Signal(str)
-    copy_wanted = Signal()
-    image_wanted = Signal()
-    movie_wanted = Signal()
-    mesh_wanted = Signal()
 
     def __init__(self, panel: SurfacePanel, *, settings: Settings) -> None:
         super().__init__(panel)
         self.setObjectName("view3d.options")
         self._panel, self._settings = panel, settings
+        saving = panel.saving
         directions = self.addMenu(tr("View from"))
         for name, (text, keys) in DIRECTIONS.items():
-            self._add(name, f"{text}\t{keys}", partial(panel.view_from, name), directions)
-        for name, text in STYLES.items():
-            action = self._add(f"style_{name}", text, None)
+            self.add(name, f"{text}\t{keys}", partial(panel.view_from, name), directions)
+        self._styles = {
+            name: self.add(f"style_{name}", text, partial(self._toggle, name))
+            for name, text in STYLES.items()
+        }
+        self.clip_action = self.add("clip", tr("Clip by a plane"), self._clip)
+        for action in (*self._styles.values(), self.clip_action):
             action.setCheckable(True)
-            action.triggered.connect(partial(self._set, name))
-        self.clip_action = self._add("clip", tr("Clip by a plane"), None)
-        self.clip_action.setCheckable(True)
-        self.clip_action.triggered.connect(self._clip)
-        self.addSeparator()
-        self._colours = self.addMenu(tr("Colour by"))
-        self._group = QActionGroup(self)
-        self._reference = self.addMenu(tr("Reference for differences"))
-        for name, text in (
-            ("hold", tr("Use the current frame")),
-            ("load", tr("Load from a file…")),
-            ("clear", tr("Clear")),
-        ):
-            self._add(
-                f"reference_{name}", text, partial(self.reference_wanted.emit, name),
-                self._reference,
-            )  # fmt: skip
+        self._of_pages = self.addSeparator()
         self._viewpoints = self.addMenu(tr("Viewpoints"))
         self._viewpoints.aboutToShow.connect(self._list_viewpoints)
-        self._add("pins_clear", tr("Remove pins"), partial(panel.set_pins, ()))
+        self._pins_clear = self.add("pins_clear", tr("Remove pins"), partial(panel.set_pins, ()))
         self.addSeparator()
-        for name, text, signal in (
-            ("copy", tr("Copy image"), self.copy_wanted),
-            ("image", tr("Save image…"), self.image_wanted),
-            ("movie", tr("Save movie…"), self.movie_wanted),
-            ("mesh", tr("Export mesh…"), self.mesh_wanted),
-        ):
-            self._add(name, text, signal.emit)
-        self._action("mesh").setVisible(False)
-        self.set_colours({}, "")
+        self._of_surface = [
+            self.clip_action,
+            self.add("copy", tr("Copy image"), saving.copy),
+            self.add("image", tr("Save image…"), saving.ask_image),
+            self.add("movie", tr("Save movie…"), saving.ask_movie),
+        ]
         self.aboutToShow.connect(self._follow)
 
-    def offer_mesh(self) -> None:
-        """Offer differences and the export of the mesh, which the page handles."""
-        self._action("mesh").setVisible(True)
-        self._reference.menuAction().setVisible(True)
-
-    def _add(
-        self, name: str, text: str, slot: Callable[[], object] | None, menu: QMenu | None = None
+    def add(
+        self, name: str, text: str, slot: Callable[[], object], menu: QMenu | None = None
     ) -> QAction:
-        action = (menu or self).addAction(text)
+        """Add an entry, to this menu or to one within it."""
+        action = QAction(text, menu or self)
+        (menu or self).addAction(action)
         action.setObjectName(f"view3d.{name}")
-        if slot is not None:
-            action.triggered.connect(lambda _on=False: slot())
+        action.triggered.connect(lambda _on=False: slot())
         return action
 
-    def set_colours(self, names: dict[str, str], chosen: str) -> None:
-        """Offer these quantities for the colours."""
-        self._colours.clear()
-        for action in self._group.actions():
-            self._group.removeAction(action)
-        for key, text in names.items():
-            action = self._add(
-                f"colour_{key}", text, partial(self.colour_chosen.emit, key),
-                self._colours,
-            )  # fmt: skip
-            action.setCheckable(True)
-            action.setChecked(key == chosen)
-            self._group.addAction(action)
-        self._colours.menuAction().setVisible(bool(names))
-        self._reference.menuAction().setVisible("difference" in names)
+    def add_choices(
+        self, title: str, name: str, choices: Mapping[str, str], slot: Callable[[str], object],
+        chosen: str = "",
+    ) -> None:  # fmt: skip
+        """Add a menu whose entries call `slot` with their keys, with a mark if one is `chosen`."""
+        menu = QMenu(title, self)
+        self.insertMenu(self._of_pages, menu)
+        group = QActionGroup(self)
+        for key, text in choices.items():
+            action = self.add(f"{name}_{key}", text, partial(slot, key), menu)
+            if chosen:
+                action.setCheckable(True)
+                action.setChecked(key == chosen)
+                group.addAction(action)
 
     def _follow(self) -> None:
         """Update the check marks, and enable what can be used now."""
-        style = self._panel.view_style
-        for name in STYLES:
-            self._action(f"style_{name}").setChecked(bool(getattr(style, name)))
-        there = self._panel.view is not None and self._panel.view.scene.surface is not None
-        for name in ("clip", "copy", "image", "movie", "mesh"):
-            self._action(name).setEnabled(there)
-        self._action("pins_clear").setEnabled(bool(self._panel.pins))
+        style, view = self._panel.view_style, self._panel.view
+        for name, action in self._styles.items():
+            action.setChecked(bool(getattr(style, name)))
+        for action in self._of_surface:
+            action.setEnabled(view is not None and view.scene.surface is not None)
+        self._pins_clear.setEnabled(bool(self._panel.pins))
 
-    def _action(self, name: str) -> QAction:
-        found = self.findChild(QAction, f"view3d.{name}")
-        assert isinstance(found, QAction)
-        return found
+    def _toggle(self, name: str) -> None:
+        changed: Any = {name: self._styles[name].isChecked()}
+        self._panel.set_style(replace(self._panel.view_style, **changed))
 
-    def _set(self, name: str, on: bool) -> None:
-        style: Style = replace(self._panel.view_style, **{name: on})
-        self._panel.set_style(style)
-
-    def _clip(self, on: bool) -> None:
+    def _clip(self) -> None:
         if self._panel.view is not None:
-            self._panel.view.show_plane(on)
+            self._panel.view.show_plane(self.clip_action.isChecked())
 
     # Viewpoints
 
     def _list_viewpoints(self) -> None:
         menu, saved = self._viewpoints, viewpoints_from_text(self._settings.display(VIEWPOINTS))
         menu.clear()
-        self._add("viewpoint_save", tr("Save this viewpoint…"), self._ask_name, menu)
+        self.add("viewpoint_save", tr("Save this viewpoint…"), self._ask_name, menu)
         for name in saved:
-            self._add("viewpoint", name, partial(self.go_to, name), menu)
+            self.add("viewpoint", name, partial(self.go_to, name), menu)
         if saved:
             menu.addSeparator()
-            self._add(
+            self.add(
                 "viewpoint_clear", tr("Remove all viewpoints"),
                 partial(self._settings.keep_display, VIEWPOINTS, ""), menu,
             )  # fmt: skip

@@ -21,8 +21,10 @@ from app.services.opengl import opengl_problem
 from app.services.settings import Settings
 from app.view3d.menu import ViewMenu
 from app.view3d.picking import Point, pins_text, with_pin
+from app.view3d.saving import Played, ViewSaving
 from app.view3d.style import Style
 from app.view3d.surface import Surface, SurfaceLine
+from app.widgets.buttons import tool_button
 from app.widgets.fields import as_text, from_text
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
@@ -50,6 +52,10 @@ class SurfacePanel(QWidget):
         Load modules in the background.
     settings : Settings
         Store style and viewpoints.
+    report : callable
+        Called with the result of saving: a sentence and its kind.
+    player : callable, optional
+        Returns the frames of the open recording, or None.
     flat : callable
         Makes the map that is shown without 3D: a widget with `set_image`, `show_cursor` and the
         signal `pointed`.
@@ -73,7 +79,15 @@ class SurfacePanel(QWidget):
 
     pointed = Signal(float, float)
 
-    def __init__(self, jobs: Jobs, *, settings: Settings, flat: Callable[[], Any]) -> None:
+    def __init__(
+        self,
+        jobs: Jobs,
+        *,
+        settings: Settings,
+        report: Callable[[str, str], object],
+        flat: Callable[[], Any],
+        player: Callable[[], Played | None] = lambda: None,
+    ) -> None:
         super().__init__()
         named(self, "view3d", tr("Surface in 3D"))
         self._jobs, self._settings = jobs, settings
@@ -87,6 +101,7 @@ class SurfacePanel(QWidget):
         self._solid: Callable[[], pv.PolyData] | None = None
         self._make_flat = flat
         self._flat: Any = None
+        self.saving = ViewSaving(self, settings=settings, report=report, player=player)
         self.menu = ViewMenu(self, settings=settings)
         self._lay_out()
 
@@ -99,24 +114,20 @@ class SurfacePanel(QWidget):
         self._why = named(PlainLabel(wrap=True), "view3d.reason", tr("Why 3D is not available"))
         self._why.hide()
         self.tools = named(QWidget(), "view3d.bar", tr("View directions"))
-        row = hbox(of=self.tools, margins=0, spacing=0)
-        row.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
-        button = named(QToolButton(), "view3d.menu", tr("3D menu"), tr("Options of the 3D view"))
-        button.setText(tr("Options"))
-        button.setAutoRaise(True)
-        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        button.setMenu(self.menu)
-        row.addWidget(button)
-        row.addStretch(1)
+        fit = tool_button(
+            "view3d.fit",
+            tr("Reset"),
+            lambda: self.view_from("fit"),
+            tip=tr("Show the whole surface (double click)"),
+        )
+        options = named(QToolButton(), "view3d.menu", tr("3D menu"), tr("Options of the 3D view"))
+        options.setText(tr("Options"))
+        options.setAutoRaise(True)
+        options.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        options.setMenu(self.menu)
+        hbox(fit, options, None, of=self.tools, margins=0, spacing=0)
         self._hint = self._make_hint()
         vbox(self.tools, self._why, (self._stack, 1), self._hint, of=self, margins=0, spacing=0)
-
-    def _button(self, name: str, text: str, tip: str, key: str = "") -> QToolButton:
-        button = named(QToolButton(), f"view3d.{name}", text, tip, key)
-        button.setText(text)
-        button.setAutoRaise(True)
-        button.clicked.connect(lambda: self.view_from(name))
-        return button
 
     def _make_hint(self) -> QWidget:
         bar = QWidget()
@@ -124,9 +135,11 @@ class SurfacePanel(QWidget):
             tr("Drag: rotate   Shift+drag: pan   Wheel: zoom   Click: pin   Right click: menu"),
             wrap=True,
         )
-        button = named(QToolButton(), "view3d.hint_seen", tr("Hide the hint"))
-        button.setText(tr("Got it"))
-        button.clicked.connect(self._hide_hint)
+        accessible = tr("Hide the hint")
+        button = tool_button(
+            "view3d.hint_seen", tr("Got it"), self._hide_hint, accessible=accessible
+        )
+        button.setAutoRaise(False)
         hbox((text, 1), button, of=bar, margins=(8, 2, 4, 2))
         bar.hide()
         return bar

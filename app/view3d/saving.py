@@ -6,76 +6,67 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
-from PySide6.QtCore import QObject, QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialogButtonBox, QProgressDialog, QWidget
+from PySide6.QtWidgets import QProgressDialog, QWidget
 
 from app.services.file_dialogs import ask_save
 from app.services.settings import Settings
-from app.view3d.panel import SurfacePanel
 from app.view3d.surface import Surface
 from app.widgets.dialog import Dialog
 from app.widgets.fields import choice, number, switch
-from app.widgets.forms import Form
+from app.widgets.forms import Form, form_dialog
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.translation import tr
 
+if TYPE_CHECKING:
+    from app.view3d.panel import SurfacePanel
+
 # The recording of a page for a movie: the number of its frames, and their surfaces.
 Played = tuple[int, Iterator[Surface]]
+Chosen = Callable[[Any], object]
 
 
-class ViewSaving(QObject):
+class ViewSaving:
     """Handles the save and copy actions of the 3D view's menu.
 
     Parameters
     ----------
     panel : SurfacePanel
-        Contains the view.
-    owner : QWidget
-        Parent of dialogs.
+        Contains the view, and is the parent of dialogs.
     settings : Settings
         Store the last folder.
-    player : callable, optional
+    report : callable
+        Called with the result: a sentence and its kind.
+    player : callable
         Returns the frames of the open recording, or None.
-
-    Signals
-    -------
-    reported(str, str)
-        The result, as a sentence and its kind.
     """
-
-    reported = Signal(str, str)
 
     def __init__(
         self,
         panel: SurfacePanel,
-        owner: QWidget,
         *,
         settings: Settings,
-        player: Callable[[], Played | None] = lambda: None,
+        report: Callable[[str, str], object],
+        player: Callable[[], Played | None],
     ) -> None:
-        super().__init__(owner)
-        self._panel, self._owner, self._settings, self._player = panel, owner, settings, player
-        panel.menu.copy_wanted.connect(self.copy)
-        panel.menu.image_wanted.connect(self.ask_image)
-        panel.menu.movie_wanted.connect(self.ask_movie)
+        self._panel, self._settings, self._player = panel, settings, player
+        self._report = report
 
     def copy(self) -> None:
         """Copy the view as on the screen to the clipboard."""
         QGuiApplication.clipboard().setImage(self._panel.image())
-        self.reported.emit(tr("Image copied to the clipboard"), "pass")
+        self._report(tr("Image copied to the clipboard"), "pass")
 
     def ask_image(self) -> None:
         """Ask for the size of an image, and save it."""
-        dialog = image_dialog(self._panel.size(), ("surface",), self._owner)
-        dialog.chosen.connect(self.ask_image_file)
-        dialog.open()
+        image_dialog(self._panel.size(), ("surface",), self.ask_image_file, self._panel).open()
 
     def ask_image_file(self, choice: ImageChoice) -> None:
         """Ask for a file, and save an image of the surface in it."""
@@ -95,16 +86,15 @@ class ViewSaving(QObject):
         try:
             write_atomically(path, lambda file: Image.fromarray(np.asarray(rgb)).save(file, "PNG"))
         except InputError as error:
-            self.reported.emit(str(error), "fail")
+            self._report(str(error), "fail")
         else:
-            self.reported.emit(tr("Image saved to {path}").format(path=path), "pass")
+            self._report(tr("Image saved to {path}").format(path=path), "pass")
 
     def ask_movie(self) -> None:
         """Ask for the kind and size of a movie, and save it."""
         recording = self._player() is not None
-        dialog = movie_dialog(self._panel.size(), recording=recording, parent=self._owner)
-        dialog.chosen.connect(self.ask_movie_file)
-        dialog.open()
+        size = self._panel.size()
+        movie_dialog(size, self.ask_movie_file, recording=recording, parent=self._panel).open()
 
     def ask_movie_file(self, choice: MovieChoice) -> None:
         """Ask for a file, and save a movie in it."""
@@ -128,7 +118,7 @@ class ViewSaving(QObject):
             path = path.with_suffix(".mp4")
         count = max(round(choice.rate_hz * choice.seconds), 2)
         played = self._player() if choice.what == "recording" else None
-        progress = QProgressDialog(tr("Saving the movie"), tr("Cancel"), 0, count, self._owner)
+        progress = QProgressDialog(tr("Saving the movie"), tr("Cancel"), 0, count, self._panel)
         named(progress, "view3d.movie.progress", tr("Saving the movie"))
         progress.setWindowModality(Qt.WindowModality.WindowModal)
         progress.setMinimumDuration(0)
@@ -141,18 +131,18 @@ class ViewSaving(QObject):
             try:
                 done = write_movie(path, choice.rate_hz, watched(images, progress))
             except InputError as error:
-                self.reported.emit(str(error), "fail")
+                self._report(str(error), "fail")
             except MovieCancelled:
-                self.reported.emit(tr("Saving the movie was cancelled."), "warn")
+                self._report(tr("Saving the movie was cancelled."), "warn")
             else:
                 text = tr("Movie of {n} frames saved to {path}")
-                self.reported.emit(text.format(n=done, path=path), "pass")
+                self._report(text.format(n=done, path=path), "pass")
             finally:
                 progress.deleteLater()
 
     def _ask_path(self, ending: str, title: str, kinds: str) -> Path | None:
         name = f"surface-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.{ending}"
-        return ask_save(self._owner, self._settings, "picture", title, name, kinds)
+        return ask_save(self._panel, self._settings, "picture", title, name, kinds)
 
 
 LARGEST_PX = 8000
@@ -204,42 +194,16 @@ class MovieChoice:
     )
 
 
-class ChoiceDialog(Dialog):
-    """Lets the user choose what to save.
-
-    Parameters
-    ----------
-    value : ImageChoice or MovieChoice
-        Proposed.
-    only : bool
-        Whether there is nothing else to save than what is proposed.
-
-    Signals
-    -------
-    chosen(object)
-        The choice.
-    """
-
-    chosen = Signal(object)
-
-    def __init__(self, name: str, title: str, value: Any, *, only: bool, parent: QWidget) -> None:
-        kinds = QDialogButtonBox.StandardButton
-        super().__init__(
-            parent, f"view3d.{name}.dialog", title, kinds.Save | kinds.Cancel, once=True
-        )
-        form = Form(value, f"view3d.{name}")
-        form.show_row("what", not only)
-        self.fill(form)
-        self.accepted.connect(lambda: self.chosen.emit(form.value))
-
-
-def image_dialog(size: QSize, kinds: tuple[str, ...], parent: QWidget) -> ChoiceDialog:
+def image_dialog(size: QSize, kinds: tuple[str, ...], chosen: Chosen, parent: QWidget) -> Dialog:
     """Return a dialog that lets the user save one of some kinds of image, of twice a size."""
     value = ImageChoice(kinds[0], 2 * size.width(), 2 * size.height())
-    return ChoiceDialog("image", tr("Save an image"), value, only=len(kinds) == 1, parent=parent)
+    form = Form(value, "view3d.image")
+    form.show_row("what", len(kinds) > 1)
+    return form_dialog(form, "view3d.image.dialog", tr("Save an image"), chosen, parent)
 
 
-def movie_dialog(size: QSize, *, recording: bool, parent: QWidget) -> ChoiceDialog:
+def movie_dialog(size: QSize, chosen: Chosen, *, recording: bool, parent: QWidget) -> Dialog:
     """Return a dialog that lets the user save a movie of a size."""
-    value = MovieChoice("turntable", size.width(), size.height())
-    return ChoiceDialog("movie", tr("Save a movie"), value, only=not recording, parent=parent)
+    form = Form(MovieChoice("turntable", size.width(), size.height()), "view3d.movie")
+    form.show_row("what", recording)
+    return form_dialog(form, "view3d.movie.dialog", tr("Save a movie"), chosen, parent)

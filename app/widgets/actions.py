@@ -22,6 +22,8 @@ def make_action(
     keys: tuple[str, ...] = (),
     icon_name: str = "",
     tip: str = "",
+    checkable: bool = False,
+    inside: bool = False,
 ) -> QAction:
     """Return an action of a widget. Its shortcut works while the widget is visible.
 
@@ -41,11 +43,17 @@ def make_action(
         A name of :mod:`app.theme.icons`.
     tip : str, optional
         Tooltip.
+    checkable : bool, optional
+        Whether it is on or off.
+    inside : bool, optional
+        Whether its shortcut works only while the focus is inside the widget.
     """
-    action = QAction(text, parent)
+    action = QAction(text, parent, checkable=checkable)
     action.setObjectName(name)
     keys = tuple(filter(None, keys))
     action.setShortcuts([QKeySequence(key) for key in keys])
+    if inside:
+        action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
     if icon_name:
         action.setIcon(icon(icon_name))
     if tip or keys:
@@ -56,19 +64,9 @@ def make_action(
     return action
 
 
-def switch_button(
-    owner: QWidget,
-    name: str,
-    text: str,
-    slot: Callable[[], object],
-    key: str,
-    *,
-    icon_name: str = "",
-) -> QToolButton:
-    """Return a button that shows which view is visible, with its action; see `make_action`."""
-    action = make_action(owner, name, text, slot, keys=(key,), icon_name=icon_name)
-    action.setCheckable(True)
-    button = named(QToolButton(), f"{name}.button", text)
+def icon_button(action: QAction) -> QToolButton:
+    """Return a button for an action, with its icon or, without one, with its text."""
+    button = named(QToolButton(), f"{action.objectName()}.button", action.text())
     button.setDefaultAction(action)
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     return button

@@ -67,9 +67,12 @@ def text(
     return field(default=default, metadata=shown)
 
 
-def folder(default: str, label: str, tip: str = "") -> Any:
-    """Return a field with the absolute path of a folder."""
-    return field(default=default, metadata={"label": label, "tip": tip})
+def folder(default: str, label: str, tip: str = "", *, relative: bool = False) -> Any:
+    """Return a field with the absolute path of a folder.
+
+    With `relative`, a name without a path is a folder next to the one before.
+    """
+    return field(default=default, metadata={"label": label, "tip": tip, "relative": relative})
 
 
 def as_text(value: Any) -> str:

@@ -8,9 +8,17 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QFormLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialogButtonBox,
+    QFileDialog,
+    QFormLayout,
+    QLineEdit,
+    QWidget,
+)
 
 from app.theme.icons import icon
+from app.widgets.dialog import Dialog
 from app.widgets.fields import When
 from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
 from app.widgets.label import PlainLabel
@@ -149,14 +157,17 @@ class Form(QWidget, Generic[V]):
             words.textChanged.connect(change)
             self._show[name] = words.setText
             return words
-        return self._folder(name, change)
+        return self._folder(name, change, relative=meta["relative"])
 
-    def _folder(self, name: str, change: Callable[[str], None]) -> QLineEdit:
+    def _folder(self, name: str, change: Callable[[str], None], *, relative: bool) -> QLineEdit:
         line = QLineEdit()
 
         def entered() -> None:
-            path = Path(line.text().strip()).expanduser()
-            line.setText(str(path) if path.is_absolute() else getattr(self.value, name))
+            before = Path(getattr(self.value, name))
+            path = Path(line.text().strip() or before).expanduser()
+            if relative:
+                path = before.parent / path
+            line.setText(str(path if path.is_absolute() else before))
             change(line.text())
 
         def browse() -> None:
@@ -171,3 +182,14 @@ class Form(QWidget, Generic[V]):
         button.triggered.connect(browse)
         self._show[name] = line.setText
         return line
+
+
+def form_dialog(
+    form: Form[V], name: str, title: str, chosen: Callable[[V], object], parent: QWidget
+) -> Dialog:
+    """Return a dialog with a form; `chosen` is called with its value when the user saves."""
+    kinds = QDialogButtonBox.StandardButton
+    dialog = Dialog(parent, name, title, kinds.Save | kinds.Cancel, once=True)
+    dialog.fill(form)
+    dialog.accepted.connect(lambda: chosen(form.value))
+    return dialog

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pyqtgraph as pg
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 
@@ -28,18 +27,3 @@ def own_plot_menus(item: pg.PlotItem, owner: QWidget) -> None:
     item.setMenuEnabled(False)
     # Keep the window flags: without them the menu would lie on the widget as a part of it.
     item.ctrlMenu.setParent(owner, item.ctrlMenu.windowFlags())
-
-
-def own_handle_menus(item: pg.ROI, owner: QWidget) -> None:
-    """Make a widget own the context menus that pyqtgraph creates for the handles of an item.
-
-    Parameters
-    ----------
-    item : pyqtgraph.ROI
-        With all its handles.
-    owner : QWidget
-        Deleted together with the item.
-    """
-    for handle in item.getHandles():
-        handle.menu.setParent(owner, handle.menu.windowFlags())
-        handle.setAcceptedMouseButtons(Qt.MouseButton.LeftButton)

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QComboBox
 from screenshot_operator import Operator
 
 from app.inspect.page import InspectPage
-from app.inspect.views import Layout
+from app.live.stage import Layout
 from app.measure.page import MeasurePage
 from app.sources.bench import Bench
 
@@ -37,7 +37,7 @@ def inspect(operator: Operator) -> None:
     operator.until(lambda: page.views.surface.view is not None, "the 3D view")
     operator.pause(6.0)
     operator.shot("inspect")
-    page.views.arrange(Layout("quality"))
+    page.views.stage.arrange(Layout("quality"))
     choice = page.views.quality.findChild(QComboBox, "inspect.quality.what")
     assert choice is not None
     choice.setCurrentIndex(choice.findData("uncertainty"))
@@ -49,7 +49,7 @@ def inspect(operator: Operator) -> None:
     operator.pause(2.0)
     operator.shot("inspect-standing")
     page.pause(False)
-    page.views.arrange(Layout())
+    page.views.stage.arrange(Layout())
 
 
 def recording(operator: Operator) -> None:

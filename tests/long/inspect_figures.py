@@ -3,7 +3,7 @@
     xvfb-run -a -s "-screen 0 1920x1200x24" python tests/long/inspect_figures.py \
         --calibration sensor.gplcal --seconds 60
     ... --effort fast                    another effort than balanced
-    ... --stage four --section           what is shown: one of STAGES of app/inspect/views.py
+    ... --stage four --section           what is shown: one of STAGES of app/live/stage.py
 
 The calibration has to be one of the virtual sensor; its image size is the camera's. An object is
 dragged about. Printed are the frames per second made and shown; how often the surface was drawn for
@@ -26,8 +26,8 @@ from PySide6.QtWidgets import QApplication
 from app.context.context import AppContext
 from app.desktop import make_application, make_context
 from app.inspect.page import InspectPage
-from app.inspect.views import Layout
 from app.live.frame_results import Shown
+from app.live.stage import Layout
 from app.sources.bench import PRESSED, Bench
 from app.theme import theme
 from gelpolight_core.calibration.file import read_calibration
@@ -50,7 +50,7 @@ class Measurement:
         context.source.choose_virtual_sensor()
         self.page = InspectPage(context=context)
         self.page.resize(*SIZE)
-        self.page.views.arrange(Layout(options.stage, section=options.section))
+        self.page.views.stage.arrange(Layout(options.stage, section=options.section))
         self._lateness, self._began_s = Lateness(), time.monotonic()
         self._depth_ms: list[float] = []
         self._ages_ms: list[float] = []
@@ -59,7 +59,7 @@ class Measurement:
         self._move.timeout.connect(self._drag)
         self._move.start(DRAG_MS)
         live = Reconstructor(calibration, effort=options.effort)
-        self.page.live_depth.calibrations.loaded.emit(live, live)
+        self.page.live_depth.load(live, live)
         self.page.show()
         self.page.enter()
 

@@ -10,13 +10,13 @@ from PySide6.QtCore import QCoreApplication, QEvent, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.inspect.export import ExportDialog
+from app.inspect.export import ExportChoice, export_dialog
 from app.view3d.saving import image_dialog, movie_dialog
 
 MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
-    "export": lambda host: ExportDialog(Path("depth"), count=3, at=1, parent=host),
-    "image": lambda host: image_dialog(QSize(400, 300), ("surface", "views"), host),
-    "movie": lambda host: movie_dialog(QSize(400, 300), recording=True, parent=host),
+    "export": lambda host: export_dialog(Path("depth"), print, count=3, at=1, parent=host),
+    "image": lambda host: image_dialog(QSize(400, 300), ("surface", "views"), print, host),
+    "movie": lambda host: movie_dialog(QSize(400, 300), print, recording=True, parent=host),
 }
 
 
@@ -48,6 +48,10 @@ def test_a_name_without_path_is_a_folder_next_to_the_proposed_one(
 ) -> None:
     host = QWidget()
     qtbot.addWidget(host)
-    dialog = ExportDialog(tmp_path / "lab" / "proposed", parent=host)
-    dialog.findChild(QLineEdit, "inspect.export.folder").setText(typed)
-    assert dialog.choice.folder == tmp_path / Path(expected).expanduser()
+    chosen: list[ExportChoice] = []
+    dialog = export_dialog(tmp_path / "lab" / "proposed", chosen.append, parent=host)
+    dialog.open()
+    line = dialog.findChild(QLineEdit, "inspect.export.folder")
+    line.setText(typed)
+    qtbot.keyClick(line, Qt.Key.Key_Return)
+    assert Path(chosen[0].folder) == tmp_path / Path(expected).expanduser()

@@ -34,9 +34,14 @@ def test_unreadable_display_settings_give_the_default(text: str) -> None:
 
 
 def test_the_views_restore_their_display_settings(context: AppContext) -> None:
+    def none() -> None: ...
+
     for restored in (False, True):
         jobs = Jobs("look")
-        views = Views(jobs, (), (), context=context)
+        views = Views(
+            jobs, (), (), on_wanted=none, on_pointed=none, on_hold=none, on_save=none,
+            player=lambda: None, context=context,
+        )  # fmt: skip
         if restored:
             views.restore()
             assert views.display.display == CHOSEN
@@ -50,7 +55,7 @@ def test_the_views_restore_their_display_settings(context: AppContext) -> None:
 
 
 def test_a_panel_shows_the_display_settings_exactly(qapp: object) -> None:
-    panel = DisplayPanel()
+    panel = DisplayPanel(lambda: None)
     panel.show_display(CHOSEN)
     assert panel.display == CHOSEN
     panel.deleteLater()

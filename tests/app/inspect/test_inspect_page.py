@@ -17,7 +17,8 @@ from pytestqt.qtbot import QtBot
 from app.context.context import AppContext
 from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
-from app.inspect.views import Layout
+from app.inspect.section_line import REGION_INK
+from app.live.stage import Layout
 from app.live.zero import FRAMES, zero_calibration
 from app.sources.processor import Outcome
 from app.view3d.saving import MovieChoice
@@ -33,7 +34,7 @@ WAIT_MS = 60_000
 def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
     made = InspectPage(context=context)
     made.resize(1180, 760)
-    made.views.arrange(Layout("four", section=True))
+    made.views.stage.arrange(Layout("four", section=True))
     made.show()
     yield made
     made.leave()
@@ -55,7 +56,7 @@ def presses(small_session: Path, context: AppContext) -> Path:
 def _use(page: InspectPage, calibration: Calibration) -> None:
     """Show depth through a calibration with the paper's model, which is fast."""
     reconstructor = Reconstructor(calibration, model="paper")
-    page.live_depth.calibrations.loaded.emit(reconstructor, reconstructor)
+    page.live_depth.load(reconstructor, reconstructor)
 
 
 def _wait_for_depth(page: InspectPage, qtbot: QtBot) -> None:
@@ -112,7 +113,7 @@ def test_all_views_share_the_cursor_and_its_values_are_shown(
     page.enter()
     _use(page, small_calibration)
     _wait_for_depth(page, qtbot)
-    page.views.pointed.emit(1.0, 2.0)
+    page.views.stage.point_at(1.0, 2.0)
     readout = page.findChild(QLabel, "inspect.readout")
     assert readout is not None
     assert "x 1.00, y 2.00 mm" in readout.text()
@@ -125,10 +126,10 @@ def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
     page: InspectPage,
 ) -> None:
     height, display = page.views.map_panel, page.views.display
-    height.range_dragged.emit(0.1, 0.45)
+    height.map.bar.range_dragged.emit(0.1, 0.45)
     assert display.display.range_mm == pytest.approx((0.1, 0.45))
     assert page.live_depth._maker.wanted.display.range_mm == display.display.range_mm
-    height.range_released.emit()
+    height.map.bar_double_clicked.emit()
     assert display.display.range_mm is None
     assert page.live_depth._maker.wanted.display.range_mm is None
 
@@ -193,7 +194,7 @@ def test_an_unused_calibration_is_released(
     _use(page, small_calibration)
     _wait_for_section(page, qtbot)
     views, live = page.views, page.live
-    page.views.pointed.emit(1.0, 2.0)
+    page.views.stage.point_at(1.0, 2.0)
     figures = page.findChild(QLabel, "inspect.section.figures")
     readout = page.findChild(QLabel, "inspect.readout")
     assert figures is not None and readout is not None
@@ -201,14 +202,14 @@ def test_an_unused_calibration_is_released(
     last = page.live_depth.last
     assert last is not None
     late = Outcome(live._processor.generation, last.frame, last)  # type: ignore[union-attr]
-    page.live_depth.calibrations.loaded.emit(None, None)
+    page.live_depth.load(None, None)
     live._outbox.put(late)
     live._poll()
     page._show_texts()
     assert not views.map_panel.map.has_image
     assert views.section.cut.profile is None
     assert (figures.text(), readout.text()) == ("", "")
-    assert page._pixel_map is None
+    assert views.stage._pixel_map is None
 
 
 def test_a_frozen_image_ends_with_its_source(
@@ -230,12 +231,12 @@ def test_a_frozen_image_ends_with_its_source(
 
 def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: QtBot) -> None:
     page.enter()
-    page.views.arrange(Layout("four", section=True))
-    page.views.arrange(Layout("normals", section=True, maximised=True))
+    page.views.stage.arrange(Layout("four", section=True))
+    page.views.stage.arrange(Layout("normals", section=True, maximised=True))
     page.leave()
     again = InspectPage(context=context)
     qtbot.addWidget(again)
-    assert again.views.layout_shown == Layout("normals", section=True)
+    assert again.views.stage.arranged == Layout("normals", section=True)
     assert not again.views.normals.isHidden() and again.views.map_panel.isHidden()
     again.may_close()
 
@@ -250,7 +251,7 @@ def test_the_frame_that_is_shown_is_exported_as_reconstructed(
     qtbot.wait(300)
     last = page.live_depth.last
     assert last is not None and last.heightmap is not None
-    page.export.run(ExportChoice(tmp_path / "out", ("npz",)))
+    page.export.run(ExportChoice(tif=False, folder=str(tmp_path / "out")))
     path = tmp_path / "out" / f"frame-{last.frame.number:05d}.npz"
     qtbot.waitUntil(path.is_file, timeout=WAIT_MS)
     with np.load(path, allow_pickle=False) as stored:
@@ -278,7 +279,7 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     assert source.header.calibration_id == small_calibration.identity  # type: ignore[attr-defined]
     qtbot.waitUntil(lambda: page.views.surface.view is not None, timeout=WAIT_MS)
     choice = MovieChoice("recording", 160, 120, 10.0, 1.0)
-    page.file_actions.saving.save_movie(tmp_path / "press.mp4", choice)
+    page.views.surface.saving.save_movie(tmp_path / "press.mp4", choice)
     movie = cv2.VideoCapture(str(tmp_path / "press.mp4"))
     assert movie.get(cv2.CAP_PROP_FRAME_COUNT) == source.playback().count  # type: ignore[attr-defined]
     shown = page.views.map_panel.map.shown_images
@@ -348,6 +349,10 @@ def test_leaving_while_zero_waits_for_frames_is_reported_as_zero_not_set(
     assert context.workspace.in_use == path
 
 
+def _region_shown(page: InspectPage) -> bool:
+    return any(tool.role == REGION_INK for tool in page.views.map_panel.layer.tools)
+
+
 def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstructed(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
@@ -370,10 +375,10 @@ def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstruct
     assert mask is not None
     mask.setCurrentIndex(mask.findData("outside"))
     qtbot.waitUntil(lambda: len(page.live_depth.last.processed) == 2, timeout=WAIT_MS)  # type: ignore[union-attr]
-    assert page.views.region._roi.isVisible()
+    assert _region_shown(page)
     reset.click()
     qtbot.waitUntil(lambda: not page.processed.isVisible(), timeout=WAIT_MS)
-    assert mask.currentData() == "none" and not page.views.region._roi.isVisible()
+    assert mask.currentData() == "none" and not _region_shown(page)
     assert page.live_depth.last is not None and page.live_depth.last.heightmap is last.raw
 
 

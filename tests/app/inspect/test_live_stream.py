@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.inspect.page import InspectPage
-from app.inspect.views import Layout
+from app.live.stage import Layout
 from app.widgets.question import Question
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -27,7 +27,7 @@ WAIT_MS = 60_000
 @pytest.fixture
 def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
     made = InspectPage(context=context)
-    made.views.arrange(Layout("camera"))  # the stream alone makes depth and normals necessary
+    made.views.stage.arrange(Layout("camera"))  # the stream alone makes depth and normals necessary
     yield made
     made.leave()
     made.may_close()
@@ -46,7 +46,7 @@ def live(
     context.source.choose(info)
     page.enter()
     reconstructor = Reconstructor(small_calibration, model="paper")
-    page.live_depth.calibrations.loaded.emit(reconstructor, reconstructor)
+    page.live_depth.load(reconstructor, reconstructor)
     return page
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from PySide6.QtCore import QObject
-from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
 from app.inspect.modes import ModeChoice
@@ -21,11 +20,20 @@ from gelpolight_core.sensor_calibration import Calibration
 FRAME = np.zeros((4, 4, 3), np.uint8)
 
 
+Chosen = list[tuple[Reconstructor | None, Reconstructor | None]]
+
+
 @pytest.fixture
-def choice(context: AppContext) -> Iterator[ModeChoice]:
+def chosen() -> Chosen:
+    """Return the reconstructors that were chosen."""
+    return []
+
+
+@pytest.fixture
+def choice(context: AppContext, chosen: Chosen) -> Iterator[ModeChoice]:
     owner = QObject()
     jobs = Jobs("modes", owner)
-    made = ModeChoice(jobs, owner, context=context)
+    made = ModeChoice(jobs, owner, lambda *pair: chosen.append(pair), context=context)
     yield made
     jobs.close()
     made.close()
@@ -58,28 +66,25 @@ def test_every_mode_is_offered_with_its_measured_errors(
 
 
 def test_another_effort_is_used_at_once_and_saved(
-    choice: ModeChoice, full: Reconstructor, context: AppContext, qtbot: QtBot
+    choice: ModeChoice, full: Reconstructor, context: AppContext, chosen: Chosen
 ) -> None:
     choice.offer(full, full)
-    with qtbot.waitSignal(choice.chosen) as signal:
-        _pick(choice, Mode("full", "fast"))
-    live, best = signal.args
-    assert live.effort == "fast" and best is full
+    _pick(choice, Mode("full", "fast"))
+    live, best = chosen[-1]
+    assert live is not None and live.effort == "fast" and best is full
     assert full.effort == "balanced"
     assert live.calibration is full.calibration
-    with qtbot.waitSignal(choice.chosen) as signal:
-        choice.offer(full, full)
-    assert signal.args[0].effort == "fast"
+    choice.offer(full, full)
+    assert chosen[-1][0] is not None and chosen[-1][0].effort == "fast"
     assert context.settings.preferences.mode == Mode("full", "fast")
 
 
 def test_a_calibration_of_the_papers_model_offers_one_mode(
-    choice: ModeChoice, small_calibration: Calibration, qtbot: QtBot
+    choice: ModeChoice, small_calibration: Calibration, chosen: Chosen
 ) -> None:
     paper = Reconstructor(small_calibration, model="paper")
-    with qtbot.waitSignal(choice.chosen) as signal:
-        choice.offer(paper, paper)
-    assert signal.args[0] is paper
+    choice.offer(paper, paper)
+    assert chosen[-1][0] is paper
     assert choice.box.count() == 1 and not choice.box.isEnabled()
 
 

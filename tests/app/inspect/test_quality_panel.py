@@ -28,7 +28,7 @@ def test_another_quantity_does_not_show_the_previous_image_and_legend(
     dome: HeightMap, qtbot: QtBot
 ) -> None:
     """Flags next to the legend of an uncertainty would be misread as one."""
-    panel = QualityPanel()
+    panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
     assert not panel.map.has_image and "No depth" in panel.map._words.text()
@@ -50,7 +50,7 @@ def test_the_legend_states_the_median_misfit(model: str, dome: HeightMap, qtbot:
         def misfit(self, _frame: object, height_map: HeightMap, *, largest: int) -> np.ndarray:
             return np.full(height_map.depth_mm[:largest, :largest].shape, 0.05, np.float32)
 
-    panel = QualityPanel()
+    panel = QualityPanel(lambda: None)
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("misfit"))
     maker = Maker(Explained(replace(dome, model=model)))  # type: ignore[arg-type]

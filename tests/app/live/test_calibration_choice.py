@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,14 +28,18 @@ class Waiting:
 
 
 def _library_of_one(
-    context: AppContext, calibration: Calibration, qtbot: QtBot
+    context: AppContext,
+    calibration: Calibration,
+    qtbot: QtBot,
+    loaded: Callable[..., object] = lambda *_: None,
 ) -> tuple[Path, CalibrationChoice, Waiting]:
     """Return the path of the only calibration, its CalibrationChoice, and the objects it uses."""
     path = context.workspace.calibration_path("virtual-1", "small")
     write_calibration(calibration, path)
     owner, jobs = QWidget(), Waiting()
     qtbot.addWidget(owner)
-    return path, CalibrationChoice(jobs, owner, context=context), jobs  # type: ignore[arg-type]
+    choice = CalibrationChoice(jobs, owner, loaded, context=context)  # type: ignore[arg-type]
+    return path, choice, jobs
 
 
 def test_a_calibration_is_read_again_after_a_stopped_reading(
@@ -63,7 +68,10 @@ def test_a_replaced_file_is_read_again(
     context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     """For example by a second zero while the first file is still being read."""
-    path, choice, jobs = _library_of_one(context, small_calibration, qtbot)
+    reported: list[tuple[object, object]] = []
+    path, choice, jobs = _library_of_one(
+        context, small_calibration, qtbot, lambda *pair: reported.append(pair)
+    )
     choice.refresh()
     choice.use_what_fits("", None)
     choice.refresh()
@@ -72,8 +80,7 @@ def test_a_replaced_file_is_read_again(
     choice.refresh()
     second = jobs.job
     assert second is not first
-    reported: list[tuple[object, object]] = []
-    choice.loaded.connect(lambda live, best: reported.append((live, best)))
+    reported.clear()
     first.done((path, "live 1", "best 1"))
     assert reported == []
     second.done((path, "live 2", "best 2"))
@@ -85,7 +92,7 @@ def test_matching_is_the_newest_validated_one_and_never_one_that_failed(
 ) -> None:
     owner, workspace = QWidget(), context.workspace
     qtbot.addWidget(owner)
-    choice = CalibrationChoice(Waiting(), owner, context=context)  # type: ignore[arg-type]
+    choice = CalibrationChoice(Waiting(), owner, print, context=context)  # type: ignore[arg-type]
     plain = scene.calibration()
 
     def kept(day: int, calibration: Calibration) -> Path:

@@ -68,7 +68,7 @@ def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: Liv
     loaded, switched = list[object](), list[object]()
     depth.calibration_loaded.connect(lambda live, _best: loaded.append(live))
     depth.calibration_switched.connect(lambda: switched.append(depth.live_reconstructor))
-    depth.calibrations.loaded.emit(reconstructor, reconstructor)
+    depth.load(reconstructor, reconstructor)
     assert loaded == [reconstructor]
     assert depth.live_reconstructor is None, "no camera is selected"
     depth._context.source.choose(SimpleNamespace(kind="camera", name="A"))  # type: ignore[arg-type]

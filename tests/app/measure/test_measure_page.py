@@ -21,7 +21,7 @@ from pytestqt.qtbot import QtBot
 
 from app.command_line.main import main
 from app.context.context import AppContext
-from app.measure.grips import grips_of
+from app.live.grips import grips_of
 from app.measure.judging import Reference
 from app.measure.page import MeasurePage
 from app.services.preferences import Limits
@@ -235,11 +235,11 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     _measured(page, qtbot)
 
     # Without a calibration nothing of the last one stays on the map.
-    assert tool_map.drawn[0].text
+    assert tool_map.layer.tools[0].text
     page.context.workspace.use(None)
     page.context.requests.calibrations_changed.emit()
-    assert not any(tool.text for tool in tool_map.drawn)
-    assert not tool_map.view.has_image
+    assert not any(tool.text for tool in tool_map.layer.tools)
+    assert not tool_map.map.has_image
 
 
 @pytest.mark.usefixtures("library")
@@ -397,9 +397,9 @@ def test_a_recording_can_be_measured_frame_by_frame(
     context.requests.calibrations_changed.emit()
     qtbot.waitUntil(lambda: "sensor virtual-1" in press_view.work.refused, timeout=PATIENCE_MS)
     assert press_view.work.heightmap is None
-    assert not press_view.map.view.has_image
+    assert not press_view.map.map.has_image
     press_view.release()
-    assert press_view.map.view._words.text() == "No depth yet."
+    assert press_view.map.map._words.text() == "No depth yet."
 
 
 def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(

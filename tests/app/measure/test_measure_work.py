@@ -33,7 +33,7 @@ def test_a_removed_image_is_released_and_the_next_one_is_measured(
     work.take(image)
     qtbot.waitUntil(lambda: work.image_results is not None, timeout=PATIENCE_MS)
     assert work.image_results is not None
-    linear = weakref.ref(work.image_results.linear)
+    linear = weakref.ref(work.image_results.shown.camera)
     work.take(None)
     assert not work.busy
     qtbot.waitUntil(lambda: linear() is None)

@@ -173,15 +173,14 @@ def test_the_number_of_presses_is_shown_before_the_start(view: ProtocolView, qtb
 
 
 def test_a_membrane_with_an_object_on_it_is_not_accepted_as_bare(
-    view: ProtocolView, camera: SceneCamera, qtbot: QtBot
+    view: ProtocolView, camera: SceneCamera, context: AppContext, qtbot: QtBot
 ) -> None:
     choose(view, qtbot, repeats=1, regions=1)
     camera.press((0.0, 0.0))
     panel = begin(view, qtbot)
     panel.bare.click()
-    qtbot.waitUntil(
-        lambda: panel.live.text().startswith("Something presses on the membrane"), timeout=WAIT_MS
-    )
+    qtbot.waitUntil(lambda: bool(context.toasts.history), timeout=WAIT_MS)
+    assert "Something presses on the membrane" in context.toasts.history[-1].finding.text
     assert not panel.capture.isEnabled()
     camera.press(None)
     qtbot.wait(100)  # the frames with the object have passed

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.live.grips import Point, grips_of, moved
 from app.measure.figures_text import value_text
-from app.measure.grips import Point, grips_of, moved
 from app.measure.placing import first_points, kinds, make_tool
 from app.measure.steady import SteadyPress
 from app.sources.source import Frame

@@ -74,7 +74,7 @@ def flat_map() -> MapView:
 def panel(settings: Settings, made: Made, qtbot: QtBot) -> Iterator[SurfacePanel]:
     """Return a visible panel whose 3D view has drawn the surface."""
     jobs = Jobs("test")
-    shown = SurfacePanel(jobs, settings=settings, flat=flat_map)
+    shown = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
     shown.resize(640, 560)
     shown.show()
     shown.show_surface(made(largest=128))

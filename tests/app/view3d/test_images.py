@@ -21,14 +21,17 @@ from tests.app.view3d.conftest import Made, pixels
 
 
 @pytest.fixture
-def saving(panel: SurfacePanel, settings: Settings) -> ViewSaving:
-    return ViewSaving(panel, panel, settings=settings)
+def reported() -> list[str]:
+    """Return the kinds of what is reported."""
+    return []
 
 
-def _reported(saving: ViewSaving) -> list[tuple[str, str]]:
-    found: list[tuple[str, str]] = []
-    saving.reported.connect(lambda text, kind: found.append((text, kind)))
-    return found
+@pytest.fixture
+def saving(panel: SurfacePanel, settings: Settings, reported: list[str]) -> ViewSaving:
+    def report(_text: str, kind: str) -> None:
+        reported.append(kind)
+
+    return ViewSaving(panel, settings=settings, report=report, player=lambda: None)
 
 
 @pytest.mark.parametrize("size", [(320, 240), (1501, 1003)])
@@ -54,15 +57,14 @@ def test_a_scale_bar_goes_with_an_image_though_the_screen_shows_none(panel: Surf
 
 
 def test_a_transparent_image_has_no_background(
-    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path
+    saving: ViewSaving, reported: list[str], tmp_path: Path
 ) -> None:
     path = tmp_path / "surface.png"
-    reported = _reported(saving)
     saving.save_image(path, ImageChoice("surface", 400, 300, transparent=True))
     alpha = np.asarray(Image.open(path))[..., 3]
     assert alpha.shape == (300, 400)
     assert alpha[2, 2] == 0 and (alpha == 255).sum() > 4_000
-    assert [kind for _, kind in reported] == ["pass"]
+    assert reported == ["pass"]
 
 
 def test_the_image_is_copied(panel: SurfacePanel, saving: ViewSaving) -> None:
@@ -97,10 +99,8 @@ def _frames(path: Path) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
 def test_a_cancelled_movie_leaves_no_file(
-    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, ending: str
+    panel: SurfacePanel, saving: ViewSaving, reported: list[str], tmp_path: Path, ending: str
 ) -> None:
-    reported = _reported(saving)
-
     def cancel() -> None:
         progress = panel.findChild(QProgressDialog, "view3d.movie.progress")
         assert progress is not None
@@ -113,7 +113,7 @@ def test_a_cancelled_movie_leaves_no_file(
     timer.start(10)
     choice = MovieChoice("turntable", 240, 180, 30.0, 10.0)
     saving.save_movie(tmp_path / f"turn.{ending}", choice)
-    assert [kind for _, kind in reported] == ["warn"]
+    assert reported == ["warn"]
     assert [p.name for p in tmp_path.iterdir() if "turn" in p.name] == []
 
 
@@ -122,7 +122,7 @@ def test_a_recording_is_saved_surface_by_surface(
 ) -> None:
     surfaces = [made(factor=factor, largest=128) for factor in (0.1, 0.5, 1.0)]
     played = len(surfaces), iter(surfaces)
-    saving = ViewSaving(panel, panel, settings=settings, player=lambda: played)
+    saving = ViewSaving(panel, settings=settings, report=lambda *_: None, player=lambda: played)
     saving.save_movie(tmp_path / "film.mp4", MovieChoice("recording", 240, 180, 5.0, 1.0))
     frames = _frames(tmp_path / "film.mp4")
     assert len(frames) == 3

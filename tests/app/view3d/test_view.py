@@ -205,7 +205,7 @@ def test_style_and_viewpoints_are_remembered(
     panel.menu.go_to("from the side")
     assert panel.view.scene.viewpoint == side  # type: ignore[union-attr]
     jobs = Jobs("again")
-    again = SurfacePanel(jobs, settings=settings, flat=flat_map)
+    again = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
     qtbot.addWidget(again)
     assert again.view_style.wireframe and not again.view_style.orientation
     jobs.close()
@@ -222,7 +222,7 @@ def test_the_window_is_not_built_again_for_the_first_3d_view(
             return bool(super().event(event))
 
     jobs, window = Jobs("test"), Window()
-    panel = SurfacePanel(jobs, settings=settings, flat=flat_map)
+    panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
     window.setCentralWidget(panel)
     window.show()
     qtbot.waitExposed(window)
@@ -240,7 +240,7 @@ def test_a_closed_view_is_freed(settings: Settings, made: Made, qtbot: QtBot) ->
     gone = []
     for _ in range(3):
         jobs = Jobs("test")
-        panel = SurfacePanel(jobs, settings=settings, flat=flat_map)
+        panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
         panel.show()
         panel.show_surface(made(largest=128))
         qtbot.waitUntil(lambda p=panel: p.view is not None and p.view.drawings > 0, timeout=WAIT_MS)
@@ -260,7 +260,7 @@ def test_without_opengl_the_relief_is_shown_and_the_reason(
 ) -> None:
     monkeypatch.setattr("app.view3d.panel.opengl_problem", lambda: "OpenGL 3.2 is not available")
     jobs = Jobs("test")
-    panel = SurfacePanel(jobs, settings=settings, flat=flat_map)
+    panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
     qtbot.addWidget(panel)
     panel.show()
     panel.show_surface(made(largest=128))

@@ -39,7 +39,7 @@ def grips_of(tool: Tool) -> tuple[Grip, ...]:
     for field in places(type(tool)):
         value = getattr(tool, field.name)
         if isinstance(value, Rectangle):
-            found += _of_rectangle(value, f"{field.name}." if len(areas) > 1 else "")
+            found += rectangle_grips(value, f"{field.name}." if len(areas) > 1 else "")
         elif str(field.type) == POINTS:
             found += [Grip(str(i), point) for i, point in enumerate(value)]
         elif value is not None:
@@ -54,7 +54,7 @@ def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:
     if part in RECTANGLE_GRIPS:
         name = area or next(iter(_areas(tool)))
         return cast(
-            Tool, replace(changed, **{name: _rectangle_moved(_areas(tool)[name], part, to_mm)})
+            Tool, replace(changed, **{name: rectangle_moved(_areas(tool)[name], part, to_mm)})
         )
     if grip.isdigit():
         (field,) = places(type(tool))
@@ -84,7 +84,8 @@ def nearest_grip(grips: tuple[Grip, ...], at_mm: Point, *, reach_mm: float) -> G
     return near if near is not None and math.dist(near.at_mm, at_mm) <= reach_mm else None
 
 
-def _of_rectangle(area: Rectangle, prefix: str) -> tuple[Grip, ...]:
+def rectangle_grips(area: Rectangle, prefix: str = "") -> tuple[Grip, ...]:
+    """Return the grips of a rectangle: its middle, a corner, and one that turns it."""
     a, b = 0.5 * area.sides_mm[0], 0.5 * area.sides_mm[1]
     return (
         Grip(f"{prefix}centre", area.centre_mm),
@@ -93,7 +94,8 @@ def _of_rectangle(area: Rectangle, prefix: str) -> tuple[Grip, ...]:
     )
 
 
-def _rectangle_moved(area: Rectangle, grip: str, to_mm: Point) -> Rectangle:
+def rectangle_moved(area: Rectangle, grip: str, to_mm: Point) -> Rectangle:
+    """Return a rectangle with one of its grips moved."""
     x, y = to_mm[0] - area.centre_mm[0], to_mm[1] - area.centre_mm[1]
     if grip == "centre":
         return replace(area, centre_mm=to_mm)

@@ -1,46 +1,55 @@
-"""Tools drawn over a map in mm: lines, figures, and the grips of the chosen one."""
+"""Tools and lines drawn over a map in mm: lines, figures, and the grips that can be dragged."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen, QPolygonF, QTransform
+from PySide6.QtGui import QFontMetricsF, QPainter, QPolygonF, QTransform
 
-from app.measure.grips import Grip, Point, nearest_grip
+from app.live.drawing import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
+from app.live.grips import Grip, Point, nearest_grip
 
 REACH_PX = 12.0
 REACH_MM = 80.0
-GRIP_PX = 5.0
-HALO = QColor(0, 0, 0, 170)
-PLATE = QColor(0, 0, 0, 165)
-COLOURS = {"ok": "#e8eef5", "doubtful": "#ffd54a", "refused": "#ff6b5e", "chosen": "#5fd0ff"}
+BAND_ALPHA = 60
+MEASURED, CHOSEN = ROLE_COLOURS["info"], "#5fd0ff"
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnTool:
-    """One tool as it is shown.
+    """One tool as it is shown on the map, in 3D and in the camera image.
 
     Attributes
     ----------
     key : int
-        Its key on the sheet.
+        Its key, which tells what was clicked.
     lines : tuple of tuples of (x, y)
-        In mm.
-    state : str
-        A key of COLOURS other than ``chosen``.
+        In mm. A single point is only the place of the text.
+    role : str
+        Role of its lines, or their colour.
     text : str
         Its first figure.
+    text_role : str
+        Role of the text. Empty: that of the lines.
+    width : float
+        Of the lines, in pixels.
+    band : tuple of (x, y)
+        Corners of an area that is tinted.
     """
 
     key: int
     lines: tuple[tuple[Point, ...], ...]
-    state: str = "ok"
+    role: str = MEASURED
     text: str = ""
+    text_role: str = ""
+    width: float = 1.8
+    band: tuple[Point, ...] = ()
 
 
 class LayerUser(Protocol):
@@ -72,18 +81,17 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
         super().__init__()
         self._user = user
         self.placing = False
-        self._tools: tuple[DrawnTool, ...] = ()
-        self._key = 0
+        self.tools: tuple[DrawnTool, ...] = ()
         self._grips: tuple[Grip, ...] = ()
         self._grip = ""
         self._dragged = ""
         self._begun: tuple[Point, ...] = ()
 
     def show_tools(
-        self, tools: tuple[DrawnTool, ...], key: int, grips: tuple[Grip, ...], grip: str
+        self, tools: tuple[DrawnTool, ...], grips: tuple[Grip, ...], grip: str = ""
     ) -> None:
-        """Show tools. `key` is the chosen one, with its grips; the keys move `grip`."""
-        self._tools, self._key, self._grips, self._grip = tools, key, grips, grip
+        """Show tools, and grips that can be dragged; the keys move `grip`."""
+        self.tools, self._grips, self._grip = tools, grips, grip
         self.update()
 
     def show_begun(self, clicked: tuple[Point, ...]) -> None:
@@ -152,7 +160,7 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
         """Return the key of the tool whose line passes a point, or 0."""
         reach = self._reach_mm()
         found = [
-            (_distance(at, line), tool.key) for tool in self._tools for line in tool.lines if line
+            (_distance(at, line), tool.key) for tool in self.tools for line in tool.lines if line
         ]
         near = min(found, default=(math.inf, 0))
         return near[1] if near[0] <= reach else 0
@@ -164,34 +172,35 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
         painter.save()
         painter.resetTransform()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        for tool in self._tools:
-            colour = QColor(COLOURS["chosen" if tool.key == self._key else tool.state])
-            for line in tool.lines:
-                _stroke(painter, to_screen.map(QPolygonF([QPointF(*p) for p in line])), colour)
+        for tool in self.tools:
+            self._paint_lines(painter, tool, to_screen)
         visible = to_screen.mapRect(QRectF(self.viewRect()))
         occupied: list[QRectF] = []
-        for tool in self._tools:
+        for tool in self.tools:
             if tool.text:
                 occupied.append(_paint_text(painter, tool, to_screen, visible, occupied))
         for grip in self._grips:
-            self._paint_grip(painter, to_screen.map(QPointF(*grip.at_mm)), grip.name == self._grip)
+            at = to_screen.map(QPointF(*grip.at_mm))
+            paint_grip(painter, at, CHOSEN, grip.name == self._grip)
         for point in self._begun:
-            self._paint_grip(painter, to_screen.map(QPointF(*point)), False)
+            paint_grip(painter, to_screen.map(QPointF(*point)), CHOSEN, False)
         painter.restore()
 
     @staticmethod
-    def _paint_grip(painter: QPainter, at: QPointF, has_keys: bool) -> None:
-        size = GRIP_PX + (2.0 if has_keys else 0.0)
-        painter.setPen(QPen(QColor(0, 0, 0), 1.2))
-        painter.setBrush(QColor("white") if has_keys else QColor(COLOURS["chosen"]))
-        painter.drawRect(QRectF(at.x() - size, at.y() - size, 2.0 * size, 2.0 * size))
+    def _paint_lines(painter: QPainter, tool: DrawnTool, to_screen: QTransform) -> None:
+        if tool.band:
+            tint = colour_of(tool.role)
+            tint.setAlpha(BAND_ALPHA)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(tint)
+            painter.drawPolygon(_on_screen(tool.band, to_screen))
+        for line in tool.lines:
+            shape = _on_screen(line, to_screen)
+            stroke(painter, tool.role, partial(painter.drawPolyline, shape), width=tool.width)
 
 
-def _stroke(painter: QPainter, line: QPolygonF, colour: QColor) -> None:
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    for pen in (QPen(HALO, 3.8), QPen(colour, 1.8)):
-        painter.setPen(pen)
-        painter.drawPolyline(line)
+def _on_screen(points: tuple[Point, ...], to_screen: QTransform) -> QPolygonF:
+    return to_screen.map(QPolygonF([QPointF(*point) for point in points]))
 
 
 def _paint_text(
@@ -211,11 +220,7 @@ def _paint_text(
     for other in sorted(occupied, key=lambda point: point.top()):
         if plate.intersects(other):
             plate.moveTop(other.bottom() + 2.0)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(PLATE)
-    painter.drawRoundedRect(plate, 3.0, 3.0)
-    painter.setPen(QColor(COLOURS[tool.state]))
-    painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, tool.text)
+    paint_plate(painter, plate, tool.text, tool.text_role or tool.role)
     return plate
 
 
