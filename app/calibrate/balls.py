@@ -282,7 +282,7 @@ class BallsStep(ImageStep):
         self._next_mm: float | None = None
         self.radius = RadiusRow()
         self.radius.box.valueChanged.connect(lambda _: self._on_radius(self.radius.radius_mm))
-        self._card = self.panel.add_extra(tr("Ball diameter"), self.radius)
+        self.own = (self.panel.add_extra(tr("Ball diameter"), self.radius),)
 
     step = step_of(
         BALLS,
@@ -386,15 +386,10 @@ class BallsStep(ImageStep):
 
     # What is shown
 
-    def enter(self) -> None:
-        """Show the step with the input of the radius."""
-        self._card.show()
-        super().enter()
-
     def leave(self) -> None:
-        """Keep a typed radius, and hide the input."""
+        """Keep a typed radius."""
         self.radius.box.interpretText()
-        self._card.hide()
+        super().leave()
 
     def close(self) -> None:
         """Keep a typed radius while it can still be saved."""

@@ -124,7 +124,7 @@ class ImageStep(StepPresenter):
         """Update to changed results and corrections, also after undo."""
         super().refresh()
         captures = self.captures()
-        self.panel.residuals.show_captures(captures, shown=self.model.shown)
+        self.panel.show_captures(captures)
         fresh = next((one for one in captures if one.path.name == self._fresh), None)
         if fresh is not None and fresh.finding is not None and not self.model.busy_with_images:
             self._fresh = ""
@@ -135,9 +135,6 @@ class ImageStep(StepPresenter):
     def live(self) -> None:
         """Show the live image with the detection in it."""
         super().live()
-        there = self.model.live.stream is not None
-        self.panel.show_live("" if there else no_camera(), ready=there)
-        self.panel.capture.setEnabled(there)
         self._point_to_captures()
         self.arm(force=True)
 

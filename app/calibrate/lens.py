@@ -249,6 +249,7 @@ class LensStep(ImageStep):
             "image."
         ),
         "camera",
+        frames=1,
         wanted=12,
         least=MIN_VIEWS,
         advice=tr(

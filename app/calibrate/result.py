@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
 
 from app.calibrate.maps import MapsView
-from app.calibrate.model import WizardModel
 from app.calibrate.refraction import most_oblique_press
 from app.calibrate.remedies import Mend, mend_of
 from app.calibrate.states import RUNNING, StepState, is_done, step_state
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from app.calibrate.step_panel import Remedy
-from app.context.context import AppContext
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
 from app.widgets.buttons import push_button
-from app.widgets.label import MarkupLabel, PlainLabel, RoomyLabel, escaped
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
@@ -45,13 +42,6 @@ if TYPE_CHECKING:
 FAIL, OUTDATED = StageState.FAIL, StageState.STALE
 MAIN = ("ball_height_error_percent", "held_out_normal_deg")
 """Figures that say how good the whole calibration is; a recipe has one of them."""
-
-
-class Say(Protocol):
-    """Shows a sentence in the colour of its role."""
-
-    def __call__(self, sentence: str, role: str) -> None:
-        """Show it."""
 
 
 class Overview(QWidget):
@@ -98,24 +88,6 @@ class Overview(QWidget):
         self.more.setVisible(bool(figures))
 
 
-class SaveButtons(QWidget):
-    """Saves the calibration and its report; the main button until both agree with the captures."""
-
-    def __init__(self, save: Callable[[], None], report: Callable[[], None]) -> None:
-        super().__init__()
-        self.save = push_button("result.save", tr("&Save the calibration"), save)
-        self.report = push_button("result.report", tr("Write the &report…"), report)
-        self.saved = named(RoomyLabel(), "result.saved", tr("Where it was saved"))
-        self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.save.setMinimumHeight(38)
-        vbox(self.saved, self.report, self.save, of=self, margins=0, spacing=8)
-
-    def show_saved(self, sentence: str, role: str) -> None:
-        """Show where the calibration or its report was saved, or why it was not."""
-        self.saved.setText(sentence)
-        show_meaning(self.saved, role)
-
-
 class ResultStep(StepPresenter):
     """Shows what all stages give together, and saves the calibration and its report."""
 
@@ -131,8 +103,11 @@ class ResultStep(StepPresenter):
         super().__init__(parts)
         self._steps = {stage: step for step in parts.steps for stage in step.stages}
         self.overview = Overview()
-        self.buttons = SaveButtons(self.save, self.report)
-        self.panel.add_foot(self.buttons)
+        self.save = push_button("result.save", tr("&Save the calibration"), self.store)
+        self.report = push_button(
+            "result.report", tr("Write the &report…"), partial(ask_report, self)
+        )
+        self.own = tuple(map(self.panel.add_foot, (self.report, self.save)))
         self.tabs = named(QTabWidget(documentMode=True), "result.tabs", tr("Result"))
         self.tabs.addTab(self.overview, tr("Verdict"))
         if REFLECTANCE.key in self.model.statuses:
@@ -141,7 +116,6 @@ class ResultStep(StepPresenter):
             self.tabs.addTab(QWidget(), tr("Reflectance curves"))
         self.tabs.tabBar().setVisible(self.tabs.count() > 1)
         self.tabs.currentChanged.connect(lambda _: self._show_tab())
-        self._name = ""
         self._mend: Mend | None = None
 
     @cached_property
@@ -160,7 +134,7 @@ class ResultStep(StepPresenter):
 
     def focus(self) -> QWidget:
         """Return the main button."""
-        return self.panel.next if self.model.saved else self.buttons.save
+        return self.panel.next if self.model.saved else self.save
 
     def state(self) -> StepState:
         """Return the state of the last stages; once they are done, the worst of all."""
@@ -201,14 +175,14 @@ class ResultStep(StepPresenter):
         """Return nothing: the figures have their own place."""
         return ()
 
-    def enter(self) -> None:
-        """Show the step with its buttons."""
-        self.buttons.show()
-        super().enter()
+    def progress_line(self) -> str:
+        """Return where the calibration of the present captures is saved."""
+        name = self.model.saved
+        return tr("Saved as {name}. Validate it next.").format(name=name) if name else ""
 
     def leave(self) -> None:
-        """Hide the buttons."""
-        self.buttons.hide()
+        """Make Next the main button again."""
+        super().leave()
         set_property(self.panel.next, "primary", True)
 
     def close(self) -> None:
@@ -218,14 +192,7 @@ class ResultStep(StepPresenter):
 
     def refresh(self) -> None:
         """Show the present state of every stage."""
-        model, buttons = self.model, self.buttons
-        statuses = model.statuses
-        if self._name and not model.saved:
-            buttons.show_saved("", "")  # what was saved is no longer what the captures give
-        elif model.saved and not buttons.saved.text():
-            text = tr("Saved as {name}. Validate it next.").format(name=model.saved)
-            buttons.show_saved(text, "pass")
-        self._name = model.saved
+        model, statuses = self.model, self.model.statuses
         quality = {key: status.quality for key, status in statuses.items()}
         self._mend = mend_of(quality, model.project.results)
         _, tables = with_one_cause(quality)
@@ -235,11 +202,11 @@ class ResultStep(StepPresenter):
         made = all(map(_is_made, statuses.values()))
         failed = any(status.state is FAIL for status in statuses.values())
         idle = all(state != RUNNING for state, _ in model.states.values())
-        buttons.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
-        buttons.save.setEnabled(made and idle)
-        set_property(buttons.save, "primary", made and not model.saved)
+        self.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
+        self.save.setEnabled(made and idle)
+        set_property(self.save, "primary", made and not model.saved)
         # The report waits for the stages by itself.
-        buttons.report.setEnabled(buttons.save.isEnabled() or bool(model.jobs.busy and model.saved))
+        self.report.setEnabled(self.save.isEnabled() or bool(model.jobs.busy and model.saved))
         state, sentence = model.states[self.step.key]
         wrong = self._mend is not None and state in ("warn", "fail")
         self.show_state(state, f"{cause}." if wrong else sentence)
@@ -305,7 +272,7 @@ class ResultStep(StepPresenter):
 
     # Saving
 
-    def save(self) -> None:
+    def store(self) -> None:
         """Write the calibration into the library, and use it from now on unless it failed."""
         project, workspace = self.model.project, self.context.workspace
 
@@ -319,34 +286,26 @@ class ResultStep(StepPresenter):
 
         def done(saved: tuple[Path, Finding | None]) -> None:
             path, fault = saved
-            if fault is None:
-                text = tr("Saved as {name} and now in use. Validate it next.")
-            else:
-                text = tr("Saved as a draft, {name}, and not in use.")
-            role = "pass" if fault is None else "fail"
-            self.buttons.show_saved(text.format(name=path.stem), role)
+            text = tr("Saved as a draft, {name}, and not in use.").format(name=path.stem)
+            self.panel.show_notice(text if fault else "", "fail")
             self.context.requests.calibrations_changed.emit()
             self.model.saved_as.emit(str(path))
 
-        _submit(self.model, tr("Saving the calibration"), work, done, self.buttons.show_saved)
-
-    def report(self) -> None:
-        """Ask for a file name and write the report there."""
-        ask_report(self.tabs, self.model, self.context, self.buttons.show_saved)
+        self.model.jobs.submit(Job(tr("Saving the calibration"), work, done))
 
 
-def ask_report(parent: QWidget, model: WizardModel, context: AppContext, say: Say) -> None:
-    """Ask for a file name and write the report there."""
-    name = f"{model.project.session.serial}-report.pdf"
+def ask_report(step: StepPresenter) -> None:
+    """Ask for a file name and write the report of the session there."""
+    name = f"{step.model.project.session.serial}-report.pdf"
     title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
-    path = ask_save(parent, context.settings, "report", title, name, patterns)
+    path = ask_save(step.area, step.context.settings, "report", title, name, patterns)
     if path is not None:
-        write_report(path, model, context, say)
+        write_report(path, step)
 
 
-def write_report(path: Path, model: WizardModel, context: AppContext, say: Say) -> None:
-    """Write the report of the session in its present state; `say` shows how it ended."""
-    project, workspace = model.project, context.workspace
+def write_report(path: Path, step: StepPresenter) -> None:
+    """Write the report of the session in its present state; the panel shows how it ended."""
+    project, workspace = step.model.project, step.context.workspace
 
     def work(_progress: object) -> None:
         from gelpolight_core.report import build, file  # slow to import
@@ -357,21 +316,9 @@ def write_report(path: Path, model: WizardModel, context: AppContext, say: Say) 
         file.write_report(build.run_report(run, validation=validation), path)
 
     def done(_nothing: None) -> None:
-        say(tr("Report saved as {path}").format(path=path), "pass")
+        step.panel.show_notice(tr("Report saved as {path}").format(path=path), "pass")
 
-    _submit(model, tr("Writing the report"), work, done, say)
-
-
-def _submit(
-    model: WizardModel,
-    title: str,
-    work: Callable[[object], Any],
-    done: Callable[[Any], None],
-    say: Say,
-) -> None:
-    say(title + "…", "")
-    failed = partial(say, role="fail")
-    model.jobs.submit(Job(title, work, done, failed, stopped=failed))
+    step.model.jobs.submit(Job(tr("Writing the report"), work, done))
 
 
 def _is_made(status: StageStatus) -> bool:

@@ -61,13 +61,16 @@ class StepPresenter(QObject):
     -------
     step_wanted(str)
         Key of a step to go to.
-    lay_wanted()
-        Place the object of the step on the virtual bench.
+
+    Attributes
+    ----------
+    own : tuple of QWidget
+        Parts of the side panel that only this step shows.
     """
 
     step_wanted = Signal(str)
-    lay_wanted = Signal()
     step: Step
+    own: tuple[QWidget, ...] = ()
     uses_camera = False
 
     def __init__(self, parts: Parts) -> None:
@@ -90,9 +93,9 @@ class StepPresenter(QObject):
         return self.area
 
     @property
-    def side(self) -> QWidget:
-        """The widget at the right."""
-        return self.panel
+    def guide(self) -> tuple[str, str]:
+        """Page and section of the guide about the step."""
+        return "guide/calibrate", self.step.title
 
     def focus(self) -> QWidget:
         """Return the widget that the user needs first."""
@@ -132,7 +135,7 @@ class StepPresenter(QObject):
     def progress_line(self) -> str:
         """Return how many images there are, and how many are wanted; nothing else says it."""
         step, count = self.step, self.count()
-        if not step.captures:
+        if not step.wanted:
             return ""
         if step.wanted > 1:
             return tr("{n} of {m} captured").format(n=count, m=max(step.wanted, count))
@@ -162,11 +165,15 @@ class StepPresenter(QObject):
 
     def enter(self) -> None:
         """Show the step."""
+        for widget in self.own:
+            widget.show()
         self.area.show_step(strip=self.step.stage is not None)
         self.live()
 
     def leave(self) -> None:
         """Show another step instead."""
+        for widget in self.own:
+            widget.hide()
 
     def close(self) -> None:
         """Stop all work of the step."""
@@ -210,6 +217,8 @@ class StepPresenter(QObject):
         self.area.show_stream(None if fault else stream)
         if fault or stream is None:
             self.area.view.image.say(fault or no_camera())
+        self.panel.show_live("" if stream else no_camera(), ready=stream is not None)
+        self.panel.capture.setEnabled(stream is not None)
         self.model.live_detection.set_detector(None)
 
     def camera_changed(self) -> None:
@@ -249,10 +258,6 @@ class StepPresenter(QObject):
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
         """Correct a detection: the user has dragged a handle."""
-
-    def show_bench(self, there: bool) -> None:
-        """Offer the virtual bench if there is one."""
-        self.panel.lay.setVisible(there)
 
     def on_bench(self, scene: Scene) -> None:
         """Use the known size of an object that was placed on the virtual bench."""

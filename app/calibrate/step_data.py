@@ -25,9 +25,9 @@ class Step:
     assembly : str
         How the sensor is assembled in this step; a name of :mod:`app.calibrate.assembly`.
     frames : int
-        Frames averaged into one capture.
+        Frames averaged into one capture; 0 if none is captured in the step.
     wanted : int
-        Recommended number of captures; 0 if the step captures none.
+        Recommended number of captures that are kept.
     least : int
         Smallest number of captures from which the stage can be computed.
     folder : str
@@ -36,6 +36,8 @@ class Step:
         Whether a new image replaces the former one.
     advice : str
         More about the set-up, for the help.
+    button : str
+        Text of the button that captures; empty for the usual one.
     figure : str
         Key of the one figure that the step shows; empty for the first one of its stages.
     """
@@ -45,13 +47,13 @@ class Step:
     stages: tuple[str, ...]
     task: str
     assembly: str
-    frames: int = 1
+    frames: int = 0
     wanted: int = 0
     least: int = 1
-
     folder: str = ""
     one_image: bool = False
     advice: str = ""
+    button: str = ""
     figure: str = ""
 
     @property
@@ -62,7 +64,7 @@ class Step:
     @property
     def captures(self) -> bool:
         """Whether images are captured in this step."""
-        return bool(self.folder) and self.wanted > 0
+        return self.frames > 0
 
 
 def step_of(stage: Stage[Any], task: str, assembly: str, **more: Any) -> Step:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import isfinite
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
@@ -11,13 +13,12 @@ from PySide6.QtWidgets import (
     QMenu,
     QProgressBar,
     QPushButton,
-    QScrollArea,
     QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
-from app.calibrate.residual_table import ResidualTable
+from app.calibrate.film_strip import Capture
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.step_data import Step
 from app.calibrate.step_help import StepHelp
@@ -35,6 +36,10 @@ WIDTH = 304
 # This space is always reserved, so that nothing moves when a message changes.
 HINT_LINES = 4
 NUMBER_LINES = 3
+REMEDIES = 3
+"""As many as the panel has room for."""
+LEAST_CAPTURES = 2
+"""With fewer captures there is nothing to compare."""
 
 Remedy = tuple[str, Callable[[], object]]
 """Text of a button, and what it does."""
@@ -47,18 +52,24 @@ class StepPanel(QWidget):
     ----------
     finished : bool
         Whether the step is complete.
-
+    step : Step
+        The shown step.
+    worst : str
+        Name of the capture with the largest residual.
     """
+
+    step: Step | None = None
 
     def __init__(self) -> None:
         super().__init__()
         named(self, "calibrate.panel", tr("This step"))
         self.setFixedWidth(WIDTH)
         self.finished = False
-        self._step: Step | None = None
         self._following = ""
         self._remedies: dict[str, Callable[[], object]] = {}
-        self._scroll, inside = side_scroll("calibrate.panel.scroll", tr("This step"))
+        inside = QWidget()
+        self._scroll = named(scroll_area(inside), "calibrate.panel.scroll", tr("This step"))
+        self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._extra = QVBoxLayout()
         self._column = vbox(
             *self._build_head(),
@@ -109,26 +120,43 @@ class StepPanel(QWidget):
         self.notice = named(_message(), "calibrate.notice", tr("Result of the last action"))
         self.sentence = named(_message(), "calibrate.sentence", tr("Message about the step"))
         self.buttons = [
-            named(QPushButton(), f"calibrate.remedy{place}", tr("Remedy")) for place in range(2)
+            named(QPushButton(), f"calibrate.remedy{place}", tr("Remedy"))
+            for place in range(REMEDIES)
         ]
         for button in self.buttons:
             button.clicked.connect(lambda _on=False, b=button: self._remedies[b.text()]())
-        self._message = card(self.notice, self.sentence, hbox(*self.buttons, None, margins=0))
+        self._message = card(self.notice, self.sentence, *self.buttons)
         return self._message
 
     def _build_details(self) -> QWidget:
         self.quality = QualityTableWidget(
             "calibrate.quality", tr("Quality figures of this step"), narrow=True
         )
-        self.residuals = ResidualTable()
+        self.residual = named(PlainLabel(), "calibrate.residual", tr("Residual"))
+        make_bold(self.residual)
+        self.residuals = QualityTableWidget(
+            "calibrate.residuals", tr("Captures, worst first"), narrow=True
+        )
+        self.repeat = named(
+            QPushButton(tr("Repeat the &worst")),
+            "calibrate.residuals.repeat",
+            tr("Repeat the worst capture"),
+            tr("Exclude the capture with the largest residual, and capture a new one"),
+        )
         details = QWidget()
-        vbox(self.quality, self.residuals, of=details, margins=0)
+        vbox(self.quality, self.residual, self.residuals, self.repeat, of=details, margins=0)
         details.hide()
         self.details.toggled.connect(details.setVisible)
         return details
 
     def _build_foot(self) -> QWidget:
-        self.lay = lay_button("calibrate.lay")
+        self.lay = named(
+            QPushButton(tr("Place it on the virtual &bench")),
+            "calibrate.lay",
+            tr("Place the object for this step on the virtual bench"),
+            tr("Each click gives the next view or press, as a technician would arrange it"),
+        )
+        self.lay.hide()
         self.live = named(PlainLabel(wrap=True), "calibrate.live", tr("Content of the live image"))
         self.live.setFixedHeight(HINT_LINES * self.live.fontMetrics().lineSpacing())
         self.live.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom)
@@ -186,25 +214,27 @@ class StepPanel(QWidget):
 
     # What is shown
 
-    def add_foot(self, widget: QWidget) -> None:
+    def add_foot(self, widget: QWidget) -> QWidget:
         """Add a step's own buttons above Next; the step shows and hides them."""
         self._foot.insertWidget(self._foot.count() - 1, widget)
         widget.hide()
+        return widget
 
     def show_step(self, step: Step, *, following: str) -> None:
         """Show the task of another step; `following`: title of the next step, if any."""
-        if step is not self._step:
+        if step is not self.step:
             # The message belongs to the previous step; remove it, even during a computation.
             self._show_figures(())
             self.show_number(None, "")
             self.sentence.setText("")
-            self.residuals.show_captures((), shown="")
-        self._step, self._following = step, following
+            self.show_captures(())
+        self.step, self._following = step, following
         self.finished = False
         self.title.setText(step.title)
         self.task.setText(step.task)
         self.help.show_step(step)
         self.capturing.setVisible(step.captures)
+        self.capture.setText(step.button or tr("&Capture"))
         self.show_notice("", "pass")
         self.next.setVisible(bool(following))
         self.show_countdown(0)
@@ -281,13 +311,13 @@ class StepPanel(QWidget):
         wrong = self._state in ("warn", "fail", "stale", "waiting") and self.sentence.text()
         self.notice.setVisible(bool(said))
         self.sentence.setVisible(bool(wrong) and not said)
-        texts = [] if said or not wrong else list(self._remedies)[: len(self.buttons)]
+        texts = [] if said else list(self._remedies)[: len(self.buttons)]
         for place, button in enumerate(self.buttons):
             button.setVisible(place < len(texts))
             button.setText(texts[place] if place < len(texts) else "")
         role = self._notice_role if said else self._state
         show_ground(self._message, role if role in ("warn", "fail") else "")
-        self._message.setVisible(bool(said or wrong))
+        self._message.setVisible(bool(said or wrong or texts))
 
     _state, _notice_role = "empty", "pass"
 
@@ -295,6 +325,18 @@ class StepPanel(QWidget):
         figures = tuple(figure for table in tables for figure in table.figures)
         self.quality.set_table(QualityTable(figures))
         self.quality.setVisible(bool(figures))
+
+    def show_captures(self, captures: Sequence[Capture]) -> None:
+        """Show the captures that have a residual, the worst first."""
+        judged = {c.path: c.finding for c in captures if c.finding and isfinite(c.residual)}
+        worst = sorted(judged.items(), key=lambda one: one[1].value, reverse=True)
+        self.worst = worst[0][0].name if worst else ""
+        self.residual.setText(worst[0][1].text if worst else "")
+        self.residuals.set_table(
+            QualityTable(tuple(replace(found, text=path.stem) for path, found in worst))
+        )
+        for widget in (self.residual, self.residuals, self.repeat):
+            widget.setVisible(len(worst) >= LEAST_CAPTURES)
 
     def show_work(self, title: str, share: float) -> None:
         """Show the running work; an empty title means none."""
@@ -311,33 +353,6 @@ def card(*parts: object) -> QFrame:
     frame.setObjectName("card")
     vbox(*parts, of=frame, margins=(12, 8, 12, 8), spacing=4)
     return frame
-
-
-def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
-    """Return a vertical scroll area for a side panel, and the widget in it."""
-    inside = QWidget()
-    scroll = named(scroll_area(inside), name, accessible)
-    scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    return scroll, inside
-
-
-def help_button(name: str) -> QToolButton:
-    """Return the button that opens the guide at a step."""
-    button = named(QToolButton(), name, tr("Help on this step"), tr("Read about this step"))
-    button.setText("?")
-    return button
-
-
-def lay_button(name: str) -> QPushButton:
-    """Return the button of the virtual bench; hidden with a real camera."""
-    button = named(
-        QPushButton(tr("Place it on the virtual &bench")),
-        name,
-        tr("Place the object for this step on the virtual bench"),
-        tr("Each click gives the next view or press, as a technician would arrange it"),
-    )
-    button.hide()
-    return button
 
 
 def _message() -> PlainLabel:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,35 +14,146 @@ from numpy.typing import NDArray
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.calibrate.detection import read_raw
-from app.calibrate.maps import depth_panel
+from app.calibrate.maps import Panel, depth_panel
 from app.calibrate.result import ask_report
 from app.calibrate.states import StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
-from app.calibrate.trial import Trial, run_trial
-from app.calibrate.validation_panel import SHAPES, ValidationPanel
+from app.calibrate.step_panel import Remedy
 from app.context.calibration_status import put_into_use
-from app.services.jobs import Job, Jobs
+from app.services.jobs import Job
 from app.sources.bench import Scene
+from app.widgets.buttons import push_button
+from app.widgets.fields import choice, number
+from app.widgets.forms import Form
+from app.widgets.label import PlainLabel
+from app.widgets.layout import vbox
+from app.widgets.meaning import set_property, show_meaning
+from app.widgets.naming import named
 from app.workspace.entries import read_entry
 from app.workspace.validation import Validation, read_validation, write_validation
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Finding
 from gelpolight_core.io.user import user_name
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.measurement.result import Measurement, Truth, compare
+from gelpolight_core.measurement.trust import judged
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
 
 FRAMES = 4
 TRUTH = "truth.csv"
+SHAPES = {
+    "cylinder": tr("Cylinder, flat end"),
+    "cuboid": tr("Cuboid, flat end"),
+    "ball": tr("Ball"),
+}
+MM = tr(" mm")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The pressed object; a height of 0 is not known."""
+
+    shape: str = choice("cylinder", tr("Shape"), SHAPES)
+    size_mm: float = number(5.0, tr("True diameter or side"), 0.01, 500.0, MM, 3, step=0.1)
+    height_mm: float = number(
+        0.0, tr("True depth of the press"), 0.0, 500.0, MM, 3, step=0.1, none=tr("not known")
+    )
+
+    @property
+    def known(self) -> Truth:
+        """The object."""
+        return Truth(self.shape, self.size_mm, self.height_mm or math.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """The result of one press.
+
+    Attributes
+    ----------
+    known : Truth
+        The pressed object.
+    measurement : Measurement
+        Measurement of the object.
+    comparisons : tuple of Quantity
+        The lengths with their true values and limits.
+    heightmap : HeightMap
+        The depth it was measured in.
+    """
+
+    known: Truth
+    measurement: Measurement
+    comparisons: tuple[Quantity, ...]
+    heightmap: HeightMap
+
+    @property
+    def passed(self) -> bool:
+        """Whether all lengths are within their limits."""
+        return all(c.passed for c in self.comparisons)
+
+    @property
+    def recordable(self) -> bool:
+        """Whether it says something: a failed trial does, but nothing doubtful validates."""
+        return self.measurement.verdict == "ok" or not self.passed
+
+    def shown(self) -> tuple[str, str]:
+        """Return the result as text, and its role."""
+        text = tr(
+            "{what}: measured {m:.3f} mm, true {t:.3f} mm, error {e:+.2f} %, {word} ±{limit:g} %"
+        )
+        rows = [
+            text.format(
+                what=c.name.capitalize(), m=c.value, t=c.truth, e=c.error_percent,
+                word=tr("within") if c.passed else tr("beyond"), limit=c.limit_percent,
+            )
+            for c in self.comparisons
+        ]  # fmt: skip
+        if self.measurement.verdict == "ok":
+            return "\n".join(rows), "pass" if self.passed else "fail"
+        rows.append(tr("Low confidence: {reason}").format(reason=self.measurement.reason))
+        if not self.recordable:
+            rows.append(tr("It cannot be recorded. Correct this, then press again."))
+        return "\n".join(rows), "warn"
+
+
+def run_trial(
+    frames: Sequence[NDArray[Any]],
+    reconstructor: Reconstructor,
+    known: Truth,
+    limits_percent: tuple[float, float],
+) -> Trial:
+    """Measure the object in frames of one press; they are averaged before the reconstruction.
+
+    Raises
+    ------
+    InputError
+        If no object is found.
+    """
+    heightmap = measurable_depth(reconstructor, average_frames(frames), name=tr("press"))
+    measured = measure_heightmap(heightmap, shape=known.shape)
+    names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
+    comparisons = tuple(
+        replace(quantity, name=name)
+        for quantity, name in zip(compare(measured, known, limits_percent), names, strict=True)
+        if quantity.truth is not None
+    )
+    return Trial(known, judged(measured, heightmap), comparisons, heightmap)
 
 
 class ValidationStep(StepPresenter):
     """Measures presses with the saved calibration, and records the result."""
 
     uses_camera = True
+    guide = ("guide/validate", "Validate")
 
     step = Step(
         "validation",
@@ -50,51 +164,35 @@ class ValidationStep(StepPresenter):
             "only if the measured size is within the limits."
         ),
         "indenter",
+        frames=FRAMES,
+        button=tr("&Measure the press"),
     )
 
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
-        page = self.context.requests.page
-        form: ValidationPanel
-        after = (
-            ("inspect", tr("&Inspect"), lambda: page.emit("inspect")),
-            ("measuring", tr("M&easure"), lambda: page.emit("measure")),
-            (
-                "report",
-                tr("&Report…"),
-                lambda: ask_report(form, self.model, self.context, form.say),
-            ),
+        self.form = Form(Asked(), "validation", at_once=True)
+        self.calibration = named(
+            PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
         )
-        self.form = form = ValidationPanel(self.step, after)
+        asked = QWidget()
+        vbox(self.form, self.calibration, of=asked, margins=0)
+        self.keep = push_button("validation.keep", tr("&Record this validation"), self.record)
+        set_property(self.keep, "primary", True)
+        self.own = self.panel.add_extra(tr("Pressed object"), asked), self.panel.add_foot(self.keep)
         self._path: Path | None = None
-        # Separate jobs: a press can be measured while the stages are recomputed.
-        self.jobs = Jobs("validating", self)
-        self.jobs.progressed.connect(lambda title, share: form.show_work(share if title else None))
-        self.jobs.refused.connect(self.model.refused)
         self._reconstructor: Reconstructor | None = None
-        self._trial: tuple[Trial, str] | None = None
+        self._trial: Trial | None = None
+        self._panels: tuple[Panel, ...] = ()
         self._asked = object()  # identifies the newest trial; results of older ones are dropped
-        requests = self.context.requests
-        form.lay.clicked.connect(self.lay_wanted)
-        form.help.clicked.connect(lambda: requests.guide.emit("guide/validate", "Validate"))
-        form.measure.clicked.connect(self.measure)
-        form.import_press.clicked.connect(self.choose_press)
-        form.keep.clicked.connect(self.keep)
-        form.use.clicked.connect(self.put_into_use)
-        requests.calibrations_changed.connect(self._show_verdict)
-        self._show_calibration()
-        self._find_earlier()
-        self.model.changed.connect(self._show_calibration)
+        self.context.requests.calibrations_changed.connect(self.model.changed)
         self.model.saved_as.connect(self.use_calibration)
-
-    @property
-    def side(self) -> QWidget:
-        """The form for the known object."""
-        return self.form
+        self._find_earlier()
 
     def focus(self) -> QWidget:
-        """Return the Measure button."""
-        return self.form.measure
+        """Return the button that measures."""
+        return self.panel.capture
+
+    # What is shown
 
     def state(self) -> StepState:
         """Return whether the saved calibration is validated."""
@@ -107,35 +205,68 @@ class ValidationStep(StepPresenter):
             return "pass", tr("Validated")
         return "fail", tr("The last validation failed")
 
-    def show_bench(self, there: bool) -> None:
-        """Offer the virtual bench if there is one."""
-        self.form.lay.setVisible(there)
-        self.form.show_camera(self.model.live.stream is not None)
+    def number(self) -> Finding | None:
+        """Return the largest error of the recorded trial."""
+        found = self._recorded()
+        if found is None:
+            return None
+        return Finding("largest_error", tr("Largest error"), found.largest_percent, "%")
+
+    def remedies(self, state: str) -> tuple[Remedy, ...]:
+        """Return what follows a validation."""
+        if state != "pass":
+            return ()
+        if self.context.workspace.in_use != self._path:
+            use = partial(put_into_use, self._path, self.area, context=self.context)
+            return ((tr("&Use it now"), use),)
+        page = self.context.requests.page
+        return (
+            (tr("&Inspect"), partial(page.emit, "inspect")),
+            (tr("M&easure"), partial(page.emit, "measure")),
+            (tr("&Report…"), partial(ask_report, self)),
+        )
+
+    def result_panels(self) -> tuple[Panel, ...]:
+        """Return the measured depth."""
+        return self._panels
+
+    def refresh(self) -> None:
+        """Show the state, and which calibration is validated."""
+        super().refresh()
+        present, text = (
+            bool(self.model.saved),
+            tr("Calibration: {name}, computed from the present captures."),
+        )
+        if self._path is None:
+            text = tr("Save the calibration first. A validation belongs to a saved calibration.")
+        elif not present:
+            text = tr(
+                "Calibration: {name}. Its captures or corrections have changed since. Save it "
+                "again."
+            )
+        self.calibration.setText(text.format(name=self._path and self._path.stem))
+        show_meaning(self.calibration, "" if present else "warn")
+        self.keep.setEnabled(self._trial is not None and self._trial.recordable)
 
     def on_bench(self, scene: Scene) -> None:
         """Fill in the object on the virtual bench."""
-        self.form.show_known(Truth(scene.item, scene.size_mm, scene.depth_mm))
+        self.show_known(Truth(scene.item, scene.size_mm, scene.depth_mm))
 
-    def close(self) -> None:
-        """Stop the measurement."""
-        self.jobs.close()
+    def show_known(self, known: Truth) -> None:
+        """Fill in an object."""
+        shape = known.shape if known.shape in SHAPES else next(iter(SHAPES))
+        height_mm = known.height_mm if known.is_whole else 0.0
+        self.form.change(shape=shape, size_mm=known.size_mm, height_mm=height_mm)
 
-    def refresh(self) -> None:
-        """Show nothing else: the form follows the model."""
+    # The calibration
 
     def use_calibration(self, path: str) -> None:
         """Use this saved calibration for the next trials."""
         self._path, self._reconstructor = Path(path), None
         summary = read_entry(self._path).summary
         self.model.use_saved(self._path.stem, "" if summary is None else summary.inputs)
-        self._show_calibration()
         self._drop_trial()
-        self._show_verdict()
-
-    def _drop_trial(self) -> None:
-        """Drop the shown trial, and one that is still running."""
-        self._asked, self._trial = object(), None
-        self.form.show_trial(None)
+        self.model.changed.emit()
 
     def _find_earlier(self) -> None:
         """Select the calibration of the present captures, or the newest one of the session."""
@@ -156,114 +287,6 @@ class ValidationStep(StepPresenter):
         if found:
             self.use_calibration(str(min(found, key=lambda one: one[0])[1]))
 
-    def _show_calibration(self) -> None:
-        name = "" if self._path is None else self._path.stem
-        self.form.show_calibration(name, present=bool(self.model.saved))
-
-    def measure(self) -> None:
-        """Capture the press, then measure it."""
-        live, fault = self.model.live, self.model.camera_fault()
-        if fault:
-            self._refuse(fault)
-        elif live.stream is not None and not live.capturing and self._path is not None:
-            self._drop_trial()
-            self.form.say(tr("Capturing: hold the object still."))
-            self.form.show_work(0.0)
-            live.capture(FRAMES, self._measure, self._refuse)
-
-    def choose_press(self) -> None:
-        """Let the user choose the image of a press, and measure it."""
-        presses = self.model.project.session.folder / "presses"
-        settings = self.context.settings
-        folder = presses if presses.is_dir() else settings.folder("press")
-        chosen, _ = QFileDialog.getOpenFileName(
-            self.form,
-            tr("Import an image of a press"),
-            str(folder),
-            tr("Images (*.png *.tif *.tiff)"),
-        )
-        if chosen:
-            settings.keep_folder("press", Path(chosen).parent)
-            self.import_press(Path(chosen))
-
-    def import_press(self, path: Path) -> None:
-        """Measure a press from an image file, with the true size from its folder, if given."""
-        self.form.show_work(0.0)
-        try:
-            frame = read_raw(path)
-            known = _known_in_folder(path)
-        except InputError as error:
-            self._refuse(str(error))
-            return
-        if known is not None:
-            self.form.show_known(known)
-        self._measure([frame])
-
-    def _measure(self, frames: list[NDArray[Any]]) -> None:
-        self._drop_trial()
-        known, asked = self.form.asked.known, self._asked
-        path, present = self._path, self._reconstructor
-        if path is None:
-            return
-
-        def work(progress: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
-            reconstructor = present or Reconstructor(read_calibration(path))
-            limits = self.context.settings.limits.percent
-            return reconstructor, run_trial(
-                frames, reconstructor, known, limits_percent=limits, progress=progress
-            )
-
-        text = tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm)
-
-        def done(found: tuple[Reconstructor, Trial]) -> None:
-            if self._asked is asked:
-                self._show(*found, text)
-
-        def failed(sentence: str) -> None:
-            if self._asked is asked:
-                self._refuse(sentence)
-
-        self.form.say(tr("Measuring."))
-        self.jobs.submit(Job(tr("Measuring the press"), work, done, failed))
-
-    def _show(self, reconstructor: Reconstructor, trial: Trial, text: str) -> None:
-        self._reconstructor, self._trial = reconstructor, (trial, text)
-        self.form.show_work(None)
-        self.form.show_trial(trial)
-        panel = depth_panel(tr("Measured depth"), trial.heightmap, trial.measurement.outline_mm)
-        if not self.form.isHidden():
-            self.area.show_result(panel)
-
-    def _refuse(self, sentence: str) -> None:
-        self._trial = None
-        self.form.show_work(None)
-        self.form.show_trial(None)
-        self.form.say(sentence, "warn")
-
-    def keep(self) -> None:
-        """Store the trial as the validation of the calibration."""
-        if self._trial is None or self._path is None or self._reconstructor is None:
-            return
-        trial, text = self._trial
-        validation = Validation(
-            self._reconstructor.calibration.identity,
-            datetime.now(UTC).isoformat(timespec="seconds"),
-            user_name(),
-            text,
-            trial.comparisons,
-        )
-        try:
-            write_validation(validation, self._path)
-        except InputError as error:
-            self.context.toasts.show(str(error), "fail")
-            return
-        self.context.requests.calibrations_changed.emit()
-        self.model.changed.emit()
-
-    def put_into_use(self) -> None:
-        """Use the validated calibration on the other pages from now on."""
-        put_into_use(self._path, self.form, context=self.context)
-
     def _recorded(self) -> Validation | None:
         if self._path is None:
             return None
@@ -276,19 +299,116 @@ class ValidationStep(StepPresenter):
             return None
         return found
 
-    def _show_verdict(self) -> None:
-        found, used = self._recorded(), self.context.workspace.in_use == self._path
-        if found is None:
-            text = tr("Not validated.")
-        elif not found.passed:
-            text = tr("Not validated: the errors of the recorded trial are beyond the limits.")
-        elif used:
-            text = tr("Validated: {e:.1f} %").format(e=found.largest_percent)
-        else:
-            text = tr("Validated: {e:.1f} %, but not in use: Inspect and Measure use another one.")
-            text = text.format(e=found.largest_percent)
-        role = "warn" if found is None else "pass" if found.passed else "fail"
-        self.form.show_verdict(text, role, used=used)
+    # Trials
+
+    def capture(self) -> None:
+        """Capture the press, then measure it."""
+        live, fault = self.model.live, self.model.camera_fault()
+        if fault:
+            self._refuse(fault)
+        elif live.stream is not None and not live.capturing:
+            self._drop_trial()
+            self.panel.show_live(tr("Capturing: hold the object still."), ready=True)
+            live.capture(FRAMES, self._measure, self._refuse)
+
+    def choose_files(self) -> None:
+        """Let the user choose the image of a press, and measure it."""
+        presses = self.model.project.session.folder / "presses"
+        settings = self.context.settings
+        folder = presses if presses.is_dir() else settings.folder("press")
+        chosen, _ = QFileDialog.getOpenFileName(
+            self.area,
+            tr("Import an image of a press"),
+            str(folder),
+            tr("Images (*.png *.tif *.tiff)"),
+        )
+        if chosen:
+            settings.keep_folder("press", Path(chosen).parent)
+            self.import_press(Path(chosen))
+
+    def import_press(self, path: Path) -> None:
+        """Measure a press from an image file, with the true size from its folder, if given."""
+        try:
+            frame = read_raw(path)
+            known = _known_in_folder(path)
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        if known is not None:
+            self.show_known(known)
+        self._measure([frame])
+
+    def _drop_trial(self) -> None:
+        """Drop the shown trial, and one that is still running."""
+        self._asked, self._trial, self._panels = object(), None, ()
+        self.keep.setEnabled(False)
+        self._say("")
+
+    def _measure(self, frames: list[NDArray[Any]]) -> None:
+        self._drop_trial()
+        known, asked = self.form.value.known, self._asked
+        path, present = self._path, self._reconstructor
+        if path is None:
+            self._refuse(self.calibration.text())
+            return
+
+        def work(_progress: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
+            reconstructor = present or Reconstructor(read_calibration(path))
+            limits = self.context.settings.limits.percent
+            return reconstructor, run_trial(frames, reconstructor, known, limits)
+
+        def done(found: tuple[Reconstructor, Trial]) -> None:
+            if self._asked is asked:
+                self._reconstructor = found[0]
+                self.show_trial(found[1])
+
+        def failed(sentence: str) -> None:
+            if self._asked is asked:
+                self._refuse(sentence)
+
+        self.panel.show_live(tr("Measuring."), ready=True)
+        # Beside the computations: a press can be measured while the stages are computed again.
+        self.model.short_jobs.submit(Job(tr("Measuring the press"), work, done, failed))
+
+    def show_trial(self, trial: Trial) -> None:
+        """Show the result of a trial."""
+        outline_mm = trial.measurement.outline_mm
+        self._trial = trial
+        self._panels = (depth_panel(tr("Measured depth"), trial.heightmap, outline_mm),)
+        self.keep.setEnabled(trial.recordable)
+        self._say(*trial.shown())
+
+    def _refuse(self, sentence: str) -> None:
+        self._drop_trial()
+        self._say(sentence, "warn")
+
+    def _say(self, sentence: str, role: str = "pass") -> None:
+        """Show how a trial ended, with its depth, unless another step is open."""
+        if self.panel.step is self.step:
+            self.panel.show_notice(sentence, role)
+            self.panel.show_live("", ready=True)
+            self.show_result()
+            self.area.result.setChecked(bool(self._panels))
+
+    def record(self) -> None:
+        """Store the trial as the validation of the calibration."""
+        if self._trial is None or self._path is None or self._reconstructor is None:
+            return
+        known = self._trial.known
+        validation = Validation(
+            self._reconstructor.calibration.identity,
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            user_name(),
+            tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm),
+            self._trial.comparisons,
+        )
+        try:
+            write_validation(validation, self._path)
+        except InputError as error:
+            self._say(str(error), "fail")
+            return
+        self.panel.show_notice("", "pass")
+        self.context.requests.calibrations_changed.emit()
 
 
 def _known_in_folder(path: Path) -> Truth | None:
@@ -301,7 +421,4 @@ def _known_in_folder(path: Path) -> Truth | None:
     """
     if not (path.parent / TRUTH).is_file():
         return None
-    for row in read_truth(path.parent).rows:
-        if row.file == path.name:
-            return row.truth
-    return None
+    return next((r.truth for r in read_truth(path.parent).rows if r.file == path.name), None)

@@ -14,7 +14,7 @@ from app.calibrate.session_camera import SessionCamera
 from app.calibrate.states import OPEN, StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_list import StepColumn, StepList
-from app.calibrate.step_panel import WIDTH, StepPanel
+from app.calibrate.step_panel import StepPanel
 from app.calibrate.steps import route_of, steps_of
 from app.context.context import AppContext
 from app.widgets.actions import make_action
@@ -66,8 +66,8 @@ class Wizard(QWidget):
         self.presenters: tuple[StepPresenter, ...] = tuple(make(parts) for make in route)
         self.open = self.presenters[0]
         for presenter in self.presenters:
-            _add(self.side, presenter.side)
-            _add(self.centre, presenter.centre)
+            if self.centre.indexOf(presenter.centre) < 0:
+                self.centre.addWidget(presenter.centre)
         self._running: object = None
         # Not at once: the history may ask for it, and is closed then.
         self._renewal = QTimer(self, singleShot=True, interval=0)
@@ -82,11 +82,9 @@ class Wizard(QWidget):
         self.model.compute()
 
     def _lay_out(self) -> None:
-        self.centre, self.side = QStackedWidget(), QStackedWidget()
+        self.centre = QStackedWidget()
         self.centre.addWidget(self.area)
-        self.side.addWidget(self.panel)
-        self.side.setFixedWidth(WIDTH)
-        row = hbox(self.column, (self.centre, 1), self.side, margins=0, spacing=0)
+        row = hbox(self.column, (self.centre, 1), self.panel, margins=0, spacing=0)
         vbox(self.outside, (row, 1), of=self, margins=0, spacing=0)
 
     def _build_keys(self) -> None:
@@ -113,9 +111,7 @@ class Wizard(QWidget):
         panel.automatic.toggled.connect(self._set_automatic)
         panel.cancel.clicked.connect(model.jobs.cancel)
         guide = self.context.requests.guide
-        panel.help.guide.clicked.connect(
-            lambda: guide.emit("guide/calibrate", self.open.step.title)
-        )
+        panel.help.guide.clicked.connect(lambda: guide.emit(*self.open.guide))
         area.reconnect.clicked.connect(self.live.open)
         area.view.clicked.connect(self._on_clicked)
         area.view.dragged.connect(self.bench.drag)
@@ -126,7 +122,6 @@ class Wizard(QWidget):
         self.bench.opened.connect(self._follow_bench)
         for presenter in self.presenters:
             presenter.step_wanted.connect(self.go_to)
-            presenter.lay_wanted.connect(self._lay_on_bench)
         model.shown_changed.connect(self._on_shown)
         model.changed.connect(self.refresh)
         model.changed.connect(self.outside.check)
@@ -147,8 +142,7 @@ class Wizard(QWidget):
         panel.lay.clicked.connect(self._lay_on_bench)
         area.back_to_live.clicked.connect(lambda: self.open.live())
         area.strip.chosen.connect(self.show_capture)
-        panel.residuals.chosen.connect(self._show_from_table)
-        panel.residuals.repeat_wanted.connect(lambda name: self.open.repeat(name))
+        panel.repeat.clicked.connect(lambda: self.open.repeat(panel.worst))
         area.strip.excluded.connect(lambda name, out: self.open.exclude(name, out))
         area.view.moved.connect(lambda *at: self.open.moved(*at))
         self.live.processed.connect(lambda item: self.open.detected(item))
@@ -227,7 +221,6 @@ class Wizard(QWidget):
                 task=tr("Calibrating: {n} of {count}").format(n=n, count=count),
             )
         self.centre.setCurrentWidget(self.open.centre)
-        self.side.setCurrentWidget(self.open.side)
         self._focus_on_what_comes_next()
 
     def _next(self) -> None:
@@ -309,7 +302,7 @@ class Wizard(QWidget):
     def _refuse(self, sentence: str) -> None:
         """Show an error message on the page."""
         self.outside.check()
-        if self.isVisible() and self.side.currentWidget() is self.panel:
+        if self.isVisible():
             self.panel.show_notice(sentence, "fail")
         else:
             self.context.toasts.show(sentence, "fail")
@@ -323,12 +316,7 @@ class Wizard(QWidget):
         except InputError as error:
             self._refuse(str(error))
 
-    def _show_from_table(self, name: str) -> None:
-        self.area.strip.choose(name)
-        self.show_capture(name)
-
     def _on_shown(self) -> None:
-        self.panel.residuals.select(self.model.shown)
         self._live_key.setEnabled(bool(self.model.shown))
         self._follow_bench()
 
@@ -345,8 +333,7 @@ class Wizard(QWidget):
 
     def _on_camera(self) -> None:
         self.bench.follow()
-        for presenter in self.presenters:
-            presenter.show_bench(self.bench.in_use)
+        self.panel.lay.setVisible(self.bench.in_use)
         self.open.camera_changed()
 
     # The virtual bench
@@ -366,9 +353,3 @@ class Wizard(QWidget):
     def _on_clicked(self, u: float, v: float) -> None:
         if not self.model.shown:
             self.bench.drag_to(u, v)
-
-
-def _add(stack: QStackedWidget, widget: QWidget) -> None:
-    """Add a widget that may be there already, because several steps use it."""
-    if stack.indexOf(widget) < 0:
-        stack.addWidget(widget)

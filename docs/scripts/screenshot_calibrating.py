@@ -116,9 +116,9 @@ def calibration(operator: Operator) -> None:
 def validation(operator: Operator) -> None:
     """Press an object of known size."""
     wizard(operator).go_to("validation")
-    operator.click("validation.lay")
+    operator.click("calibrate.lay")
     operator.pause(2.0)
-    operator.click("validation.measure")
+    operator.click("calibrate.capture")
     operator.until(operator.see("validation.keep").isEnabled, "the measured press")
     operator.click("validation.keep")
     operator.window.context.toasts.clear()

@@ -112,8 +112,8 @@ class Trial:
         hand = self.hand
         hand.until(lambda: self.step == "validation", "the validation step")
         hand.begin("validation")
-        hand.click("validation.lay")
-        hand.click("validation.measure")
+        hand.click("calibrate.lay")
+        hand.click("calibrate.capture")
         hand.click("validation.keep")
         hand.until(lambda: self.validated, "the validated calibration")
 

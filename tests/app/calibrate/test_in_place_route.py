@@ -81,13 +81,13 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert read_calibration(path).model == "in-place"
     step = wizard.at("validation")
     report = tmp_path / "report.pdf"
-    write_report(report, wizard.model, step.context, step.form.say)
+    write_report(report, step)
     technician.rest()
     assert report.is_file()
     wizard.go_to("validation")
-    step.form.show_known(Truth("ball", 2.0 * opened.ball_radius_mm(files[-1].name), math.nan))
+    step.show_known(Truth("ball", 2.0 * opened.ball_radius_mm(files[-1].name), math.nan))
     step.import_press(files[-1])
-    technician.until(step.form.keep.isEnabled)
+    technician.until(step.keep.isEnabled)
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
 

@@ -68,9 +68,9 @@ def test_the_first_remedies_are_buttons_and_an_action_that_failed_comes_first(
     qtbot.addWidget(panel)
     panel.show_step(steps_of(route_of(FULL.stages))[6], following="Result")
     done: list[str] = []
-    remedies = [(name, lambda name=name: done.append(name)) for name in ("a", "b", "c")]
+    remedies = [(name, lambda name=name: done.append(name)) for name in ("a", "b", "c", "d")]
     panel.show_state("warn", "Not good.", (), remedies=remedies, finished=False)
-    assert [button.text() for button in panel.buttons] == ["a", "b"]
+    assert [button.text() for button in panel.buttons] == ["a", "b", "c"]
     panel.buttons[1].click()
     assert done == ["b"]
     panel.show_notice("The disk is full.", "fail")

@@ -226,7 +226,7 @@ def test_the_saved_calibration_equals_that_of_the_command_line(
     technician.begin(computed_project(), "result")
     technician.click("result.save")
     technician.rest()
-    assert "Saved as" in technician.see("result.saved").text()
+    assert "Saved as" in technician.wizard.panel.below.text()
     (path,) = (tmp_path / "workspace" / "sensors").rglob("*.gplcal")
     made, theirs = read_calibration(path), small_calibration
     assert made.identity == theirs.identity
@@ -259,14 +259,14 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
     technician.wizard.refresh()
     assert step.overview.headline.property("meaning") == "fail"
     assert technician.state("result") == "fail"
-    assert step.buttons.save.text() == "&Save as a draft"
+    assert step.save.text() == "&Save as a draft"
     technician.click("result.save")
     technician.rest()
     (draft,) = context.workspace.sensors_folder.rglob("*-draft.gplcal")
     assert context.workspace.in_use == used
     assert read_summary(draft).verdict is Verdict.FAIL
-    assert step.buttons.saved.property("meaning") == "fail"
-    assert not step.buttons.save.property("primary")
+    assert draft.stem in technician.wizard.panel.notice.text()
+    assert not step.save.property("primary")
 
 
 def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_again(
@@ -277,10 +277,10 @@ def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_agai
     technician.rest()
     technician.click("calibrate.next")
     camera.show(read_rgb(small_session / "presses" / "cylinder_s5_d100.png"))
-    panel = technician.wizard.at("validation").form
-    technician.until(panel.measure.isEnabled)
-    technician.click("validation.measure")
-    technician.until(lambda: "Diameter" in panel.result.text())
+    panel = technician.wizard.panel
+    technician.until(panel.capture.isEnabled)
+    technician.click("calibrate.capture")
+    technician.until(lambda: "Diameter" in panel.notice.text())
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
     folder = technician.session
@@ -305,16 +305,16 @@ def test_where_it_was_saved_is_shown_until_the_captures_change(
     technician.begin(computed_project(), "result")
     wizard, step = technician.wizard, technician.wizard.at("result")
     step.overview.more.click()
-    assert step.buttons.save.property("primary") and not wizard.panel.next.property("primary")
+    assert step.save.property("primary") and not wizard.panel.next.property("primary")
     technician.click("result.save")
     technician.rest()
-    assert wizard.model.saved in step.buttons.saved.text()
+    assert wizard.model.saved in wizard.panel.below.text()
     assert step.overview.every.isVisible(), "the figures stay open"
-    assert not step.buttons.save.property("primary") and wizard.panel.next.property("primary")
+    assert not step.save.property("primary") and wizard.panel.next.property("primary")
     wizard.model.exclude("balls", "ball_01.png", True)
     wizard.model.jobs.cancel()
     technician.rest()
-    assert not step.buttons.saved.text()
+    assert not wizard.panel.below.text()
 
 
 def test_curves_and_other_corrections_share_one_history(
@@ -394,10 +394,11 @@ def test_a_press_image_is_validated_with_its_truth_file(
     technician.rest()
     technician.click("calibrate.next")
     step = technician.wizard.at("validation")
-    assert not step.form.measure.isEnabled()  # there is no camera
+    panel = technician.wizard.panel
+    assert not panel.capture.isEnabled()  # there is no camera
     step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
-    technician.until(lambda: "Diameter" in step.form.result.text())
-    known = step.form.asked.known
+    technician.until(lambda: "Diameter" in panel.notice.text())
+    known = step.form.value.known
     assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
@@ -430,17 +431,17 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
         wizard = technician.wizard
         assert wizard.open.step.key == "validation"
         step = wizard.at("validation")
-        assert "present captures" in step.form.calibration.text()
+        assert "present captures" in step.calibration.text()
         wizard.go_to("result")
         assert "You can validate it now" in wizard.at("result").overview.headline.text()
         wizard.go_to("validation")
         step.import_press(small_session / "presses" / "cylinder_s5_d100.png")
-        technician.until(lambda: "Diameter" in step.form.result.text())
+        technician.until(lambda: "Diameter" in wizard.panel.notice.text())
         assert wizard.model.jobs.busy
         wizard.model.exclude("balls", "ball_01.png", True)
-        assert "have changed since" in step.form.calibration.text()
+        assert "have changed since" in step.calibration.text()
         wizard.model.undo.undo()
-        assert "present captures" in step.form.calibration.text()
+        assert "present captures" in step.calibration.text()
         wizard.model.jobs.cancel()
         hold.set()
         technician.rest()

@@ -55,20 +55,18 @@ def test_a_trial_of_an_earlier_calibration_is_dropped(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     path = save(technician, computed_project(), tmp_path / "workspace")
-    step, panel = (
-        technician.wizard.at("validation"),
-        technician.wizard.at("validation").form,
-    )
+    wizard = technician.wizard
+    step, panel = wizard.at("validation"), wizard.panel
     held = Held(validating.read_calibration)
     monkeypatch.setattr(validating, "read_calibration", held)
     step.import_press(small_session / PRESS)
     technician.until(held.begun.is_set)
     step.use_calibration(str(shutil.copy(path, path.with_name("newer.gplcal"))))
     held.go.set()
-    technician.until(lambda: not step.jobs.busy)
+    technician.until(lambda: not wizard.model.short_jobs.busy)
     assert step._reconstructor is None
-    assert not panel.keep.isEnabled()
-    assert not panel.result.text()
+    assert not step.keep.isEnabled()
+    assert not panel.notice.text()
 
 
 def test_a_doubtful_trial_cannot_be_recorded(
@@ -76,19 +74,15 @@ def test_a_doubtful_trial_cannot_be_recorded(
 ) -> None:
     """A width within the limits says little where the program does not trust the measurement."""
     save(technician, computed_project(), tmp_path / "workspace")
-    step, panel = (
-        technician.wizard.at("validation"),
-        technician.wizard.at("validation").form,
-    )
+    wizard = technician.wizard
+    step, panel = wizard.at("validation"), wizard.panel
     step.import_press(small_session / PRESS)
-    technician.until(panel.keep.isEnabled)
-    assert step._trial is not None
-    trial = step._trial[0]
+    technician.until(step.keep.isEnabled)
+    trial = step._trial
     unsure = replace(trial.measurement, findings=(doubt("cut", "cut by the border"),))
-    panel.show_trial(replace(trial, measurement=unsure))
-    assert not panel.keep.isEnabled()
-    assert panel.result.property("meaning") == "warn"
-    assert "cut by the border" in panel.result.text()
+    step.show_trial(replace(trial, measurement=unsure))
+    assert not step.keep.isEnabled()
+    assert "cut by the border" in panel.notice.text()
 
 
 def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
@@ -116,7 +110,7 @@ def test_a_validated_calibration_that_is_not_in_use_can_be_put_into_use(
     technician: Technician, computed_project: Made, tmp_path: Path
 ) -> None:
     path = save(technician, computed_project(), tmp_path / "workspace")
-    step = technician.wizard.at("validation")
+    step, panel = technician.wizard.at("validation"), technician.wizard.panel
     context = step.context
     passed = Quantity("height", 1.0, truth=1.0, limit_percent=8.0)
     identity = read_summary(path).identity
@@ -125,12 +119,14 @@ def test_a_validated_calibration_that_is_not_in_use_can_be_put_into_use(
     )
     context.requests.calibrations_changed.emit()
     assert context.workspace.in_use == path
-    assert not step.form.use.isVisible()
+    texts = [button.text() for button in panel.buttons]
+    assert texts == ["&Inspect", "M&easure", "&Report…"]
     context.workspace.use(None)
     context.requests.calibrations_changed.emit()
-    technician.click("validation.use")
+    assert panel.buttons[0].text() == "&Use it now"
+    technician.click("calibrate.remedy0")
     assert context.workspace.in_use == path
-    assert not step.form.use.isVisible()
+    assert panel.buttons[0].text() == "&Inspect"
 
 
 def test_reports_of_the_window_and_of_the_command_state_the_validation(
@@ -139,9 +135,9 @@ def test_reports_of_the_window_and_of_the_command_state_the_validation(
     path = save(technician, computed_project(), tmp_path / "workspace")
     step = technician.wizard.at("validation")
     step.import_press(small_session / PRESS)
-    technician.until(lambda: "Diameter" in step.form.result.text())
-    step.keep()
-    write_report(tmp_path / "window.pdf", technician.wizard.model, step.context, step.form.say)
+    technician.until(lambda: "Diameter" in technician.wizard.panel.notice.text())
+    step.record()
+    write_report(tmp_path / "window.pdf", step)
     technician.rest()
     assert main(["report", str(path), "-o", str(tmp_path / "command.pdf")]) == 0
     window, command = (report_data(tmp_path / f"{n}.pdf") for n in ("window", "command"))
