@@ -27,7 +27,7 @@ NO_CODE = {
 MOST = {
     "app/.": 171,
     "app/bench": 246,
-    "app/calibrate": 6102,
+    "app/calibrate": 5803,
     "app/cameras": 606,
     "app/command_line": 1726,
     "app/context": 483,
@@ -70,7 +70,7 @@ MOST = {
     "gelpolight_core/simulation": 2096,
     "gelpolight_core/studies": 1143,
     "tests/.": 1450,
-    "tests/app": 10657,
+    "tests/app": 10638,
     "tests/batch": 408,
     "tests/calibration": 1720,
     "tests/command_line": 1032,
