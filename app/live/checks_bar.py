@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
-from app.live.drawing import ROLE_COLOURS
+from app.live.drawing import colour_of
 from app.live.overlay import Role
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox
 from app.widgets.naming import named
+from app.widgets.plots import without_menus
 from app.widgets.quality_table import SIGNS
 from gelpolight_core.finding import Finding
 from gelpolight_core.translation import tr
@@ -80,7 +82,7 @@ class ChecksBar(QWidget):
             self._exposure.setVisible(not text)
 
 
-MARGIN_PX = 6
+HISTOGRAM_PX = 232, 104
 # Line styles distinguish the channels without colour, together with the letters.
 CHANNELS: tuple[tuple[Role, str, Qt.PenStyle], ...] = (
     ("led0", tr("R"), Qt.PenStyle.SolidLine),
@@ -89,70 +91,35 @@ CHANNELS: tuple[tuple[Role, str, Qt.PenStyle], ...] = (
 )
 
 
-class Histogram(QWidget):
-    """Three lines, pixels by brightness, on a logarithmic scale."""
+class Histogram(pg.PlotWidget):  # type: ignore[misc]
+    """Three lines, pixels by brightness in percent, on a logarithmic scale."""
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
+        background = QColor(12, 14, 18)
+        super().__init__(parent, background=background, viewBox=pg.ViewBox(enableMenu=False))
+        without_menus(self)
         named(self, "live.histogram", tr("Histogram"))
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.resize(self.sizeHint())
-        self._counts: NDArray[np.int64] | None = None
-
-    def sizeHint(self) -> QSize:  # noqa: D102
-        return QSize(232, 104)
+        self.resize(*HISTOGRAM_PX)
+        self.hideButtons()
+        self.hideAxis("left")
+        axis = self.getAxis("bottom")
+        axis.setTicks([[(0.0, "0"), (50.0, "50"), (100.0, "100")]])
+        axis.setTextPen(colour_of("info"))
+        self.showGrid(x=True, alpha=0.3)
+        self.setXRange(0.0, 100.0, padding=0.08)
+        self.addLegend(colCount=3, offset=(4, 1), labelTextColor=colour_of("info"))
+        self._curves = [
+            self.plot(pen=pg.mkPen(colour_of(role), width=1.4, style=style), name=name)
+            for role, name, style in CHANNELS
+        ]
 
     def show_counts(self, counts: NDArray[np.int64] | None) -> None:
         """Show counts (3, bins); None for nothing."""
-        self._counts = counts
-        self.update()
-
-    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(12, 14, 18, 190))
-        painter.drawRoundedRect(QRectF(self.rect()), 5.0, 5.0)
-        if self._counts is None:
-            return
-        plot = QRectF(self.rect()).adjusted(MARGIN_PX, 20, -MARGIN_PX - 6, -MARGIN_PX)
-        painter.setPen(QPen(QColor(255, 255, 255, 60), 1.0))
-        for quarter in range(5):
-            x = plot.left() + 0.25 * quarter * plot.width()
-            painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
-        height = np.log1p(self._counts)
-        height = height / max(float(height.max()), 1.0)
-        for k, (role, _name, style) in enumerate(CHANNELS):
-            self._paint_channel(painter, plot, height[k], QColor(ROLE_COLOURS[role]), style)
-        self._paint_legend(painter)
-
-    def _paint_channel(
-        self,
-        painter: QPainter,
-        plot: QRectF,
-        height: NDArray[np.float64],
-        colour: QColor,
-        style: Qt.PenStyle,
-    ) -> None:
-        bins = height.size
-        points = [
-            QPointF(plot.left() + plot.width() * i / (bins - 1), plot.bottom() - plot.height() * h)
-            for i, h in enumerate(height)
-        ]
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.setPen(QPen(colour, 1.4, style))
-        painter.drawPolyline(QPolygonF(points))
-        # The end of the scale, where a pixel is saturated, is a separate bar.
-        painter.setPen(QPen(colour, 3.0))
-        painter.drawLine(points[-1], QPointF(points[-1].x(), plot.bottom()))
-
-    def _paint_legend(self, painter: QPainter) -> None:
-        x = float(MARGIN_PX)
-        for role, name, style in CHANNELS:
-            painter.setPen(QPen(QColor(ROLE_COLOURS[role]), 1.6, style))
-            painter.drawLine(QPointF(x, 11.0), QPointF(x + 16.0, 11.0))
-            painter.drawText(QRectF(x + 20.0, 2.0, 16.0, 18.0), Qt.AlignmentFlag.AlignCenter, name)
-            x += 42.0
-        painter.setPen(QColor(ROLE_COLOURS["info"]))
-        text = QRectF(x, 2.0, self.width() - x - MARGIN_PX, 18.0)
-        painter.drawText(text, Qt.AlignmentFlag.AlignRight, tr("0 to 100 %"))
+        if counts is None:
+            counts = np.zeros((3, 1), np.int64)
+        # The end of the scale, where a pixel is saturated, goes down to the axis again.
+        brightness = np.append(np.linspace(0.0, 100.0, counts.shape[1]), 100.0)
+        for curve, channel in zip(self._curves, counts, strict=True):
+            curve.setData(brightness, np.log1p(np.append(channel, 0)))
+        self.setYRange(0.0, 1.4 * max(float(np.log1p(counts.max())), 1.0), padding=0.0)

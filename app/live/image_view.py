@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
+from PySide6.QtCore import QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QResizeEvent
 
 from app.live.drawing import OverlayItem
-from app.view2d.display import SURROUND
-from app.widgets.label import placeholder
+from app.view2d.fitted_view import FittedView
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -29,9 +28,10 @@ FLASH = QColor(255, 255, 255, 150)
 class _Box(pg.ViewBox):  # type: ignore[misc]
     """A view box that passes on drags with the left button if requested."""
 
-    def __init__(self, on_dragged: Callable[[str, float, float], object]) -> None:
+    def __init__(self) -> None:
         super().__init__(lockAspect=1.0, invertY=True, enableMenu=False)
-        self.hands_drags_on, self._on_dragged = False, on_dragged
+        self.hands_drags_on = False
+        self.on_dragged: Callable[[str, float, float], object]
 
     def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
         if not self.hands_drags_on or event.button() != Qt.MouseButton.LeftButton:
@@ -44,16 +44,14 @@ class _Box(pg.ViewBox):  # type: ignore[misc]
 
     def _report(self, phase: str, at: Any) -> None:
         position = self.mapToView(at)
-        self._on_dragged(phase, position.x(), position.y())
+        self.on_dragged(phase, position.x(), position.y())
 
 
-class ImageView(pg.GraphicsView):  # type: ignore[misc]
+class ImageView(FittedView):
     """Shows an image and an overlay.
 
     Signals
     -------
-    pointed(float, float)
-        Image pixel (u, v) under the pointer; NaN if there is none.
     clicked(float, float)
         A left click on the image.
     dragged(str, float, float)
@@ -65,32 +63,22 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         The size of the view changed.
     """
 
-    pointed = Signal(float, float)
     clicked = Signal(float, float)
     dragged = Signal(str, float, float)
     zoomed = Signal(float)
     resized = Signal()
 
     def __init__(self) -> None:
-        super().__init__(background=SURROUND)
+        super().__init__(_Box())
+        self.box.on_dragged = self.dragged.emit
         named(self, "live.image", tr("Live image"))
-        # Keys belong to the whole live view, which handles those of tools and handles.
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._size = self._drawn = (0, 0)
-        self._fitted = True
-        self._box = _Box(self.dragged.emit)
-        self._box.disableAutoRange()
-        self.setCentralItem(self._box)
-        self._image = pg.ImageItem(axisOrder="row-major")
-        self._box.addItem(self._image, ignoreBounds=True)
+        self.setCentralItem(self.box)
         self.overlay = OverlayItem()
         self.overlay.setZValue(10)
-        self._box.addItem(self.overlay, ignoreBounds=True)
-        self._box.sigRangeChangedManually.connect(self._on_moved_by_hand)
-        self._box.sigRangeChanged.connect(self._on_range)
-        self.scene().sigMouseMoved.connect(self._on_pointer)
-        self.scene().sigMouseClicked.connect(self._on_click)
-        self._placeholder = placeholder(self, tr("No camera. Select a source."))
+        self.box.addItem(self.overlay, ignoreBounds=True)
+        self.box.sigRangeChanged.connect(self._on_range)
+        self._words.setText(tr("No camera. Select a source."))
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -100,7 +88,7 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
     @property
     def scale_px(self) -> float:
         """Screen pixels per image pixel."""
-        width, _ = self._box.viewPixelSize()
+        width, _ = self.box.viewPixelSize()
         return float(self.devicePixelRatioF() / width) if width > 0.0 else 1.0
 
     def show_rgb(
@@ -111,36 +99,29 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         A reduced image has the `size` (width, height) of its original; positions are pixels of the
         original.
         """
-        self._placeholder.setVisible(rgb is None)
+        self._words.setVisible(rgb is None)
         if rgb is None:
             self._image.clear()
             self._size = self._drawn = (0, 0)
+            self._extent = QRectF()
             self.zoomed.emit(math.nan)
             return
         self._image.setImage(rgb, autoLevels=False)
         size = size or (rgb.shape[1], rgb.shape[0])
         drawn = (rgb.shape[1], rgb.shape[0])
-        if drawn != self._drawn:
+        # Half a pixel: (0, 0) is the centre of the first pixel, not its corner.
+        extent = QRectF(-0.5, -0.5, *size)
+        if (drawn, size) != (self._drawn, self._size):
             self._drawn = drawn
-            self._image.setRect(QRectF(-0.5, -0.5, *size))
+            self._image.setRect(extent)
         if size != self._size:
             self._size = size
-            # Half a pixel: (0, 0) is the centre of the first pixel, not its corner.
-            self._image.setRect(QRectF(-0.5, -0.5, *size))
             # Far enough out for full size in any window, but the image must not get lost.
-            reach = max(4.0 * max(size), 8000.0)
-            self._box.setLimits(
-                minXRange=6.0,
-                xMin=-reach,
-                xMax=size[0] + reach,
-                yMin=-reach,
-                yMax=size[1] + reach,
-            )
-            self.fit()
+            self._show_extent(extent, beyond=max(4.0 * max(size), 8000.0), least=6.0)
 
     def hand_drags_on(self, on: bool) -> None:
         """Emit drags with the left button instead of panning; the middle button still pans."""
-        self._box.hands_drags_on = on
+        self.box.hands_drags_on = on
 
     def flash(self) -> None:
         """Brighten the view for a moment."""
@@ -149,13 +130,7 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
 
     def say(self, text: str) -> None:
         """Change the text that is shown when there is no image."""
-        self._placeholder.setText(text)
-
-    def fit(self) -> None:
-        """Show the whole image, also after the view's size changes."""
-        self._fitted = True
-        if self._size != (0, 0):
-            self._box.setRange(QRectF(-0.5, -0.5, *self._size), padding=0.0)
+        self._words.setText(text)
 
     def full_size(self) -> None:
         """Show one image pixel on one screen pixel, keeping the centre of the view."""
@@ -169,44 +144,35 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         if self._size == (0, 0):
             return
         self._fitted = False
-        middle = self._box.viewRect().center()
-        width = self._box.width() * self.devicePixelRatioF() / scale
-        height = self._box.height() * self.devicePixelRatioF() / scale
-        self._box.setRange(
+        middle = self.box.viewRect().center()
+        width = self.box.width() * self.devicePixelRatioF() / scale
+        height = self.box.height() * self.devicePixelRatioF() / scale
+        self.box.setRange(
             QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height), padding=0.0
         )
 
     def view_position(self, u: float, v: float) -> tuple[float, float]:
         """Return where a point of the image is in this widget, in points."""
-        at = self.mapFromScene(self._box.mapViewToScene(pg.Point(u, v)))
+        at = self.mapFromScene(self.box.mapViewToScene(pg.Point(u, v)))
         return float(at.x()), float(at.y())
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
-        if not hasattr(self, "_placeholder"):  # the base class resizes itself in its constructor
-            super().resizeEvent(event)
-            return
-        scale = self.scale_px
+        self._scale_before = self.scale_px if hasattr(self, "_words") else 1.0
         super().resizeEvent(event)
-        self._placeholder.setGeometry(self.rect().adjusted(20, 20, -20, -20))
+
+    def _on_resized(self) -> None:
         if self._fitted:
             self.fit()
         else:
-            self._scale_to(scale)
+            self._scale_to(self._scale_before)
         self.resized.emit()
-
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102
-        super().leaveEvent(event)
-        self.pointed.emit(math.nan, math.nan)
-
-    def _on_moved_by_hand(self, *_: Any) -> None:
-        self._fitted = False
 
     def _on_range(self, *_: Any) -> None:
         self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, self.scale_px < SQUARES_FROM)
         self.zoomed.emit(self.scale_px if self._size != (0, 0) else math.nan)
 
     def _on_pointer(self, at: Any) -> None:
-        position = self._box.mapSceneToView(at)
+        position = self.box.mapSceneToView(at)
         self.pointed.emit(position.x(), position.y())
 
     def _on_click(self, event: Any) -> None:
@@ -215,5 +181,5 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         if event.double():
             self.fit()
             return
-        position = self._box.mapSceneToView(event.scenePos())
+        position = self.box.mapSceneToView(event.scenePos())
         self.clicked.emit(position.x(), position.y())

@@ -9,12 +9,12 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QPainter, QResizeEvent
+from PySide6.QtGui import QColor, QFont, QPainter
 
 from app.theme import theme
 from app.view2d.colour_bar import TEXT_FILL, ColourBar
 from app.view2d.display import SURROUND
-from app.widgets.label import placeholder
+from app.view2d.fitted_view import FittedView
 from app.widgets.naming import named
 from app.widgets.plots import own_plot_menus
 from app.widgets.units import length_text, round_length_mm
@@ -44,7 +44,7 @@ def extent_of(grid: HeightMap | MembraneGrid) -> Extent:
     )
 
 
-class MapView(pg.GraphicsView):  # type: ignore[misc]
+class MapView(FittedView):
     """Shows an image over an extent, x right and y down, in mm of the sensor frame or in pixels.
 
     Parameters
@@ -63,34 +63,25 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
 
     Signals
     -------
-    pointed(float, float)
-        Position (x, y) under the pointer, mm; NaN where there is none.
     bar_double_clicked()
         The colour bar was double-clicked.
     """
 
-    pointed = Signal(float, float)
     bar_double_clicked = Signal()
+    padding = 0.01
 
     def __init__(
         self, name: str, accessible: str, *, limits: tuple[float, float] | None = None
     ) -> None:
-        super().__init__()
+        super().__init__(pg.ViewBox(lockAspect=1.0, invertY=True, enableMenu=False))
         named(self, name, accessible)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setMinimumSize(120, 100)
         self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, True)
-        self._extent = QRectF()
-        self._fitted = True
-        self.box = pg.ViewBox(lockAspect=1.0, invertY=True, enableMenu=False)
         self.box.setBackgroundColor(SURROUND)
-        self.box.disableAutoRange()
         self._plot = pg.PlotItem(viewBox=self.box)
         self.bar = ColourBar(limits)
         for item in (self._plot, self.bar):
             own_plot_menus(item, self)
-        self._image = pg.ImageItem(axisOrder="row-major")
-        self.box.addItem(self._image, ignoreBounds=True)
         self._lines = self._make_cursor()
         self._scale = _RoundScaleBar(self.box)
         self._outline = pg.PlotCurveItem(pen=pg.mkPen(CURSOR, width=2))
@@ -98,7 +89,6 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         self._in_mm = True
         self._unit = pg.LabelItem()
         self._lay_out()
-        self._words = placeholder(self)
         self.shown_images = 0
         self._apply_theme()
         self._connect()
@@ -135,11 +125,8 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         self.setCentralItem(plot)
 
     def _connect(self) -> None:
-        self.box.sigRangeChangedManually.connect(self._on_moved_by_hand)
         self.box.sigRangeChanged.connect(self._scale.follow)
         self.box.sigResized.connect(self._on_box_resized)
-        self.scene().sigMouseMoved.connect(self._on_pointer)
-        self.scene().sigMouseClicked.connect(self._on_click)
 
     def set_image(self, rgb: NDArray[np.uint8], extent: Extent, *, in_mm: bool = True) -> None:
         """Show an image over an extent in mm, or in pixels of the camera image."""
@@ -154,19 +141,10 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         if self._image.boundingRect().size() != area.size() or area != self._extent:
             self._image.setRect(area)
         if area != self._extent:
-            self._extent = area
             self._words.hide()
             self._show_scales(True)
             beyond = 40.0 + max(area.width(), area.height())
-            reach = area.adjusted(-beyond, -beyond, beyond, beyond)
-            self.box.setLimits(
-                minXRange=0.2,
-                xMin=reach.left(),
-                xMax=reach.right(),
-                yMin=reach.top(),
-                yMax=reach.bottom(),
-            )
-            self.fit()
+            self._show_extent(area, beyond=beyond, least=0.2)
 
     def show_outline(self, outline: NDArray[np.float64] | None) -> None:
         """Draw a closed line (N, 2) over the image. None: no line."""
@@ -184,11 +162,6 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         if words != self.accessibleDescription():
             self.setAccessibleDescription(words)
 
-    @property
-    def has_image(self) -> bool:
-        """Whether an image is shown, not a text."""
-        return not self._extent.isNull()
-
     def say(self, text: str) -> None:
         """Show a text instead of the image, without axes and colour bar."""
         self._image.clear()
@@ -198,12 +171,6 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         self._words.setText(text)
         self._words.show()
 
-    def fit(self) -> None:
-        """Show the whole extent, also after the view's size changes."""
-        self._fitted = True
-        if not self._extent.isEmpty():
-            self.box.setRange(self._extent, padding=0.01)
-
     def show_cursor(self, x_mm: float, y_mm: float) -> None:
         """Mark a position. NaN: none."""
         there = math.isfinite(x_mm) and math.isfinite(y_mm)
@@ -212,20 +179,12 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
             if there:
                 line.setValue(value)
 
-    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
-        super().resizeEvent(event)
-        # The base class resizes itself during its construction and after closing.
-        if hasattr(self, "_words") and not self.closed:
-            self._words.setGeometry(self.rect().adjusted(16, 16, -16, -16))
-            self._show_scales(self.has_image)
-
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102
-        super().leaveEvent(event)
-        self.pointed.emit(math.nan, math.nan)
+    def _on_resized(self) -> None:
+        self._show_scales(self.has_image)
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_words"):
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "shown_images"):
             self._apply_theme()
 
     def _apply_theme(self) -> None:
@@ -252,9 +211,6 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         if self._fitted:
             self.fit()
         self._scale.follow()
-
-    def _on_moved_by_hand(self, *_: Any) -> None:
-        self._fitted = False
 
     def _on_pointer(self, at: QPointF) -> None:
         position = self.box.mapSceneToView(at)

@@ -187,10 +187,10 @@ def _masked(heightmap: HeightMap, processing: Processing) -> HeightMap:
 
 
 def _inside(heightmap: HeightMap, rectangle: Rectangle) -> NDArray[np.bool_]:
-    (x, y), (wide, high) = rectangle.centre_mm, rectangle.sides_mm
-    across = np.abs(heightmap.x_mm - x) <= 0.5 * wide
-    down = np.abs(heightmap.y_mm - y) <= 0.5 * high
-    return np.asarray(down[:, None] & across)
+    x_mm, y_mm = (np.asarray(v, np.float64) for v in (heightmap.x_mm, heightmap.y_mm))
+    along, across = rectangle.from_centre(x_mm, y_mm[:, None])
+    first, second = rectangle.sides_mm
+    return np.asarray((np.abs(along) <= 0.5 * first) & (np.abs(across) <= 0.5 * second))
 
 
 def _levelled(heightmap: HeightMap, processing: Processing) -> HeightMap:

@@ -15,12 +15,15 @@ from PIL import Image
 from PySide6.QtWidgets import QProgressDialog
 
 from app.view3d.scene import Scene
+from app.view3d.style import Ink
 from app.view3d.surface import Surface
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8]
+LETTERS, LEAST_PT = 40, 16
+"""Lines of letters that would fill a printed image, and the smallest letters."""
 
 
 class Studio:
@@ -32,12 +35,14 @@ class Studio:
         The original, with its viewpoint.
     size : (width, height)
         In pixels.
+    paper : bool, optional
+        For a printed page: white background, large letters.
     """
 
-    def __init__(self, scene: Scene, size: tuple[int, int]) -> None:
+    def __init__(self, scene: Scene, size: tuple[int, int], *, paper: bool = False) -> None:
         self._plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
         self.scene = Scene(self._plotter)
-        scene.copy_to(self.scene)
+        scene.copy_to(self.scene, Ink(font=max(min(size) // LETTERS, LEAST_PT)) if paper else None)
         # A saved image has no measuring tools, so it gets a scale bar.
         self.scene.set_style(replace(scene.style, scale_bar=True))
         self.scene.viewpoint = scene.viewpoint
@@ -63,18 +68,20 @@ class Studio:
 
 
 @contextmanager
-def studio(scene: Scene, size: tuple[int, int]) -> Iterator[Studio]:
+def studio(scene: Scene, size: tuple[int, int], *, paper: bool = False) -> Iterator[Studio]:
     """Open a studio and close it at the end."""
-    opened = Studio(scene, size)
+    opened = Studio(scene, size, paper=paper)
     try:
         yield opened
     finally:
         opened.close()
 
 
-def image_of(scene: Scene, size: tuple[int, int], *, transparent: bool = False) -> Rgb:
+def image_of(
+    scene: Scene, size: tuple[int, int], *, transparent: bool = False, paper: bool = False
+) -> Rgb:
     """Return the scene as an image of any size, with axes, colour bar and scale bar."""
-    with studio(scene, size) as opened:
+    with studio(scene, size, paper=paper) as opened:
         return opened.draw(transparent=transparent)
 
 

@@ -335,6 +335,6 @@ class Interactor(QtInteractor):  # type: ignore[misc]
 
     def _follow_theme(self) -> None:
         low, high = ("base", "button") if theme.is_dark() else ("alternate", "base")
-        names = (theme.colour(name).name() for name in (low, high, "text", "line"))
-        self.scene.set_ink(Ink(*names))
+        below, above, text = (theme.colour(name).name() for name in (low, high, "text"))
+        self.scene.set_ink(Ink(below, above, text))
         self.update()

@@ -93,10 +93,10 @@ def draw_pins(plotter: Plotter, points: Array, text: str, ink: Ink) -> None:
     plotter.add_point_labels(
         points, list(PIN_NAMES[: len(points)]), name="pins", point_color=PIN, point_size=10,
         shape_color=PIN, shape_opacity=1.0, render_points_as_spheres=True, always_visible=True,
-        font_size=FONT + 1, text_color="black", margin=3, reset_camera=False, render=False,
+        font_size=ink.font + 1, text_color="black", margin=3, reset_camera=False, render=False,
     )  # fmt: skip
     plotter.add_text(
-        text, position="lower_right", font_size=FONT - 2, color=ink.text, name="pin-text",
+        text, position="lower_right", font_size=ink.font - 2, color=ink.text, name="pin-text",
         render=False,
     )  # fmt: skip
     if len(points) == len(PIN_NAMES):
@@ -123,7 +123,6 @@ def draw_solid(plotter: Plotter, solid: pv.PolyData | None, exaggeration: float)
 
 Box = tuple[float, float, float, float, float, float]
 Plotter: TypeAlias = BasePlotter
-FONT = 11
 
 
 def box_of(surface: Surface, exaggeration: float) -> Box:
@@ -157,7 +156,7 @@ def draw_axes(plotter: Plotter, box: Box, style: Style, ink: Ink) -> None:
     )  # fmt: skip
     plotter.add_point_labels(
         points, texts, name="axes-labels", shape=None, show_points=False,
-        font_size=FONT + 1, text_color=ink.text, bold=False, justification_horizontal="center",
+        font_size=ink.font + 1, text_color=ink.text, bold=False, justification_horizontal="center",
         justification_vertical="center", reset_camera=False, render=False,
     )  # fmt: skip
 
@@ -212,14 +211,14 @@ def draw_scale(
     bar = plotter.add_scalar_bar(
         title, mapper=mapper, vertical=True, n_labels=0 if scale.names else 5,
         fmt="{:.4g}", color=ink.text, position_x=0.015, position_y=0.55, width=0.14, height=0.42,
-        title_font_size=FONT + 1, label_font_size=FONT + 1, unconstrained_font_size=True,
+        title_font_size=ink.font + 1, label_font_size=ink.font + 1, unconstrained_font_size=True,
         render=False,
     )  # fmt: skip
     bar.SetBarRatio(0.2)
     bar.SetDrawAnnotations(bool(scale.names))
     if scale.names:
         bar.SetTextPositionToPrecedeScalarBar()  # puts the names on the other side
-    bar.GetAnnotationTextProperty().SetFontSize(FONT)
+    bar.GetAnnotationTextProperty().SetFontSize(ink.font)
     bar.GetAnnotationTextProperty().SetColor(pv.Color(ink.text).float_rgb)
 
 
@@ -229,7 +228,7 @@ def draw_note(plotter: Plotter, style: Style, ink: Ink) -> None:
     if style.exaggeration != 1.0:
         plotter.add_text(
             tr("Depth scaled {k:g} times").format(k=style.exaggeration), position="lower_left",
-            font_size=FONT - 3, color=ink.text, name="note", render=False,
+            font_size=ink.font - 3, color=ink.text, name="note", render=False,
         )  # fmt: skip
 
 
@@ -249,6 +248,6 @@ def draw_scale_bar(plotter: Plotter, box: Box, style: Style, ink: Ink) -> None:
     plotter.add_point_labels(
         [(box[0] + 0.5 * length, y - 0.07 * side, 0.0)], [length_text(length)],
         shape=None,
-        name="scale-bar-length", font_size=FONT + 4, text_color=ink.text, show_points=False,
+        name="scale-bar-length", font_size=ink.font + 4, text_color=ink.text, show_points=False,
         always_visible=True, reset_camera=False, render=False,
     )  # fmt: skip

@@ -82,6 +82,7 @@ class ViewSaving:
             self._panel.view.scene,
             (choice.width_px, choice.height_px),
             transparent=choice.transparent,
+            paper=choice.paper,
         )
         try:
             write_atomically(path, lambda file: Image.fromarray(np.asarray(rgb)).save(file, "PNG"))
@@ -166,6 +167,12 @@ class ImageChoice:
     )
     transparent: bool = switch(
         False, "", tr("Transparent background"), when=lambda c: c.what == "surface"
+    )
+    paper: bool = switch(
+        False,
+        "",
+        tr("For print: white background, large letters"),
+        when=lambda c: c.what == "surface",
     )
 
 

@@ -263,9 +263,9 @@ class Scene:
         camera.parallel_projection = viewpoint.parallel
         self._plotter.renderer.ResetCameraClippingRange()
 
-    def copy_to(self, other: Scene) -> None:
+    def copy_to(self, other: Scene, ink: Ink | None = None) -> None:
         """Show the same content in another scene, from the same viewpoint."""
-        other.set_ink(self._ink)
+        other.set_ink(ink or self._ink)
         if self.surface is not None:
             other.show_surface(self.surface)
         other.set_style(self.style)

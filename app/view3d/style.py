@@ -47,12 +47,12 @@ class Style:
 
 @dataclass(frozen=True, slots=True)
 class Ink:
-    """Colours of the background, from bottom to top, of text and of grid lines."""
+    """Colours of the background, from bottom to top, and of text, and the size of letters."""
 
     low: str = "white"
     high: str = "white"
     text: str = "black"
-    grid: str = "grey"
+    font: int = 11
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,6 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.measurement.evaluation_run import press_measurement
 from gelpolight_core.measurement.indenter_tools import Cylinder
-from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
@@ -44,8 +43,8 @@ def test_a_failed_calibration_makes_every_measurement_doubtful(
     reconstructor = Reconstructor(calibration)
     press = press_measurement(reconstructor)(path, "cylinder")
     heightmap = reconstructor.depth(read_image(path).rgb)
-    on_page = apply_tool(Cylinder(), heightmap)
-    assert isinstance(on_page, ToolResult)
+    on_page = apply_tool(Cylinder(), heightmap).result
+    assert on_page is not None
     assert on_page.measurement is not None
     for result in (press, on_page, on_page.measurement):
         assert ("41.7 %" in result.reason) is doubtful

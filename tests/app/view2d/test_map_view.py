@@ -9,6 +9,7 @@ from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.inspect.section_line import SectionMarks
 from app.live.frame_results import Maker, Shown, Wanted
 from app.live.height_panel import HeightPanel
 from app.sources.source import Frame
@@ -125,12 +126,12 @@ def shown(dome: HeightMap) -> Shown:
 
 @pytest.fixture
 def panel(qtbot: QtBot, shown: Shown) -> HeightPanel:
-    made = HeightPanel(adjustable=True)
+    made = HeightPanel(SectionMarks(lambda: None, lambda: None), adjustable=True)
     qtbot.addWidget(made)
     made.resize(420, 420)
     made.show()
     qtbot.waitExposed(made)
-    made.show_frame(shown, "viridis", still=False)
+    made.show_frame(shown, still=False)
     qtbot.wait(50)
     return made
 
@@ -144,7 +145,7 @@ def _ends(panel: HeightPanel) -> tuple[QPointF, QPointF, float]:
 
 def test_the_upper_end_is_dragged_to_a_larger_depth(panel: HeightPanel) -> None:
     ranges: list[tuple[float, float]] = []
-    panel.range_dragged.connect(lambda low, high: ranges.append((low, high)))
+    panel.map.bar.range_dragged.connect(lambda low, high: ranges.append((low, high)))
     _low, high, length = _ends(panel)
     _drag(panel.map, high, high - QPointF(0.0, 0.5 * length))
     assert ranges[-1] == panel.map.bar.levels()
@@ -156,11 +157,11 @@ def test_frames_do_not_move_an_end_that_is_being_dragged(panel: HeightPanel, sho
     _drag(panel.map, high, high - QPointF(0.0, 0.5 * length), drop=False)
     dragged = panel.map.bar.levels()
     assert dragged[1] > 1.5
-    panel.show_frame(shown, "viridis", still=False)
+    panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == dragged
     _mouse(
         panel.map, QEvent.Type.MouseButtonRelease, high - QPointF(0.0, 0.5 * length),
         Qt.MouseButton.NoButton,
     )  # fmt: skip
-    panel.show_frame(shown, "viridis", still=False)
+    panel.show_frame(shown, still=False)
     assert panel.map.bar.levels() == shown.range_mm

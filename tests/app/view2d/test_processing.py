@@ -57,6 +57,15 @@ def test_each_mask_keeps_what_its_name_says(dome: HeightMap) -> None:
         np.testing.assert_array_equal(usable(done.heightmap), usable(flagged) & expected)
 
 
+def test_a_turned_rectangle_keeps_what_it_outlines(dome: HeightMap) -> None:
+    (x, y), (first, second) = RECTANGLE.centre_mm, RECTANGLE.sides_mm
+    turned = Rectangle((x, y), (second, first), 90.0)
+    upright, same = (
+        processed(dome, Processing(mask="inside", rectangle=area)) for area in (RECTANGLE, turned)
+    )
+    np.testing.assert_array_equal(usable(upright.heightmap), usable(same.heightmap))
+
+
 def test_a_median_removes_single_points_and_both_steps_are_named(tilted: HeightMap) -> None:
     depth = tilted.depth_mm.copy()
     depth[60, 60] = 3.0

@@ -16,6 +16,7 @@ from app.services.settings import Settings
 from app.view3d.images import image_of, write_movie
 from app.view3d.panel import SurfacePanel
 from app.view3d.saving import ImageChoice, MovieChoice, ViewSaving
+from app.view3d.style import Ink
 from gelpolight_core.errors import InputError
 from tests.app.view3d.conftest import Made, pixels
 
@@ -65,6 +66,14 @@ def test_a_transparent_image_has_no_background(
     assert alpha.shape == (300, 400)
     assert alpha[2, 2] == 0 and (alpha == 255).sum() > 4_000
     assert reported == ["pass"]
+
+
+def test_a_printed_image_has_a_white_background_and_large_letters(panel: SurfacePanel) -> None:
+    assert panel.view is not None
+    panel.view.scene.set_ink(Ink("#101010", "#202020", "#ffffff"))
+    plain, printed = (image_of(panel.view.scene, (800, 640), paper=on) for on in (False, True))
+    assert (printed[2, 2] == 255).all() and plain[2, 2].max() < 64
+    assert (printed.max(axis=2) < 60).sum() > (plain.min(axis=2) > 200).sum()
 
 
 def test_the_image_is_copied(panel: SurfacePanel, saving: ViewSaving) -> None:
