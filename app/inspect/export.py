@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QDialogButtonBox, QSpinBox, QWidget
 
 from app.context.context import AppContext
+from app.live.banner import SHOWN_FROM
 from app.live.depth import LiveDepth
 from app.services.jobs import Job, Jobs
 from app.sources.recording import RecordingSource
@@ -83,15 +84,15 @@ def frame_name(frame: Frame, source: Source | None, *, processed: bool = False) 
     return f"{name}-processed.png" if processed else f"{name}.png"
 
 
-def export_frame(heightmap: HeightMap, choice: ExportChoice, name: str) -> list[Path]:
-    """Write the height map of one frame."""
-    return _write(replace(heightmap, source=name), choice)
-
-
-def _write(heightmap: HeightMap, choice: ExportChoice) -> list[Path]:
-    return write_heightmap(
-        heightmap, Path(choice.folder), formats=choice.formats, stride=choice.stride
-    )
+def export_frame(
+    heightmap: HeightMap, choice: ExportChoice, name: str, progress: Callable[[float], None]
+) -> list[Path]:
+    """Write the height map of one frame; report the progress from the beginning."""
+    named, folder, written = replace(heightmap, source=name), Path(choice.folder), list[Path]()
+    for kind in choice.formats:
+        progress(max(len(written) / len(choice.formats), SHOWN_FROM))
+        written += write_heightmap(named, folder, formats=kind, stride=choice.stride)
+    return written
 
 
 def export_recording(
@@ -128,7 +129,9 @@ def export_recording(
             progress(done / len(choice.frames))
             frame = recording.frame(index)
             heightmap = reconstructor.depth(frame.rgb, name=f"{path.stem}-{index:05d}.png")
-            written += _write(heightmap, choice)
+            written += write_heightmap(
+                heightmap, Path(choice.folder), formats=choice.formats, stride=choice.stride
+            )
     finally:
         recording.close()
     return written
@@ -234,7 +237,7 @@ class ExportControl(QObject):
             name = frame_name(last.frame, self._depth.live.source, processed=bool(last.processed))
 
             def work(progress: Any) -> list[Path]:
-                return export_frame(heightmap, choice, name)
+                return export_frame(heightmap, choice, name, progress)
 
         else:
             return

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.widgets.fields import choice, number
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.rays import pixel_directions, trace_points
+from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.simulation.boards import BoardPose
@@ -19,15 +21,33 @@ if TYPE_CHECKING:
 BOARDS = ("checkerboard", "board_on_top")
 FLAT = ("mirror", "whiteboard", "bare")
 PRESSED = ("ball", "cylinder", "cuboid", "coin", "nut")
-ITEMS = (*BOARDS, *FLAT, *PRESSED)
+ITEMS = {
+    "checkerboard": tr("Checkerboard, hand-held"),
+    "board_on_top": tr("Checkerboard on the top surface"),
+    "mirror": tr("Mirror"),
+    "whiteboard": tr("Whiteboard"),
+    "bare": tr("Bare membrane"),
+    "ball": tr("Ball"),
+    "cylinder": tr("Cylinder"),
+    "cuboid": tr("Cuboid"),
+    "coin": tr("Coin"),
+    "nut": tr("Nut"),
+}
+"""The label of each object that can be on the sensor."""
 
-FAULTS = (
-    "camera_stops", "room_light", "membrane_on", "too_bright", "led_off", "defocused", "dust",
-)  # fmt: skip
-"""Faults that can be switched on: the camera stops delivering images; light from the room falls in;
-the membrane is still mounted under the mirror; three times too much light; the blue LED is dead;
-the lens is out of focus; dust in the light path.
-"""
+FAULTS = {
+    "camera_stops": (
+        tr("Camera failure"),
+        tr("No more images arrive, as with an unplugged cable"),
+    ),
+    "room_light": (tr("Room light on"), tr("Light from outside falls into the sensor")),
+    "membrane_on": (tr("Membrane mounted"), tr("The membrane hides the mirror")),
+    "too_bright": (tr("Overexposed"), tr("Three times too much light")),
+    "led_off": (tr("Blue LED off"), tr("The blue LED gives no light")),
+    "defocused": (tr("Out of focus"), tr("The lens is turned away from its focus")),
+    "dust": (tr("Dust"), tr("Specks of dust between camera and membrane")),
+}
+"""Label and meaning of each fault that can be switched on."""
 
 STAGES = {
     "checkerboard": "checkerboard",
@@ -43,6 +63,25 @@ STAGES = {
 
 NOMINAL_EXPOSURE_MS = 10.0
 """At this exposure and gain 0 dB the images are as bright as the design specifies."""
+
+
+def _is_pressed(scene: Scene) -> bool:
+    return scene.item in PRESSED
+
+
+def _is_movable(scene: Scene) -> bool:
+    return scene.item not in FLAT
+
+
+def _can_turn(scene: Scene) -> bool:
+    """Whether a rotation is visible: not of a round object."""
+    return _is_movable(scene) and scene.item not in ("ball", "cylinder")
+
+
+# A coin that can be solved in seconds; the board in front of the lens may be anywhere in view.
+_LARGEST_MM = 12.0
+_DEEPEST_MM = 3.0
+_MM = " " + tr("mm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +103,13 @@ class Scene:
         Depth of its foremost point.
     """
 
-    item: str = "bare"
+    item: str = choice("bare", tr("On the sensor"), ITEMS)
     pose: int = 0
-    x_mm: float = 0.0
-    y_mm: float = 0.0
-    yaw_deg: float = 0.0
-    size_mm: float = 5.0
-    depth_mm: float = 1.0
+    x_mm: float = number(0.0, tr("x, right"), -100, 100, _MM, 2, step=0.1, when=_is_movable)
+    y_mm: float = number(0.0, tr("y, down"), -100, 100, _MM, 2, step=0.1, when=_is_movable)
+    yaw_deg: float = number(0.0, tr("Rotation"), -180, 180, "°", 1, when=_can_turn)
+    size_mm: float = number(5.0, tr("Size"), 0, _LARGEST_MM, _MM, 2, step=0.1, when=_is_pressed)
+    depth_mm: float = number(1.0, tr("Depth"), 0, _DEEPEST_MM, _MM, 2, step=0.01, when=_is_pressed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,23 +126,23 @@ class Conditions:
         Names of FAULTS that are switched on.
     """
 
-    exposure_ms: float = NOMINAL_EXPOSURE_MS
-    gain_db: float = 0.0
-    rate_hz: float = 30.0
-    noise: float = 1.0
-    faults: frozenset[str] = field(default_factory=frozenset)
+    exposure_ms: float = number(NOMINAL_EXPOSURE_MS, tr("Exposure"), 0.1, 100.0, " ms", 2, step=0.5)
+    gain_db: float = number(0.0, tr("Gain"), 0.0, 24.0, " dB", 1)
+    rate_hz: float = number(30.0, tr("Frame rate"), 1.0, 60.0, " Hz")
+    noise: float = number(
+        1.0,
+        tr("Noise"),
+        0.0,
+        5.0,
+        " " + tr("times"),
+        2,
+        step=0.1,
+        tip=tr("0 is no noise, 1 is the noise of the design"),
+    )
+    faults: frozenset[str] = frozenset()
 
 
-CONDITION_RANGES = {
-    "exposure_ms": (0.1, 100.0),
-    "gain_db": (0.0, 24.0),
-    "rate_hz": (1.0, 60.0),
-    "noise": (0.0, 5.0),
-}
-
-# A coin that can be solved in seconds; the board in front of the lens may be anywhere in view.
-_LARGEST_MM = 12.0
-_DEEPEST_MM = 3.0
+RANGES = {f.name: f.metadata["span"] for f in fields(Conditions) if f.metadata}
 
 _FIRST_POSITIONS: dict[str, dict[str, Any]] = {
     "board_on_top": {"x_mm": 0.35, "y_mm": -0.25, "yaw_deg": 14.0},
@@ -199,7 +238,7 @@ class Bench:
     def adjust(self, **values: float) -> Conditions:
         """Change exposure_ms, gain_db, rate_hz or noise; return the new conditions."""
         within = {
-            key: min(max(value, CONDITION_RANGES[key][0]), CONDITION_RANGES[key][1])
+            key: min(max(value, RANGES[key][0]), RANGES[key][1])
             for key, value in _finite(values).items()
         }
         with self._lock:

@@ -6,12 +6,12 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sources.bench import CONDITION_RANGES, NOMINAL_EXPOSURE_MS, Bench, Conditions
+from app.sources.bench import NOMINAL_EXPOSURE_MS, Bench, Conditions
 from app.sources.bench_faults import with_faults
 from app.sources.noise import NoiseLevel, noisy, rgb_of
 from app.sources.rendering import Renderer, Rendering
@@ -19,11 +19,8 @@ from app.sources.source import Frame, Rgb, Setting, SourceLost, closed
 from gelpolight_core.errors import Remedy
 from gelpolight_core.translation import tr
 
-_SETTINGS: dict[str, tuple[Callable[[], str], str, float]] = {
-    "exposure_ms": (lambda: tr("Exposure"), "ms", 0.1),
-    "gain_db": (lambda: tr("Gain"), "dB", 0.1),
-    "rate_hz": (lambda: tr("Frame rate"), "Hz", 1.0),
-}
+_SETTINGS = ("exposure_ms", "gain_db", "rate_hz")
+"""The conditions of the bench that a camera could set."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,11 +88,13 @@ class VirtualSource:
 
     def settings(self) -> tuple[Setting, ...]:
         """Return exposure, gain and frame rate."""
-        conditions = self.bench.conditions
-        return tuple(
-            Setting(key, label(), unit, *CONDITION_RANGES[key], step, getattr(conditions, key))
-            for key, (label, unit, step) in _SETTINGS.items()
-        )
+        found = []
+        for f in fields(Conditions):
+            if f.name in _SETTINGS:
+                meta, value = f.metadata, getattr(self.bench.conditions, f.name)
+                (low, high), unit = meta["span"], meta["unit"].strip()
+                found.append(Setting(f.name, meta["label"], unit, low, high, meta["step"], value))
+        return tuple(found)
 
     def close(self) -> None:
         """Stop rendering."""

@@ -11,6 +11,7 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialogButtonBox,
+    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QLineEdit,
@@ -95,6 +96,13 @@ class Form(QWidget, Generic[V]):
         self.show_value(replace(self.value, **values))  # type: ignore[type-var]
         for name, value in values.items():
             self.changed.emit(name, value)
+
+    def limit(self, name: str, low: float, high: float) -> None:
+        """Change the range of a number without a signal."""
+        made = self.inputs[name]
+        assert isinstance(made, QDoubleSpinBox)
+        with QSignalBlocker(made):
+            made.setRange(low, high)
 
     def show_row(self, name: str, on: bool) -> None:
         """Show or hide the row of a field."""

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 from shiboken6 import isValid
 
-from app.bench.bench_panel import BenchPanel, item_names
+from app.bench.bench_panel import BenchPanel
 from app.sources.bench import FAULTS, ITEMS, Bench
 from gelpolight_core.design.sensor_design import SensorDesign
 
@@ -55,7 +55,7 @@ def test_choosing_an_object_puts_it_on_the_sensor(
 ) -> None:
     choose(panel, item)
     assert bench.scene.item == item
-    assert find(panel, QComboBox, "item").currentText() == item_names()[item]
+    assert find(panel, QComboBox, "item").currentText() == ITEMS[item]
 
 
 def test_only_relevant_controls_are_shown(panel: BenchPanel) -> None:

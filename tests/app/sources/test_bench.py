@@ -17,7 +17,9 @@ BENCH = Bench(SensorDesign().scaled(0.25))
 NUMBERS = st.floats(-1e6, 1e6)
 
 
-@given(st.sampled_from(ITEMS), NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, st.integers(-50, 50))
+@given(
+    st.sampled_from(list(ITEMS)), NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, st.integers(-50, 50)
+)
 def test_everything_stays_within_its_range(
     item: str, x: float, y: float, yaw: float, size: float, depth: float, pose: int
 ) -> None:
