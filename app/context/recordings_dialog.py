@@ -8,15 +8,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QImage, QPixmap
-from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QListWidget,
-    QListWidgetItem,
-    QPushButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
+from app.widgets.buttons import push_button
+from app.widgets.dialog import Dialog, Kinds
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
@@ -72,7 +67,7 @@ def read_preview(path: Path) -> Preview:
         recording.close()
 
 
-class RecordingsDialog(QDialog):
+class RecordingsDialog(Dialog):
     """Lets the user choose a recording.
 
     Parameters
@@ -94,10 +89,7 @@ class RecordingsDialog(QDialog):
     other_wanted = Signal()
 
     def __init__(self, recordings: tuple[Path, ...], parent: QWidget) -> None:
-        super().__init__(parent)
-        named(self, "recordings", tr("Recordings"))
-        self.setWindowTitle(tr("Recordings"))
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        super().__init__(parent, "recordings", tr("Recordings"), Kinds.Cancel, once=True)
         self.list = named(QListWidget(self), "recordings.list", tr("Recordings, newest first"))
         self.list.setMinimumWidth(300)
         for path in recordings:
@@ -112,22 +104,15 @@ class RecordingsDialog(QDialog):
         self.text.setFixedWidth(PREVIEW.width())
         if not recordings:
             self.text.setText(tr("There are no recordings yet. Inspect has a Record button."))
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
-        self.play_button = named(QPushButton(tr("Play"), self), "recordings.play", tr("Play"))
+        self.play_button = push_button("recordings.play", tr("Play"), self.play_chosen)
         self.play_button.setDefault(True)
-        other = named(QPushButton(tr("Other file…"), self), "recordings.other", tr("Other file"))
-        self.other_button = other
-        buttons.addButton(self.play_button, QDialogButtonBox.ButtonRole.AcceptRole)
-        buttons.addButton(other, QDialogButtonBox.ButtonRole.ActionRole)
-        buttons.accepted.connect(self.play_chosen)
-        buttons.rejected.connect(self.reject)
-        other.clicked.connect(self.accept)
-        other.clicked.connect(self.other_wanted)
+        self.other_button = push_button(
+            "recordings.other", tr("Other file…"), self._ask_for_other, accessible=tr("Other file")
+        )
         self.list.currentItemChanged.connect(self._show_chosen)
         self.list.itemDoubleClicked.connect(lambda _: self.play_chosen())
-        right = vbox(self.image, self.text, None)
-        row = hbox((self.list, 1), right)
-        vbox((row, 1), buttons, of=self)
+        row = hbox((self.list, 1), vbox(self.image, self.text, None))
+        self.fill((row, 1), add=(self.play_button, self.other_button))
         self.list.setCurrentRow(0)
         self.play_button.setEnabled(bool(recordings))
 
@@ -137,6 +122,10 @@ class RecordingsDialog(QDialog):
         if item is not None:
             self.accept()
             self.chosen.emit(item.data(Qt.ItemDataRole.UserRole))
+
+    def _ask_for_other(self) -> None:
+        self.accept()
+        self.other_wanted.emit()
 
     def _show_chosen(self, item: QListWidgetItem | None) -> None:
         if item is None:

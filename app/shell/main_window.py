@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from PySide6.QtCore import QSize, Qt, QTimer, QUrl
 from PySide6.QtGui import (
@@ -44,8 +44,7 @@ from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet
 from app.shell.state_bar import FailedLine, StateBar
 from app.theme import theme
-from app.theme.icons import icon
-from app.widgets.label import plain_tip
+from app.widgets.actions import make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.units import use_length_unit
@@ -53,9 +52,6 @@ from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 from gelpolight_core.translation import tr
-
-if TYPE_CHECKING:
-    from app.shell.guide_window import GuideWindow
 
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 # Image sizes for which the kernels of the sources are compiled.
@@ -92,9 +88,7 @@ class MainWindow(QMainWindow):
         self.loader = Loader(self)
         self._made: dict[str, QWidget] = {}
         self._asked_for = ""
-        self._log_window: LogWindow | None = None
-        self._tools: dict[str, QDialog] = {}
-        self._guide: GuideWindow | None = None
+        self._kept_dialogs: dict[str, QDialog] = {}
         self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
         centre = QWidget()
         vbox(FailedLine(context.status), (self._stack, 1), of=centre, margins=0, spacing=0)
@@ -134,19 +128,18 @@ class MainWindow(QMainWindow):
         steps = [name for name in self.entries if name != "start"]
         for name, entry in self.entries.items():
             key = f"Ctrl+{steps.index(name) + 1}" if name in steps else "Ctrl+Home"
-            action = QAction(icon(entry.icon), entry.title, self)
-            action.setObjectName(f"navigation.{entry.name}")
+            show = partial(self.show_page, name)
+            action = make_action(
+                self, f"navigation.{name}", entry.title, show, keys=(key,), icon_name=entry.icon
+            )
             action.setCheckable(True)
-            action.setShortcut(key)
-            action.setToolTip(plain_tip(entry.title, key))
-            action.triggered.connect(lambda _=False, name=name: self.show_page(name))
             group.addAction(action)
             bar.addAction(action)
             button = bar.widgetForAction(action)
-            named(button, f"navigation.button.{entry.name}", entry.title)
+            named(button, f"navigation.button.{name}", entry.title)
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-            actions[entry.name] = action
+            actions[name] = action
         self.addToolBar(Qt.ToolBarArea.LeftToolBarArea, bar)
         return actions
 
@@ -344,10 +337,7 @@ class MainWindow(QMainWindow):
 
     def show_log(self) -> None:
         """Show the log."""
-        if self._log_window is None:
-            self._log_window = LogWindow(self.context.log, self)
-        self._log_window.show()
-        self._log_window.raise_()
+        self._show_kept("log", lambda: LogWindow(self.context.log, self))
 
     def show_preferences(self) -> None:
         """Show the preferences."""
@@ -389,7 +379,7 @@ class MainWindow(QMainWindow):
         """Show accuracy against run time on this machine."""
         from app.tools.precision_dialog import PrecisionDialog  # slow import
 
-        self._show_tool("precision", lambda: PrecisionDialog(context=self.context, parent=self))
+        self._show_kept("precision", lambda: PrecisionDialog(context=self.context, parent=self))
 
     def show_design(self) -> None:
         """Show the check of the virtual sensor's design."""
@@ -398,18 +388,20 @@ class MainWindow(QMainWindow):
 
         bench = self.context.source.bench
         design = SensorDesign() if bench is None else bench.design
-        self._show_tool("design", lambda: DesignDialog(design, context=self.context, parent=self))
+        self._show_kept("design", lambda: DesignDialog(design, context=self.context, parent=self))
 
     def show_stream(self) -> None:
         """Show what is sent to other programs, on the Inspect page."""
         self._with_page("inspect", lambda page: _call(page, "show_stream"))
 
-    def _show_tool(self, name: str, make: Callable[[], QDialog]) -> None:
-        """Show a dialog that keeps its results while the program runs."""
-        if name not in self._tools:
-            self._tools[name] = make()
-        self._tools[name].show()
-        self._tools[name].raise_()
+    def _show_kept(self, name: str, make: Callable[[], QDialog]) -> QDialog:
+        """Show a dialog that keeps its content while the program runs, and return it."""
+        if name not in self._kept_dialogs:
+            self._kept_dialogs[name] = make()
+        dialog = self._kept_dialogs[name]
+        dialog.show()
+        dialog.raise_()
+        return dialog
 
     def show_guide(self, page: str = "", heading: str = "") -> None:
         """Show the guide: what it says about the visible page, or another page and heading."""
@@ -422,11 +414,9 @@ class MainWindow(QMainWindow):
             )
             self.context.toasts.show(text, "warn")
             return
-        if self._guide is None:
-            self._guide = GuideWindow(folder, self)
-        self._guide.show()
-        self._guide.raise_()
-        self._guide.show_page(page or OF_PAGE.get(self.page_name, "index"), heading)
+        guide = self._show_kept("guide", lambda: GuideWindow(folder, self))
+        assert isinstance(guide, GuideWindow)
+        guide.show_page(page or OF_PAGE.get(self.page_name, "index"), heading)
 
     def open_board(self, square_mm: int) -> None:
         """Show a printable checkerboard in the PDF viewer of the desktop."""
@@ -468,12 +458,8 @@ class MainWindow(QMainWindow):
         self.context.toasts.clear()
         for page in self._made.values():
             page.close()
-        if self._log_window is not None:
-            self._log_window.close()
-        for dialog in self._tools.values():
+        for dialog in self._kept_dialogs.values():
             dialog.close()
-        if self._guide is not None:
-            self._guide.close()
         super().closeEvent(event)
 
 

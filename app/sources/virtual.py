@@ -7,18 +7,21 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.bench import NOMINAL_EXPOSURE_MS, Bench, Conditions
 from app.sources.bench_faults import with_faults
-from app.sources.noise import NoiseLevel, noisy, rgb_of
 from app.sources.rendering import Renderer, Rendering
 from app.sources.source import Frame, Rgb, Setting, SourceLost, closed
 from gelpolight_core.errors import Remedy
 from gelpolight_core.translation import tr
 
+NOISE_STARTS = 2**20
+"""Each image takes its noise from another of so many places: no two images have the same."""
 _SETTINGS = ("exposure_ms", "gain_db", "rate_hz")
 """The conditions of the bench that a camera could set."""
 
@@ -137,18 +140,38 @@ class VirtualSource:
 
     def _maker(self, signal: NDArray[np.float64], conditions: Conditions) -> Callable[[int], Rgb]:
         camera, seed = self.bench.design.camera, self._noise_seed
-        depth = camera.bit_depth
-        full = 2.0**depth - 1.0
+        full = 2.0**camera.bit_depth - 1.0
+        kind = np.uint8 if camera.bit_depth == 8 else np.uint16
         if conditions.noise == 0.0:
-            whole = np.rint(full * np.clip(signal, 0.0, 1.0))
-            quiet = rgb_of(whole.astype(np.uint8 if depth == 8 else np.uint16))
-            # Every frame has its own memory, as with a camera.
-            return lambda number: quiet.copy()
-        noise = NoiseLevel.of_camera(
-            camera, gain=_amplification(conditions), scale=conditions.noise
-        )
+            quiet = np.rint(full * np.clip(signal, 0.0, 1.0)).astype(kind)
+            return lambda number: _rgb(quiet)
         level = np.maximum(full * signal, 0.0).astype(np.float32)
-        return lambda number: noisy(level, noise, seed=seed + number, bit_depth=depth)
+        # Light and read noise are amplified alike: with the gain g, a signal s has the variance
+        # g shot_variance s + (g read_sd)^2.
+        gain, scale = full * _amplification(conditions), conditions.noise
+        variance = gain * scale**2 * camera.shot_variance * level
+        deviation = np.sqrt(variance + np.float32((gain * scale * camera.read_sd) ** 2))
+        noise = _standard_noise(level.size)
+
+        def make(number: int) -> Rgb:
+            start = np.random.default_rng(seed + number).integers(NOISE_STARTS)
+            values = deviation * noise[start : start + level.size].reshape(level.shape)
+            values += level
+            np.clip(np.rint(values, out=values), 0.0, full, out=values)
+            return _rgb(values.astype(kind))
+
+        return make
+
+
+@lru_cache(maxsize=1)
+def _standard_noise(size: int) -> NDArray[np.float32]:
+    """Return normal noise. New numbers for thirty images a second would take too long."""
+    return np.random.default_rng().standard_normal(size + NOISE_STARTS, dtype=np.float32)
+
+
+def _rgb(counts: NDArray[Any]) -> Rgb:
+    """Return three channels in memory of their own; they are equal if the counts are grey."""
+    return cast(Rgb, np.dstack([counts] * 3) if counts.ndim == 2 else counts.copy())
 
 
 def _amplification(conditions: Conditions) -> float:
