@@ -34,6 +34,7 @@ from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import SENSOR_RANGES, SensorData
 from gelpolight_core.translation import tr
+from gelpolight_core.validation import Validation
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -493,6 +494,8 @@ class Calibration:
         Quality table of every stage, in order.
     provenance : Provenance
         Origin of the calibration.
+    validation : Validation or None
+        On an object of known size, passed or not.
 
     Examples
     --------
@@ -508,6 +511,7 @@ class Calibration:
     data: SensorModel
     quality: Mapping[str, QualityTable]
     provenance: Provenance
+    validation: Validation | None = None
 
     @property
     def serial(self) -> str:

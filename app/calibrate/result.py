@@ -26,7 +26,6 @@ from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from app.workspace.report import stated_validation
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.missing import OPEN_FOLDERS
 from gelpolight_core.calibration.open_sensor import TOP_POSE
@@ -312,8 +311,10 @@ def write_report(path: Path, step: StepPresenter) -> None:
 
         run = project.finish()
         saved = workspace.entry_of(run.calibration.identity)
-        validation = None if saved is None else stated_validation(saved)
-        file.write_report(build.run_report(run, validation=validation), path)
+        if saved is not None:
+            calibration = replace(run.calibration, validation=saved.validation)
+            run = replace(run, calibration=calibration)
+        file.write_report(build.run_report(run), path)
 
     def done(_nothing: None) -> None:
         step.panel.show_notice(tr("Report saved as {path}").format(path=path), "pass")

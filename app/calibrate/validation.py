@@ -31,22 +31,22 @@ from app.widgets.layout import vbox
 from app.widgets.meaning import set_property, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import read_entry
-from app.workspace.validation import Validation, read_validation, write_validation
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
 from gelpolight_core.io.user import user_name
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.trust import judged
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
+from gelpolight_core.validation import Validation
 
 FRAMES = 4
 TRUTH = "truth.csv"
@@ -288,16 +288,7 @@ class ValidationStep(StepPresenter):
             self.use_calibration(str(min(found, key=lambda one: one[0])[1]))
 
     def _recorded(self) -> Validation | None:
-        if self._path is None:
-            return None
-        try:
-            found = read_validation(self._path)
-            if found is not None and found.identity != read_summary(self._path).identity:
-                return None  # it belongs to another calibration
-        except InputError as error:
-            self.context.toasts.show(str(error), "warn")
-            return None
-        return found
+        return None if self._path is None else read_entry(self._path).validation
 
     # Trials
 

@@ -9,8 +9,6 @@ from typing import Any
 from app.command_line.common import stage_progress
 from app.command_line.options import Command, option, output, place
 from app.command_line.terminal import say
-from app.workspace.entries import read_entry
-from app.workspace.report import stated_validation
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.missing import session_to_calibrate
 from gelpolight_core.calibration.project import calibrate
@@ -74,8 +72,6 @@ class WriteReport(Command):
             )
         calibration = read_calibration(self.source)
         validation = _validation(calibration, presses, progress)
-        if validation is None:
-            validation = stated_validation(read_entry(self.source))
         return calibration_report(calibration, validation=validation)
 
     def _of_session(self, presses: Path | None, progress: Any) -> Report:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 from app.services.preferences import Limits
 from app.widgets.fields import number
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.result import Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, verdict_of
 from gelpolight_core.translation import tr

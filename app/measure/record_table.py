@@ -7,7 +7,7 @@ from dataclasses import replace
 from app.measure.figures_text import unit_behind, unit_of, value_text
 from app.measure.placing import kind_label
 from app.widgets.cells_table import Cell
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord
 from gelpolight_core.records.evaluation_entry import SHAPE as EVALUATION
 from gelpolight_core.translation import tr

@@ -13,9 +13,9 @@ from app.measure.work import Work
 from app.services.preferences import Limits
 from app.widgets.units import length_unit, per_mm
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.translation import tr
 

@@ -24,7 +24,6 @@ from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.gel_care import presses_text, read_presses
-from app.workspace.report import write_entry_report
 from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
@@ -214,11 +213,18 @@ class SensorsPage(QWidget):
                 self._write_report(entry, path)
 
     def _write_report(self, entry: Entry, path: Path) -> None:
+        def work(_progress: object) -> None:
+            from gelpolight_core.calibration.file import read_calibration  # slow imports
+            from gelpolight_core.report.build import calibration_report
+            from gelpolight_core.report.file import write_report
+
+            write_report(calibration_report(read_calibration(entry.path)), path)
+
         self._show_busy(True)
         self._reports.submit(
             Job(
                 tr("Writing the report"),
-                lambda _progress: write_entry_report(entry, path),
+                work,
                 lambda _nothing: self._report_written(str(path)),
                 ended=lambda: self._show_busy(False),
                 must=True,

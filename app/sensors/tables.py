@@ -97,9 +97,9 @@ def validated_cell(entry: Entry) -> Cell:
     if entry.validated and trial is not None:
         tip = tr("{what}, {when}").format(what=trial.indenter, when=trial.when)
         return Cell(tr("validated"), "validated", "pass", tip, key=2)
-    if trial is not None and not entry.validation_note:
+    if trial is not None:
         return Cell(tr("failed"), "fail", "fail", trial.indenter, key=1)
-    return Cell(tr("not validated"), "", "muted", entry.validation_note, key=0)
+    return Cell(tr("not validated"), "", "muted", key=0)
 
 
 def _in_use(entry: Entry) -> Cell:

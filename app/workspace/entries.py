@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
-from app.workspace.validation import Validation, read_validation
 from gelpolight_core.calibration.manifest import CalibrationSummary, read_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
+from gelpolight_core.io.reading import parse_time
 from gelpolight_core.translation import tr
+from gelpolight_core.validation import Validation
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +26,6 @@ class Entry:
         Its description. None if it cannot be read.
     broken : str
         Why it cannot be read. Empty for a good file.
-    validation : Validation or None
-        Its validation, passed or not.
-    validation_note : str
-        Why the validation file is ignored: damaged, or of another calibration.
     in_use : bool
         Whether it is the calibration in use.
     """
@@ -36,8 +33,6 @@ class Entry:
     path: Path
     summary: CalibrationSummary | None
     broken: str = ""
-    validation: Validation | None = None
-    validation_note: str = ""
     in_use: bool = False
 
     @property
@@ -51,14 +46,14 @@ class Entry:
         return self.path.parent.name if self.summary is None else self.summary.serial
 
     @property
+    def validation(self) -> Validation | None:
+        """Its validation, passed or not."""
+        return None if self.summary is None else self.summary.validation
+
+    @property
     def validated(self) -> bool:
         """Whether this calibration passed validation on an object of known size."""
-        return (
-            self.summary is not None
-            and self.validation is not None
-            and self.validation.identity == self.summary.identity
-            and self.validation.passed
-        )
+        return self.validation is not None and self.validation.passed
 
     @property
     def failed(self) -> bool:
@@ -83,52 +78,17 @@ class Entry:
         return None if made is None else max(0.0, (now - made).total_seconds() / 86400.0)
 
 
-def parse_time(text: str) -> datetime | None:
-    """Read an ISO 8601 time. Without a time zone it counts as UTC. Invalid text gives None."""
-    try:
-        time = datetime.fromisoformat(text)
-    except ValueError:
-        return None
-    return time if time.tzinfo is not None else time.replace(tzinfo=UTC)
-
-
 def read_entry(path: Path, *, in_use: bool = False) -> Entry:
     """Return the library entry of a calibration file, including broken ones."""
     try:
-        summary = read_summary(path)
+        return Entry(path, read_summary(path), in_use=in_use)
     except InputError as error:
         return Entry(path, None, broken=f"{error.found}. {error.advice}.", in_use=in_use)
-    try:
-        validation = read_validation(path)
-    except InputError as error:
-        return Entry(path, summary, validation_note=error.found, in_use=in_use)
-    note = ""
-    if validation is not None and validation.identity != summary.identity:
-        note = tr("the validation next to it belongs to another calibration")
-    return Entry(path, summary, "", validation, note, in_use)
 
 
 def validation_lines(entry: Entry) -> list[str]:
     """Return the validation of a calibration on an object of known size, with its results."""
-    trial = entry.validation
-    if trial is None or entry.validation_note:
-        note = entry.validation_note or tr("press an object of known size to validate it")
+    if entry.validation is None:
+        note = tr("press an object of known size to validate it")
         return [tr("Not validated: {note}").format(note=note)]
-    word = tr("Validated") if trial.passed else tr("Validation failed")
-    when = parse_time(trial.when)
-    day = trial.when if when is None else f"{when.astimezone():%Y-%m-%d %H:%M}"
-    by = tr("by {name}").format(name=trial.who) if trial.who else ""
-    line = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
-    return [
-        f"{word}: {trial.indenter}, {day} {by}".rstrip(),
-        *(
-            line.format(
-                what=c.name,
-                a=c.value,
-                b=c.truth,
-                e=c.error_percent,
-                l=c.limit_percent,
-            )
-            for c in trial.comparisons
-        ),
-    ]
+    return entry.validation.lines()

@@ -1,7 +1,8 @@
 """The trash folder of a workspace: removed calibrations, each with its origin.
 
-``trash/TIME-SERIAL/`` holds the calibration, its validation, and ``removal.json`` with the folder
-that they came from, the time, and whether the calibration was in use.
+``trash/TIME-SERIAL/`` holds the calibration and ``removal.json`` with the folder that it came from,
+the time, and whether the calibration was in use; beside them the validation that an older program
+has written.
 """
 
 from __future__ import annotations
@@ -10,14 +11,14 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.workspace.entries import Entry, parse_time, read_entry
+from app.workspace.entries import Entry, read_entry
 from app.workspace.files import free_path, move_file
 from app.workspace.sessions import file_time
-from app.workspace.validation import validation_path
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_json
-from gelpolight_core.io.reading import parse_json, plain_text, read_file
+from gelpolight_core.io.reading import parse_json, parse_time, plain_text, read_file
 from gelpolight_core.translation import tr
+from gelpolight_core.validation import validation_path
 
 NOTE = "removal.json"
 ENDING = ".gplcal"

@@ -3,7 +3,7 @@
 ::
 
     workspace.json                       the calibration put into use last
-    sensors/SERIAL/NAME.gplcal           calibrations, with NAME.validation.json next to them
+    sensors/SERIAL/NAME.gplcal           calibrations
     sensors/SERIAL/sessions/NAME/        session folders
     sensors/SERIAL/recordings/TIME.gplrec
     records.sqlite                       measurements
@@ -27,12 +27,12 @@ from app.workspace.entries import Entry, read_entry
 from app.workspace.files import copy_file, copy_new, free_path
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.trash import Removal, put_into_trash, removals_in, take_from_trash
-from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_json
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.translation import tr
+from gelpolight_core.validation import validation_path
 
 if TYPE_CHECKING:
     from gelpolight_core.records.records import Records

@@ -46,6 +46,7 @@ from gelpolight_core.sensor_calibration import (
     Provenance,
     SensorModel,
 )
+from gelpolight_core.validation import validation_in
 
 # A fixed time stamp: the same calibration gives the same bytes.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
@@ -128,7 +129,7 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
         arrays = {
             name: _read_array(archive, name, entry) for name, entry in manifest["arrays"].items()
         }
-        calibration = _build(manifest, arrays)
+        calibration = _build(manifest, arrays, path)
         # Files of the first programs may state a name that this program cannot compute.
         known = manifest["version"] >= FIRST_NESTED
         if known and calibration.identity != manifest["identity"]:
@@ -145,7 +146,7 @@ def _encode(array: NDArray[Any]) -> bytes:
 def contents_of(c: Calibration) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Return the manifest of a calibration file, and the arrays beside it by their names."""
     arrays: dict[str, NDArray[Any]] = {}
-    manifest = {
+    manifest: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "identity": c.identity,
@@ -158,6 +159,9 @@ def contents_of(c: Calibration) -> tuple[dict[str, Any], dict[str, NDArray[Any]]
         "quality": {stage: quality_rows(table) for stage, table in c.quality.items()},
         "provenance": pack(c.provenance, arrays, "provenance"),
     }
+    # The validation of a calibration is none of the same calibration with other numbers.
+    if c.validation is not None and c.validation.identity == c.identity:
+        manifest["validation"] = c.validation.as_json()
     return manifest, arrays
 
 
@@ -182,7 +186,7 @@ def _read_array(archive: zipfile.ZipFile, name: str, entry: dict[str, Any]) -> N
     return array.copy()
 
 
-def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibration:
+def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]], path: Path) -> Calibration:
     model = manifest["model"]
     if model not in KINDS:
         raise ValueError(f"unknown model {model!r}")
@@ -195,6 +199,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         data,
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
         provenance=unpack(Provenance, manifest["provenance"], {}, "provenance"),
+        validation=validation_in(manifest, path),
     )
     made, known = _grid_entry(calibration.table.grid), manifest["grid"]
     if not np.allclose([float(known[key]) for key in made], list(made.values()), atol=ROUNDING):

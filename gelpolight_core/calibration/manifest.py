@@ -35,6 +35,7 @@ from gelpolight_core.io.reading import (
 )
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.translation import english, tr
+from gelpolight_core.validation import Validation, validation_in
 
 FORMAT = "gelpolight-calibration"
 # Version 1 has no membrane curves, standard deviations, manual edits or camera response.
@@ -70,6 +71,8 @@ class CalibrationSummary:
         As in its provenance.
     camera : str
         Identity of the camera. Empty if unknown.
+    validation : Validation or None
+        On an object of known size, passed or not.
     """
 
     identity: str
@@ -85,6 +88,7 @@ class CalibrationSummary:
     elastomer: str = ""
     accepted: str = ""
     camera: str = ""
+    validation: Validation | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -112,7 +116,7 @@ def read_summary(path: Path) -> CalibrationSummary:
         manifest = read_manifest(archive, path)
         manifest["grid"]
         check_arrays(manifest["arrays"], archive)
-        return _summarise(manifest)
+        return _summarise(manifest, path)
 
 
 def refuse_damaged_arrays(path: Path) -> None:
@@ -134,7 +138,7 @@ def refuse_damaged_arrays(path: Path) -> None:
                 raise ValueError(f"the checksum of {name} is wrong")
 
 
-def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
+def _summarise(manifest: dict[str, Any], path: Path) -> CalibrationSummary:
     made = manifest["provenance"]
     texts = {key: manifest[key] for key in ("identity", "serial", "model")}
     texts |= {key: made[key] for key in ("created", "operator", "program_version", "session")}
@@ -145,6 +149,7 @@ def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
         **{key: written_text(text) for key, text in texts.items()},
         image_size=(int(width), int(height)),
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
+        validation=validation_in(manifest, path),
     )
 
 

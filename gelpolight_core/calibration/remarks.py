@@ -11,6 +11,7 @@ from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import plain_text
 from gelpolight_core.translation import tr
+from gelpolight_core.validation import Validation
 
 
 def write_remark(path: Path, key: str, text: str) -> None:
@@ -45,3 +46,14 @@ def write_remark(path: Path, key: str, text: str) -> None:
     remark: dict[str, Any] = {key: text.strip()}
     stated = replace(calibration.provenance, **remark)
     write_calibration(replace(calibration, provenance=stated), path)
+
+
+def write_validation(validation: Validation, path: Path) -> None:
+    """Write a validation into the file of its calibration, in place of an earlier one.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or written.
+    """
+    write_calibration(replace(read_calibration(path), validation=validation), path)

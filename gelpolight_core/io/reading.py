@@ -17,6 +17,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
@@ -363,6 +364,15 @@ def written_text(value: Any, most: int = 1_000_000) -> str:
         raise ValueError(f"a text has {len(value)} characters")
     value.encode()  # a lone surrogate cannot be encoded
     return value
+
+
+def parse_time(text: str) -> datetime | None:
+    """Read an ISO 8601 time. Without a time zone it counts as UTC. Invalid text gives None."""
+    try:
+        time = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return time if time.tzinfo is not None else time.replace(tzinfo=UTC)
 
 
 def as_text(name: str) -> str:

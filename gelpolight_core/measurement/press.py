@@ -13,8 +13,8 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, is_file_name
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.quantity import percent_error
 from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.quantity import percent_error
 from gelpolight_core.translation import tr
 
 LONGEST_MM = 1000.0

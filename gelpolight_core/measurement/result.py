@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, reason_of
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.statistics import finite_or_none
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]

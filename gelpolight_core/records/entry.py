@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 
 PASSED, FAILED, DOUBTFUL, UNJUDGED = "pass", "fail", "doubtful", ""
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict
 
 from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord
 from gelpolight_core.records.records import Records
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.io.reading import parse_json, written_text
 from gelpolight_core.io.texts import text_of_file
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.database import VALUE_LIMIT
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.translation import english

@@ -37,7 +37,7 @@ def calibration_report(calibration: Calibration, *, validation: Validation | Non
     calibration : Calibration
         Read from its file.
     validation : Validation, optional
-        Results on objects of known size; by default none.
+        Results on objects of known size; by default those of its file.
     """
     return _assemble(calibration, None, validation)
 
@@ -54,7 +54,7 @@ def run_report(
     run : Run
         A calibration with the results of every stage.
     validation : Validation, optional
-        Results on objects of known size; by default none.
+        Results on objects of known size; by default those that the calibration holds.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _assemble(c: Calibration, run: Run | None, validation: Validation | None) ->
     for stage in recipe.stages:
         if show := SHOWN.get(stage):
             parts |= show(c.data, run)
-    validation = validation or _not_validated()
+    validation = validation or _stated(c)
     cause, quality = with_one_cause(c.quality)
     sections = tuple(
         Section(
@@ -187,7 +187,10 @@ def _numbers(c: Calibration) -> dict[str, Any]:
     return {key: value for key, value in manifest.items() if key != "quality"} | few
 
 
-def _not_validated() -> Validation:
+def _stated(c: Calibration) -> Validation:
+    if c.validation is not None:
+        verdict = Verdict.PASS if c.validation.passed else Verdict.FAIL
+        return Validation("; ".join(c.validation.lines()), verdict, data=c.validation.as_json())
     sentence = tr(
         "Not validated: no object of known size was measured with this calibration. A wrong ball "
         "diameter, square size or scale makes every result wrong, and no image can show this"

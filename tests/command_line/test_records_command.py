@@ -8,7 +8,7 @@ import pytest
 from one_line import refusal
 
 from app.command_line.main import main
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 

@@ -19,8 +19,8 @@ from typing import Any
 import cv2
 
 from app.command_line.main import main as gelpolight
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.result import Truth
+from gelpolight_core.quantity import Quantity
 
 DESIGN = Path(__file__).with_name("small_sensor.toml")
 PRESS = "cylinder_s5_d100"
@@ -111,9 +111,10 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
 
 def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: Path) -> None:
     """Write the lab's indenters, the validation of the calibration and the one in use."""
-    import app.workspace.validation as validation
     from app.workspace.indenters import Indenter, write_indenters
     from app.workspace.workspace import Workspace
+    from gelpolight_core.calibration.remarks import write_validation
+    from gelpolight_core.validation import Validation
 
     write_indenters([Indenter("Pin A", "cylinder", 5.0, height_mm=1.0),
                      Indenter("Block", "cuboid", 4.0, 6.0)], workspace)  # fmt: skip
@@ -122,9 +123,7 @@ def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: P
         Quantity("height", measurement.height_mm, None, 1.0, 8.0),
     )
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    validation.write_validation(
-        validation.Validation(calibration.identity, now, "A. Tester", "Pin A", lengths), path
-    )
+    write_validation(Validation(calibration.identity, now, "A. Tester", "Pin A", lengths), path)
     Workspace(workspace).use(path)
 
 

@@ -18,7 +18,6 @@ from app.command_line.tool_arguments import read_tools
 from app.services.settings import Settings
 from app.workspace.indenters import first_indenters, read_indenters, write_indenters
 from app.workspace.sessions import read_session_entry
-from app.workspace.validation import Validation, read_validation, write_validation
 from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
@@ -33,13 +32,13 @@ from gelpolight_core.measurement.protocol import (
     read_protocol_file,
     write_protocol_file,
 )
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.score import read_true_depth
 from gelpolight_core.measurement.tools import tools_from_json
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import build_resampling_table
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
@@ -64,6 +63,7 @@ from gelpolight_core.session.decisions import (
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import SensorData, read_session
 from gelpolight_core.simulation.session import session_toml
+from gelpolight_core.validation import FORMAT, VERSION, Validation, validation_in
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,8 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
     trial = Validation(
         "c", "2026-01-02", "me", "ball", (Quantity("height", 1.0, truth=1.0, limit_percent=8.0),)
     )
-    write_validation(trial, folder / "c.gplcal")
+    content = {"format": FORMAT, "version": VERSION, **trial.as_json()}
+    (folder / "c.validation.json").write_text(json.dumps(content))
     good = Measurement("ball", 3.0, None, 1.0, (0.0, 1.0), None, 0.5, {"height_mm": 0.1}, None, 0.1,
                        0.0, 0.01, 9.0, np.zeros((4, 2)))  # fmt: skip
     Ledger(folder / "ledger.jsonl", "c").keep("k", good)
@@ -270,7 +271,7 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
         ("tools", "tools.json", _TOOLS.encode(), lambda p: tools_from_json(read_tools(p))),
         ("indenters", "indenters.json", held("indenters.json"), lambda p: read_indenters(p.parent)),
         ("validation", "c.validation.json", held("c.validation.json"),
-         lambda p: read_validation(p.with_name("c.gplcal"))),
+         lambda p: validation_in({"identity": "c"}, p.with_name("c.gplcal"))),
         ("workspace", "workspace.json", json.dumps({"in_use": "sensors/A/c.gplcal"}).encode(),
          lambda p: Workspace(p.parent).in_use),
         ("settings", "desktop.ini", settings.encode(), _use_settings),

@@ -15,8 +15,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.statistics import statistics_of
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 

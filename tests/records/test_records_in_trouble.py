@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records import schema
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
@@ -32,7 +32,7 @@ ADD_FOR_EVER = """
 import sys
 import time
 from pathlib import Path
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import Records
 

@@ -17,21 +17,22 @@ from hypothesis import strategies as st
 from report_pdf import report_data, report_text
 
 from app.command_line.main import MENDABLE, main
-from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.project import Run
+from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.causes import MODEL
 from gelpolight_core.finding import QualityTable, Verdict, judge, limit_text
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.report.file import report_pdf, write_report
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import use_language
+from gelpolight_core.validation import Validation
 
 NASTY = (
     '#panic("x") *b* $1/0$ <l> @r \\u{41} `raw` // /* \u4e2d\u6587 \udcff \x00 "q"\n= h ' + 90 * "w"

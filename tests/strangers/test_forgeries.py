@@ -18,7 +18,6 @@ import pytest
 from recorded import write_recording
 
 from app.workspace.indenters import read_indenters
-from app.workspace.validation import read_validation
 from app.workspace.workspace import Workspace, folder_name
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
@@ -32,8 +31,8 @@ from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.protocol import (
     read_protocol_file,
 )
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.score import read_true_depth
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.records.entry import MeasurementRecord
@@ -41,6 +40,7 @@ from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.decisions import read_decisions
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
+from gelpolight_core.validation import validation_in
 
 READERS: dict[str, Callable[[Path], object]] = {
     "c.gplcal": read_calibration,
@@ -57,7 +57,7 @@ ABSENT: dict[str, Callable[[Path], object]] = {
     "decisions.toml": lambda p: read_decisions(p.parent),
     "ledger.jsonl": lambda p: Ledger(p, "c"),
     "indenters.json": lambda p: read_indenters(p.parent),
-    "c.validation.json": lambda p: read_validation(p.with_name("c.gplcal")),
+    "c.validation.json": lambda p: validation_in({"identity": "c"}, p.with_name("c.gplcal")),
     "workspace.json": lambda p: Workspace(p.parent).in_use,
     "any": is_recording,
 }

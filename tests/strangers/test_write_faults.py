@@ -19,7 +19,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import NameTakenError, write_atomically
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter

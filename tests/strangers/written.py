@@ -12,11 +12,11 @@ import scene
 from recorded import noisy
 
 from app.workspace.indenters import first_indenters, write_indenters
-from app.workspace.validation import Validation, write_validation
 from app.workspace.workspace import Workspace
 from gelpolight_core.batch.results import FILE, FrameRow, keep_rows, write_summary
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.export.profile_file import write_profiles
@@ -24,7 +24,7 @@ from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.protocol import Protocol, ProtocolFile, write_protocol_file
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import write_csv
@@ -37,6 +37,7 @@ from gelpolight_core.session.description import write_description
 from gelpolight_core.session.images import write_image
 from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.simulation.session import session_toml
+from gelpolight_core.validation import Validation
 
 RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),))
 TRIAL = Validation(
@@ -69,6 +70,14 @@ def _workspace(folder: Path, which: int) -> None:
     workspace.use(path if which else None)
 
 
+def _validation(folder: Path, which: int) -> None:
+    path = folder / "c.gplcal"
+    if not path.exists():
+        write_calibration(calibration(), path)
+    identity = calibration().identity
+    write_validation(replace(TRIAL, identity=identity, indenter=f"ball {which}"), path)
+
+
 def _import(folder: Path, which: int) -> None:
     source = folder / "elsewhere" / f"{which}.gplcal"
     for k in (0, 1):
@@ -77,7 +86,6 @@ def _import(folder: Path, which: int) -> None:
             path.parent.mkdir(exist_ok=True)
             sensor = replace(calibration().data.sensor, serial=f"S-{k}")
             write_calibration(calibration().changed(sensor=sensor), path)
-            write_validation(TRIAL, path)
     (folder / "library" / "sensors" / "S-1").mkdir(parents=True, exist_ok=True)
     Workspace(folder / "library").import_calibration(source)
 
@@ -186,8 +194,7 @@ KINDS = (
         calibration().changed(noise=np.full(3, 1e-3 * (k + 1))), f / "c.gplcal")),
     Written("library", _import),
     Written("calibration in use", _workspace),
-    Written("validation", lambda f, k: write_validation(
-        replace(TRIAL, indenter=f"ball {k}"), f / "c.gplcal")),
+    Written("validation", _validation),
     Written("indenters", lambda f, k: write_indenters(first_indenters()[k:], f)),
     Written("session", _description),
     Written("decisions", _decisions),

@@ -13,11 +13,12 @@ from pytestqt.qtbot import QtBot
 from app.context.context import AppContext
 from app.live.calibration_choice import CalibrationChoice
 from app.services.jobs import Job
-from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.calibration.remarks import write_validation
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.validation import Validation
 
 
 class Waiting:

@@ -6,7 +6,7 @@ from pytestqt.qtbot import QtBot
 
 from app.measure.error_plot import ErrorPlot
 from app.services.preferences import Limits
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 
 

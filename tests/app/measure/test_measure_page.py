@@ -26,8 +26,8 @@ from app.measure.judging import Reference
 from app.measure.page import MeasurePage
 from app.services.preferences import Limits
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.measurement.quantity import Quantity
 from gelpolight_core.measurement.tools import Distance, tool_from_dict
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.measure.record_table import record_cells
 from app.theme.icons import icon
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 
 

@@ -31,13 +31,15 @@ from app.widgets.quality_table import QualityTableWidget
 from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from app.workspace.gel_care import presses_text, write_presses
-from app.workspace.report import write_entry_report
-from app.workspace.validation import Validation, write_validation
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.calibration.remarks import write_validation
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME
+from gelpolight_core.report.build import calibration_report
+from gelpolight_core.report.file import write_report
+from gelpolight_core.validation import Validation
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +138,7 @@ def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
     answer.click()
     assert context.workspace.in_use == path
     assert "Used although it failed: for teaching" in words(page)
-    write_entry_report(read_entry(path), tmp_path / "report.pdf")
+    write_report(calibration_report(read_calibration(path)), tmp_path / "report.pdf")
     assert ["Used although it failed", "for teaching"] in report_data(tmp_path / "report.pdf")[
         "facts"
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -13,19 +14,14 @@ import pytest
 import scene
 
 from app.workspace.entries import read_entry
-from app.workspace.validation import (
-    Validation,
-    read_validation,
-    validation_path,
-    write_validation,
-)
 from app.workspace.workspace import Workspace, folder_name
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary
-from gelpolight_core.calibration.remarks import write_remark
+from gelpolight_core.calibration.remarks import write_remark, write_validation
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.validation import FORMAT, VERSION, Validation, validation_path
 
 GOOD = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
 BAD = Quantity("diameter", 5.6, truth=5.0, limit_percent=5.0)
@@ -170,17 +166,34 @@ def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: P
 def test_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
     place = workspace.import_calibration(source)
     write_validation(trial(place, GOOD), place)
-    assert read_validation(place) == trial(place, GOOD)
+    entry = read_entry(place)
+    assert entry.validation == trial(place, GOOD)
+    assert entry.validated
+    write_remark(place, "elastomer", "gel 7")
     assert read_entry(place).validated
+    assert not validation_path(place).exists()
 
 
+def write_beside(validation: Validation, path: Path, **forged: bool) -> None:
+    """Write a validation as older programs did."""
+    content = {"format": FORMAT, "version": VERSION, **validation.as_json(), **forged}
+    validation_path(path).write_text(json.dumps(content))
+
+
+@pytest.mark.parametrize("write", [write_validation, write_beside])
 def test_a_validation_is_imported_with_its_calibration(
-    workspace: Workspace, source: Path, tmp_path: Path
+    workspace: Workspace, source: Path, tmp_path: Path, write: Callable[[Validation, Path], None]
 ) -> None:
     copy = tmp_path / "copy.gplcal"
     shutil.copy(source, copy)
-    write_validation(trial(copy, GOOD), copy)
-    assert read_entry(workspace.import_calibration(copy)).validated
+    write(trial(copy, GOOD), copy)
+    place = workspace.import_calibration(copy)
+    assert read_entry(place).validated
+    assert read_calibration(place).validation == trial(copy, GOOD)
+    removal = workspace.remove(place)
+    assert removal.entry.validated
+    workspace.restore(removal)
+    assert read_entry(place).validated
 
 
 @pytest.mark.parametrize("comparisons", [(BAD,), (GOOD, BAD), ()], ids=["bad", "one bad", "none"])
@@ -198,30 +211,25 @@ def test_a_trial_of_another_calibration_does_not_validate(
     workspace: Workspace, source: Path
 ) -> None:
     place = workspace.import_calibration(source)
-    write_validation(replace(trial(place, GOOD), identity="another"), place)
-    entry = read_entry(place)
-    assert not entry.validated
-    assert "another calibration" in entry.validation_note
-
-
-def forge_passed(path: Path) -> None:
-    content = json.loads(path.read_text())
-    content["passed"] = True
-    path.write_text(json.dumps(content))
+    another = replace(trial(place, GOOD), identity="another")
+    write_validation(another, place)
+    write_beside(another, place)
+    assert read_entry(place).validation is None
+    made = read_calibration(place)
+    write_calibration(
+        replace(made, validation=trial(place, GOOD)).changed(factors=2.0 * made.data.factors), place
+    )
+    assert read_entry(place).validation is None
 
 
 def test_a_verdict_that_does_not_match_its_lengths_is_refused(
     workspace: Workspace, source: Path
 ) -> None:
     place = workspace.import_calibration(source)
-    write_validation(trial(place, BAD), place)
-    forge_passed(validation_path(place))
-    with pytest.raises(InputError, match="does not match"):
-        read_validation(place)
+    write_beside(trial(place, BAD), place, passed=True)
     entry = read_entry(place)
     assert not entry.validated
     assert not entry.broken
-    assert "does not match" in entry.validation_note
 
 
 def test_age_is_counted_in_days(workspace: Workspace, source: Path) -> None:
@@ -275,7 +283,7 @@ def test_a_calibration_is_not_imported_without_its_validation(
 ) -> None:
     copied = tmp_path / source.name
     shutil.copy(source, copied)
-    write_validation(trial(copied, GOOD), copied)
+    write_beside(trial(copied, GOOD), copied)
     serial = read_summary(source).serial
     place = workspace.sensor_folder(serial) / f"{folder_name(copied.stem)}.gplcal"
     in_the_way = validation_path(place)

@@ -16,11 +16,12 @@ from technician import Technician
 from app.calibrate import validation as validating
 from app.calibrate.result import write_report
 from app.command_line.main import main
-from app.workspace.validation import Validation, write_validation
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.finding import doubt
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.quantity import Quantity
+from gelpolight_core.validation import Validation
 
 Made = Callable[[], Project]
 PRESS = "presses/cylinder_s5_d100.png"

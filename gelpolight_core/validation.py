@@ -1,19 +1,21 @@
-"""Validation of a calibration on an object of known size: a small file next to it.
+"""Validation of a calibration on an object of known size: part of the calibration's file.
 
-``<name>.validation.json`` contains time, operator, object, measured and true lengths, and the
-limits.
-It belongs to one calibration only, given by its identity.
+It belongs to one calibration only, given by its identity. Older programs wrote it to a file next to
+the calibration, ``<name>.validation.json``, which is read as long as the calibration's file has
+none.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.io.atomic import write_json
-from gelpolight_core.io.reading import brief, plain_text, read_own
-from gelpolight_core.measurement.quantity import Quantity
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import brief, parse_time, plain_text, read_own
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
@@ -55,52 +57,57 @@ class Validation:
         """The largest error of a length, without its sign."""
         return max(abs(c.error_percent or 0.0) for c in self.comparisons)
 
+    def lines(self) -> list[str]:
+        """Return it in words: its verdict, object and origin, then each length."""
+        word = tr("Validated") if self.passed else tr("Validation failed")
+        time = parse_time(self.when)
+        day = self.when if time is None else f"{time.astimezone():%Y-%m-%d %H:%M}"
+        by = tr("by {name}").format(name=self.who) if self.who else ""
+        line = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
+        return [
+            f"{word}: {self.indenter}, {day} {by}".rstrip(),
+            *(
+                line.format(what=c.name, a=c.value, b=c.truth, e=c.error_percent, l=c.limit_percent)
+                for c in self.comparisons
+            ),
+        ]
+
     def as_json(self) -> dict[str, Any]:
         """Return the validation as plain values."""
         keys = ("quantity", "measured_mm", "true_mm", "limit_percent")
         lengths = [(c.name, c.value, c.truth, c.limit_percent) for c in self.comparisons]
         rows = [dict(zip(keys, length, strict=True)) for length in lengths]
-        return {**asdict(self), "comparisons": rows}
+        return {**asdict(self), "comparisons": rows, "passed": self.passed}
 
 
 def validation_path(calibration: Path) -> Path:
-    """Return the path of the validation of a calibration file."""
+    """Return where older programs wrote the validation of a calibration file."""
     return calibration.with_name(calibration.stem + ENDING)
 
 
-def write_validation(validation: Validation, calibration: Path) -> Path:
-    """Write a validation next to its calibration file, completely or not at all. Return its path.
+def validation_in(manifest: Mapping[str, Any], path: Path) -> Validation | None:
+    """Return the validation of a calibration; None if there is none.
+
+    Parameters
+    ----------
+    manifest : mapping
+        Of the calibration file.
+    path : Path
+        The file. A validation by an older program lies next to it.
 
     Raises
     ------
-    InputError
-        If it cannot be written.
+    ValueError, TypeError, KeyError
+        If the one in the manifest is no validation.
     """
-    path = validation_path(calibration)
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        **validation.as_json(),
-        "passed": validation.passed,
-    }
-    write_json(path, content)
-    return path
-
-
-def read_validation(calibration: Path) -> Validation | None:
-    """Read the validation next to a calibration file. None if there is none.
-
-    Raises
-    ------
-    InputError
-        If it is damaged, has a newer version, or its verdict does not match its lengths.
-    """
-    return read_own(
-        validation_path(calibration),
-        (FORMAT, VERSION),
-        _parse,
-        found=tr("The validation cannot be read ({error})"),
-    )
+    found = None
+    if "validation" in manifest:
+        found = _parse(manifest["validation"])
+    else:
+        # With a damaged one the calibration is not validated, and is shown so.
+        with suppress(InputError):
+            found = read_own(validation_path(path), (FORMAT, VERSION), _parse, found="({error})")
+    return found if found is not None and found.identity == manifest["identity"] else None
 
 
 def _parse(content: Any) -> Validation:
