@@ -83,8 +83,9 @@ class Remedy(StrEnum):
     STEADY_SERIES = marked("Keep scene, light and gain constant, and state the true exposure times")
     # The board
     BOARD_SIZE = marked("Correct the number of inner corners and the side of the squares")
+    REMOVE_BOARD = marked("Remove the checkerboard and capture the image again")
     SHOW_BOARD = marked("Show the whole board, flat and evenly lit, with a light margin around it")
-    MORE_VIEWS = marked("Capture 10 or more sharp views of the board, tilted by 15 to 40 degrees")
+    MORE_VIEWS = marked("Capture more sharp views of the board, tilted by 15 to 40 degrees")
     FLAT_BOARD = marked("Use a flat board, check its square size, and hold it still")
     BOARD_ON_TOP = marked("Lay the board flat on the top surface, and capture it there")
     # Presses

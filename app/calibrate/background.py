@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
-from app.calibrate.detection import Detection, Detector, judged, or_refusal
+from app.calibrate.detection import (
+    Detection,
+    Detector,
+    beside,
+    enlarged,
+    judged,
+    marked,
+    or_refusal,
+    refuse_grey,
+)
 from app.calibrate.image_step import ImageStep
-from app.calibrate.light_checks import KnownImage, enlarged, marked, refuse_grey
 from app.calibrate.maps import Panel, three_maps
 from app.calibrate.marks import table_of, working_circle
 from app.calibrate.step_data import step_of
@@ -73,8 +80,11 @@ class BackgroundStep(ImageStep):
     def detector(self, name: str) -> Detector:
         """Return the check of the bare membrane."""
         project = self.model.project
-        known = KnownImage(project.session.found("whiteboard"))
-        return partial(_check, table=table_of(project.results), known=known)
+        table = table_of(project.results)
+        return beside(
+            project.session.found("whiteboard"),
+            lambda rgb, other: detect_background(rgb, table=table, whiteboard=other),
+        )
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the reflectance factor of each LED."""
@@ -84,7 +94,3 @@ class BackgroundStep(ImageStep):
             return ()
         found = made.factors
         return three_maps(found.factors, found.usable, table.grid, tr("Reflectance factor"))
-
-
-def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detection:
-    return or_refusal(lambda: detect_background(rgb, table=table, whiteboard=known.rgb))

@@ -11,7 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QSignalBlocker
 
 from app.calibrate.detection import (
     Detection,
@@ -31,7 +31,6 @@ from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
 from app.widgets.inputs import DoubleSpinBox
-from app.widgets.layout import hbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS, TOP_POSE
@@ -236,39 +235,32 @@ def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
     return Detection(marks, replace(found.finding, remedy=remedy))
 
 
-class RadiusRow(QWidget):
+class DiameterBox(DoubleSpinBox):
     """The diameter of the ball of the next press, or of the shown one.
 
     Files and calculations use the radius.
     """
 
     def __init__(self) -> None:
-        super().__init__()
-        self.box = named(
-            DoubleSpinBox(
-                minimum=0.1, maximum=1000.0, decimals=3, suffix=tr(" mm"), keyboardTracking=False
-            ),
+        super().__init__(
+            minimum=0.1, maximum=1000.0, decimals=3, suffix=tr(" mm"), keyboardTracking=False
+        )
+        named(
+            self,
             "calibrate.radius",
             tr("Diameter of the ball in mm"),
             tr("Diameter for the next press, or for the shown one"),
         )
-        hbox((self.box, 1), of=self, margins=0)
 
     @property
     def radius_mm(self) -> float:
         """Half of the diameter."""
-        return 0.5 * self.box.value()
+        return 0.5 * self.value()
 
     @property
     def typing(self) -> bool:
         """Whether a diameter is being typed, so that the field still has the old value."""
-        return self.box.valueFromText(self.box.text()) != self.box.value()
-
-    def show_radius(self, radius_mm: float) -> None:
-        """Show a radius without reporting it as an input."""
-        self.box.blockSignals(True)
-        self.box.setValue(2.0 * radius_mm)
-        self.box.blockSignals(False)
+        return self.valueFromText(self.text()) != self.value()
 
 
 USUAL_RADIUS_MM = 3.0
@@ -280,8 +272,8 @@ class BallsStep(ImageStep):
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts)
         self._next_mm: float | None = None
-        self.radius = RadiusRow()
-        self.radius.box.valueChanged.connect(lambda _: self._on_radius(self.radius.radius_mm))
+        self.radius = DiameterBox()
+        self.radius.valueChanged.connect(lambda _: self._on_radius(self.radius.radius_mm))
         self.own = (self.panel.add_extra(tr("Ball diameter"), self.radius),)
 
     step = step_of(
@@ -358,7 +350,7 @@ class BallsStep(ImageStep):
     @property
     def radius_mm(self) -> float | None:
         """Radius of the ball of the next press."""
-        self.radius.box.interpretText()  # a typed value counts even without Enter
+        self.radius.interpretText()  # a typed value counts even without Enter
         return self.radius.radius_mm
 
     @property
@@ -382,18 +374,20 @@ class BallsStep(ImageStep):
         session, name = self.model.project.session, self.model.shown
         usual = session.ball_default_radius_mm or USUAL_RADIUS_MM
         value = self._next_mm or usual
-        self.radius.show_radius(session.ball_radii_mm.get(name, usual) if name else value)
+        radius_mm = session.ball_radii_mm.get(name, usual) if name else value
+        with QSignalBlocker(self.radius):
+            self.radius.setValue(2.0 * radius_mm)
 
     # What is shown
 
     def leave(self) -> None:
         """Keep a typed radius."""
-        self.radius.box.interpretText()
+        self.radius.interpretText()
         super().leave()
 
     def close(self) -> None:
         """Keep a typed radius while it can still be saved."""
-        self.radius.box.interpretText()
+        self.radius.interpretText()
 
     def refresh(self) -> None:
         """Update to changed results, also after undo."""
@@ -403,12 +397,12 @@ class BallsStep(ImageStep):
 
     def live(self) -> None:
         """Show the live image; a typed radius belongs to the image shown before."""
-        self.radius.box.interpretText()
+        self.radius.interpretText()
         super().live()
 
     def show_capture(self, name: str) -> None:
         """Show a press with its radius; a typed one belongs to the image shown before."""
-        self.radius.box.interpretText()
+        self.radius.interpretText()
         super().show_capture(name)
 
     def arm(self, *, force: bool = False) -> None:

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from app.live.image_checks import Rgb, end_of_scale
 from app.live.live_detection import Detection as Detection
-from app.live.overlay import Overlay
+from app.live.overlay import Mask, Overlay
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.factors.bare_membrane import SHRINK
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of
 from gelpolight_core.image.linear import LinearImage
-from gelpolight_core.session.images import read_raw_image
+from gelpolight_core.session.images import read_raw_image, require_colour
 from gelpolight_core.translation import tr
 
 Detector = Callable[[NDArray[Any]], Detection]
+Mask2 = NDArray[np.bool_]
 
 
 def too_early(_rgb: Rgb) -> Detection:
@@ -74,3 +78,33 @@ def share(mask: NDArray[np.bool_], area: NDArray[np.bool_]) -> float:
     """Return the share of `area` that is in `mask`; 0 for an empty area."""
     count = int(np.count_nonzero(area))
     return float(np.count_nonzero(mask & area) / count) if count else 0.0
+
+
+def beside(files: tuple[Path, ...], detect: Callable[[Rgb, Rgb | None], Detection]) -> Detector:
+    """Return a detection that also gets the last image of another stage; None without one.
+
+    That image is read once, when it is first needed, in the processing thread.
+    """
+
+    @cache
+    def other() -> Rgb | None:
+        return read_raw(files[-1]) if files else None
+
+    return lambda rgb: or_refusal(lambda: detect(rgb, other()))
+
+
+def refuse_grey(rgb: Rgb) -> None:
+    """Raise InputError if the image has no colours."""
+    require_colour(as_image(rgb[::SHRINK, ::SHRINK]), where=tr("Image"))
+
+
+def enlarged(mask: Mask2, rgb: Rgb) -> Mask2:
+    """Return a mask of the shrunk image at the size of the image."""
+    size = (rgb.shape[1], rgb.shape[0])
+    return np.asarray(cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)) > 0
+
+
+def marked(full: Mask2, suspect: Mask2) -> tuple[Mask, ...]:
+    """Return the masks of saturated and suspect pixels that are not empty."""
+    both = (Mask(full, "bad"), Mask(suspect, "expected"))
+    return tuple(mask for mask in both if mask.area.any())

@@ -151,7 +151,8 @@ class ImageStep(StepPresenter):
         """
         live = self.model.live
         found = self.model.project.session.found(self.step.folder)
-        own = live.stream is not None and not self.model.camera_fault(ask=False)
+        foreign = self.model.camera_fault(ask=False) or self.model.from_files()
+        own = live.stream is not None and not foreign
         if self.model.shown:
             self.panel.capture.setEnabled(live.stream is not None)
         elif found and live.page_shown and not own:

@@ -14,11 +14,11 @@ from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Job
+from gelpolight_core.calibration.image_checks import refuse_board
 from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.errors import InputError
 from gelpolight_core.finding import judge
 from gelpolight_core.lights.mirror import find_mirror_spots, spot_near
-from gelpolight_core.optics.board_search import find_rough_corners
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.session.session import Session
@@ -59,7 +59,7 @@ def detect_mirror(
         try:
             spots = find_mirror_spots(as_image(rgb))
         except InputError:
-            _refuse_boards(rgb, boards)
+            refuse_board(as_image(rgb), boards, where=tr("Image"))
             raise
         marks = Overlay(
             markers=(*expected, *spot_markers(spots, editable=editable)),
@@ -79,17 +79,6 @@ def detect_mirror(
         return judged(marks, figures, tr("All three LED reflections were found."))
 
     return or_refusal(detect, marks=Overlay(markers=expected))
-
-
-def _refuse_boards(rgb: Rgb, boards: tuple[BoardSpec, ...]) -> None:
-    """Raise InputError if the image shows a checkerboard instead of the mirror."""
-    grey = as_image(rgb).rgb.mean(axis=2)
-    if any(find_rough_corners(grey, board.inner_corners) is not None for board in boards):
-        raise InputError(
-            tr("the checkerboard is still in place of the mirror"),
-            where=tr("Image"),
-            advice=Remedy.CLEAN_MIRROR,
-        )
 
 
 def placed_spots(rgb: Rgb, session: Session) -> Detection:

@@ -68,7 +68,7 @@ class Panel:
     scale : Scale or None
         What the colours mean; None for a photograph.
     outline_mm : (N, 2) or None
-        Closed line to draw.
+        Closed line to draw, in the unit of the extent.
     """
 
     title: str

@@ -139,6 +139,8 @@ class WizardModel(QObject):
         # Returns why the present camera must not be used for this session; the session camera sets
         # it.
         self.camera_fault: Callable[..., str] = lambda ask=True: ""
+        # Returns whether the images are from files, and none from the present camera.
+        self.from_files: Callable[[], bool] = lambda: False
         # Returns what was changed on it since the images with which those of a stage are compared.
         self.camera_change: Callable[[str], str] = lambda stage: ""
         self.shown = ""

@@ -9,11 +9,10 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
 
 from app.calibrate.in_place_offer import copy_images, in_place_offer
-from app.calibrate.question_view import QuestionView
 from app.calibrate.session_camera import SetupCamera
 from app.calibrate.setup_form import SetupForm
 from app.calibrate.setup_values import new_session
-from app.calibrate.start_view import StartView
+from app.calibrate.start_view import QuestionView, StartView
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext
 from app.widgets.layout import vbox

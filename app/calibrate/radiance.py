@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, Detector, judged, or_refusal, share
+from app.calibrate.detection import (
+    Detection,
+    Detector,
+    Mask2,
+    beside,
+    enlarged,
+    judged,
+    marked,
+    or_refusal,
+    refuse_grey,
+    share,
+)
 from app.calibrate.image_step import ImageStep
-from app.calibrate.light_checks import KnownImage, enlarged, marked, refuse_grey
 from app.calibrate.maps import Panel, three_maps
 from app.calibrate.marks import table_of, working_circle
 from app.calibrate.step_data import step_of
@@ -33,7 +41,6 @@ from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 from gelpolight_core.translation import tr
 
 Float = NDArray[np.float32]
-Mask2 = NDArray[np.bool_]
 
 # Specks and squares change the brightness within a fiftieth of the image; light does not.
 SPECK_OF_WIDTH = 0.02
@@ -130,8 +137,11 @@ class RadianceStep(ImageStep):
     def detector(self, name: str) -> Detector:
         """Return the check of the light."""
         project = self.model.project
-        known = KnownImage(project.session.found("background"))
-        return partial(_check, table=table_of(project.results), known=known)
+        table = table_of(project.results)
+        return beside(
+            project.session.found("background"),
+            lambda rgb, other: detect_whiteboard(rgb, table=table, background=other),
+        )
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the light intensity of each LED."""
@@ -141,7 +151,3 @@ class RadianceStep(ImageStep):
             return ()
         text = tr("Light intensity in percent of full scale")
         return three_maps(found.radiance, found.usable, table.grid, text, unit="%", factor=100.0)
-
-
-def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detection:
-    return or_refusal(lambda: detect_whiteboard(rgb, table=table, background=known.rgb))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import cv2
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 
 from app.calibrate.detection import read_raw
 from app.calibrate.maps import Panel
-from app.view2d.map_view import Extent
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.open_sensor import TOP_POSE
 from gelpolight_core.calibration.project import Project
@@ -19,9 +17,8 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.translation import tr
 
-Rgb = NDArray[np.uint8]
 CLOSE_UP = 1.6
-CLOSE_UP_PX = 420
+ORIGIN = np.zeros(2)
 
 
 def refraction_panels(
@@ -38,73 +35,57 @@ def refraction_panels(
     table : ResamplingTable
         Of the session.
     """
-    found = press.indentation
-    edge = found.contour.astype(np.float32).reshape(-1, 1, 2)
-    seen_u = cv2.remap(table.u_px, edge[..., 0], edge[..., 1], cv2.INTER_LINEAR)
-    seen_v = cv2.remap(table.v_px, edge[..., 0], edge[..., 1], cv2.INTER_LINEAR)
-    before = np.concatenate([seen_u, seen_v], axis=1)
+    edge = press.indentation.contour.astype(np.float32).reshape(-1, 1, 2)
+    before = np.concatenate(
+        [
+            cv2.remap(positions, edge[..., 0], edge[..., 1], cv2.INTER_LINEAR)
+            for positions in (table.u_px, table.v_px)
+        ],
+        axis=1,
+    )
     eight = (raw >> 8).astype(np.uint8) if raw.dtype == np.uint16 else raw
     flat = table.apply(eight.astype(np.float32) / np.float32(255.0))
     after = (255.0 * np.clip(flat, 0.0, 1.0)).astype(np.uint8)
-    text = tr("axis ratio {a:.3f} : 1")
     grid = table.grid
-    seen, seen_extent = _close_up(eight, before, ellipse=True)
-    flat_view, at = _close_up(after, found.contour, ellipse=False)
-    x, y, pitch = float(grid.x_mm[0]), float(grid.y_mm[0]), grid.pitch_mm
-    left, top, right, bottom = (pitch * edge for edge in at)
+    corner_mm = np.array([grid.x_mm[0], grid.y_mm[0]])
     return (
-        Panel(
-            tr("Raw camera image"),
-            seen,
-            seen_extent,
-            in_mm=False,
-            caption=text.format(a=_axes(before)),
+        _close_up(tr("Raw camera image"), eight, before, in_mm=False),
+        _close_up(
+            tr("Lens, tilt and refraction corrected"), after, press.indentation.contour,
+            origin=corner_mm, pitch=grid.pitch_mm,
         ),
-        Panel(
-            tr("Lens, tilt and refraction corrected"),
-            flat_view,
-            (x + left, y + top, x + right, y + bottom),
-            caption=text.format(a=_axes(found.contour)),
-        ),
-    )
+    )  # fmt: skip
 
 
-def _axes(points: NDArray[Any]) -> float:
-    (_, (one, other), _) = cv2.fitEllipseDirect(points.astype(np.float32).reshape(-1, 1, 2))
-    return max(one, other) / max(min(one, other), 1e-9)
-
-
-def _close_up(rgb: Rgb, points: NDArray[Any], *, ellipse: bool) -> tuple[Rgb, Extent]:
-    """Return an enlarged view of a contour with the curve fitted to it, and its outer edges."""
+def _close_up(
+    title: str,
+    rgb: NDArray[np.uint8],
+    points: NDArray[Any],
+    *,
+    origin: NDArray[np.float64] = ORIGIN,
+    pitch: float = 1.0,
+    in_mm: bool = True,
+) -> Panel:
+    """Return the part of an image around a contour, with the contour and its axis ratio."""
     centre = points.mean(axis=0)
     reach = CLOSE_UP * float(np.linalg.norm(points - centre, axis=1).max())
-    scale = CLOSE_UP_PX / (2.0 * reach)
-    shift = CLOSE_UP_PX / 2.0 - scale * centre
-    matrix = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
-    near = cv2.warpAffine(rgb, matrix, (CLOSE_UP_PX, CLOSE_UP_PX), flags=cv2.INTER_LINEAR)
-    near = cv2.convertScaleAbs(near, alpha=220.0 / max(float(np.percentile(near, 99.5)), 1.0))
-    at = (scale * points + shift).astype(np.float32)
-    for u, v in at:
-        cv2.circle(near, (round(float(u)), round(float(v))), 2, (255, 220, 60), -1, cv2.LINE_AA)
-    if ellipse:
-        box = cv2.fitEllipseDirect(at.reshape(-1, 1, 2))
-        cv2.ellipse(near, box, (255, 255, 255), 1, cv2.LINE_AA)
-    else:
-        u, v, radius = _fit_circle(at)
-        cv2.circle(near, (round(u), round(v)), round(radius), (255, 255, 255), 1, cv2.LINE_AA)
+    low = np.maximum(np.round(centre - reach).astype(int), 0)
+    high = np.minimum(np.round(centre + reach).astype(int) + 1, rgb.shape[1::-1])
+    near = rgb[low[1] : high[1], low[0] : high[0]]
+    bright = cv2.convertScaleAbs(near, alpha=220.0 / max(float(np.percentile(near, 99.5)), 1.0))
+    _, axes, _ = cv2.fitEllipseDirect(points.astype(np.float32).reshape(-1, 1, 2))
+    ratio = max(axes) / max(min(axes), 1e-9)
     left, top, right, bottom = np.concatenate(
-        [(edge - shift) / scale for edge in (-0.5, CLOSE_UP_PX - 0.5)]
+        [origin + pitch * (at - 0.5) for at in (low, high)]
     ).tolist()
-    return np.asarray(near, np.uint8), (left, top, right, bottom)
-
-
-def _fit_circle(points: NDArray[Any]) -> tuple[float, float, float]:
-    """Return centre and radius of a circle fitted to points; the circle may be incomplete."""
-    middle = points.mean(axis=0)
-    away = (points - middle).astype(np.float64)
-    sides = np.column_stack([2.0 * away, np.ones(len(away))])
-    (u, v, rest), *_ = np.linalg.lstsq(sides, (away**2).sum(axis=1), rcond=None)
-    return float(middle[0] + u), float(middle[1] + v), math.sqrt(rest + u * u + v * v)
+    return Panel(
+        title,
+        np.asarray(bright, np.uint8),
+        (left, top, right, bottom),
+        in_mm=in_mm,
+        caption=tr("axis ratio {a:.3f} : 1").format(a=ratio),
+        outline_mm=origin + pitch * points.astype(np.float64),
+    )
 
 
 def most_oblique_press(project: Project) -> tuple[Panel, ...]:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from app.calibrate.detection import Detection, Detector, or_refusal, refuse_size, too_early
+from app.calibrate.detection import (
+    Detection,
+    Detector,
+    beside,
+    or_refusal,
+    refuse_grey,
+    refuse_size,
+    too_early,
+)
 from app.calibrate.image_step import ImageStep
-from app.calibrate.light_checks import KnownImage, refuse_grey
 from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
@@ -84,21 +90,15 @@ class ScaleStep(ImageStep):
         files = session.found("background")
         if not files:
             return too_early
-        known = KnownImage(files)
-        return partial(
-            _detect, known=known, stated=session.in_place or InPlace(), response=session.response
-        )
+        stated, response = session.in_place or InPlace(), session.response
+
+        def detect(rgb: Rgb, bare: Rgb | None) -> Detection:
+            assert bare is not None  # there is a file
+            return detect_scale(rgb, bare, stated=stated, response=response)
+
+        return beside(files, detect)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the size of the pressed object, and the background."""
         session = self.model.project.session
         return session.in_place, session.found("background")
-
-
-def _detect(
-    rgb: Rgb, known: KnownImage, stated: InPlace, response: CameraResponse | None
-) -> Detection:
-    background = known.rgb
-    if background is None:
-        return too_early(rgb)
-    return detect_scale(rgb, background, stated=stated, response=response)

@@ -92,6 +92,7 @@ class SessionCamera(QObject):
         model.photographed.connect(self._on_photographed)
         model.camera_fault = self.fault
         model.camera_change = self.change
+        model.from_files = self.from_files
 
     def fault(self, *, ask: bool = True) -> str:
         """Return why the present camera cannot be used: the session belongs to another camera.
@@ -127,6 +128,12 @@ class SessionCamera(QObject):
             same = tr("It is the same camera"), accept
             question(self._window, tr("Another camera"), text, same)
         return text
+
+    def from_files(self) -> bool:
+        """Return whether there are images, none of them from a camera, and now there is one."""
+        session = self._model.project.session
+        found = self._model.project.recipe.files(session)
+        return bool(found) and session.camera_settings is None and self._present() is not None
 
     def change(self, stage: str) -> str:
         """Return what was changed on the camera since the image with which a stage is compared."""

@@ -193,7 +193,7 @@ class StepPresenter(QObject):
     def show_state(self, state: str, sentence: str) -> None:
         """Show the state in the side panel."""
         panel = self.panel
-        panel.show_number(self.number(), self.progress_line())
+        panel.show_number(self.number(), self.progress_line(), waits=not is_done(state))
         if state == RUNNING:
             panel.show_running()
             return

@@ -245,10 +245,14 @@ class StepPanel(QWidget):
         text = tr("&Next: {title}").format(title=self._following)
         self.next.setText(f"{text}  ({seconds})" if seconds else text)
 
-    def show_number(self, number: Finding | None, below: str) -> None:
-        """Show the one figure of the step, and a line about its captures."""
-        self.caption.setText(tr("No result yet") if number is None else number.text)
-        self.caption.setToolTip(plain_tip("" if number is None else number.text))
+    def show_number(self, number: Finding | None, below: str, *, waits: bool = True) -> None:
+        """Show the one figure of the step, and a line about its captures.
+
+        `waits`: without a figure, there will be one; a step may also be complete without any.
+        """
+        text = (tr("No result yet") if waits else "") if number is None else number.text
+        self.caption.setText(text)
+        self.caption.setToolTip(plain_tip(text))
         self.number.setText("\u2013" if number is None else value_text(number))
         self.below.setText(below)
 

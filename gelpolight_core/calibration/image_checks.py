@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.linear import require_size
+from gelpolight_core.image.linear import LinearImage, require_size
+from gelpolight_core.optics.board_search import find_rough_corners
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.file_hashes import file_hash, refuse_copies
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.session.session import Session
@@ -41,7 +43,7 @@ def refuse_unfit(
         size = size or image.size
         require_size(image.size, size, where=str(path))
         if colour:
-            require_colour(image, where=str(path))
+            require_lit_colours(image, session, where=str(path))
     refuse_copies(files)
     known = {file_hash(path): path for folder in folders for path in session.captured(folder)}
     for path in files:
@@ -53,6 +55,33 @@ def refuse_unfit(
                 ),
                 where=path,
                 advice=Remedy.CHOOSE_FILE,
+            )
+
+
+def require_lit_colours(image: LinearImage, session: Session, *, where: str) -> None:
+    """Refuse a grey image of the lit sensor. The likely cause is a board that is still there.
+
+    Raises
+    ------
+    InputError
+        If the image is grey; it names the checkerboard if there is one in it.
+    """
+    try:
+        require_colour(image, where=where)
+    except InputError:
+        refuse_board(image, (session.top_pose, session.checkerboard), where=where)
+        raise
+
+
+def refuse_board(image: LinearImage, boards: Sequence[BoardSpec], *, where: str) -> None:
+    """Raise InputError if an image shows one of some checkerboards."""
+    grey = image.rgb.mean(axis=2)
+    for board in boards:
+        if find_rough_corners(grey, board.inner_corners) is not None:
+            raise InputError(
+                tr("the checkerboard is still in the image"),
+                where=where,
+                advice=Remedy.REMOVE_BOARD,
             )
 
 

@@ -86,10 +86,10 @@ def linear(session: Session, results: Results) -> Session:
 
 def stage_image(work: Work, folder: str) -> LinearImage:
     """Return the average image of a stage with one view, in colour and of the lens views' size."""
-    from gelpolight_core.session.images import require_colour
+    from gelpolight_core.calibration.image_checks import require_lit_colours
 
     image = linear(work.session, work.results).averaged(folder)
-    require_colour(image, where=f"{folder}/{image.name}")
+    require_lit_colours(image, work.session, where=f"{folder}/{image.name}")
     same_size(image, work[LENS], folder)
     return image
 

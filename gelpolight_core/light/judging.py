@@ -98,7 +98,7 @@ FAULTS = {
         "%",
     ),
     "camera_moved": (
-        tr("the camera has moved against the membrane by {n:.1f} px"),
+        tr("the camera has moved against the membrane by {n:.1f} px{beyond}"),
         tr("Seat the camera and the elastomer as at calibration, or calibrate again"),
         "px",
     ),
@@ -283,13 +283,15 @@ def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> 
     size = math.hypot(common.values[SHIFT_U], common.values[SHIFT_V])
     if size < max(SIGMAS * math.hypot(common.sd[SHIFT_U], common.sd[SHIFT_V]), SHIFT_PX):
         return None
-    return fault("camera_moved", size, far=common.share < LEAST_START and size > FOLLOWED_PX)
+    lost = size > FOLLOWED_PX  # the fit cannot follow so far
+    beyond = tr(" or more") if lost else ""
+    return fault("camera_moved", size, far=common.share < LEAST_START and lost, beyond=beyond)
 
 
 def far_moved_finding(shift_px: tuple[float, float]) -> Finding:
     """Return that the camera has moved, by a search."""
     size = math.hypot(*shift_px)
-    return fault("camera_moved", size, far=size > FAR * SHIFT_PX)
+    return fault("camera_moved", size, far=size > FAR * SHIFT_PX, beyond="")
 
 
 def blur_finding(common: CommonChange, strength: Array) -> Finding | None:

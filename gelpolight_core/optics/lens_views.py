@@ -93,8 +93,7 @@ def left_out_views(views: Sequence[LensView]) -> str:
 def more_views_advice() -> str:
     """Return the advice for too few or too similar views."""
     return tr(
-        "Capture 10 or more sharp views of the board, tilted by 15 to 40 degrees in different "
-        "directions"
+        "Capture more sharp views of the board, tilted by 15 to 40 degrees in different directions"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from gelpolight_core.finding import Verdict
 from gelpolight_core.light.check import HealthCheck
 from gelpolight_core.light.finding import KEYS
 from gelpolight_core.light.fit import CommonChange
-from gelpolight_core.light.judging import dirt_finding
+from gelpolight_core.light.judging import dirt_finding, moved_finding
+from gelpolight_core.light.samples import SHIFT_U
 from gelpolight_core.light.usual import usual_of_open
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
@@ -387,3 +389,13 @@ def test_crosstalk_of_one_led_is_no_dirt(
     common = CommonChange(np.zeros(9), np.ones(9), pressed, none, np.zeros(3), np.ones(3))
     found = dirt_finding(samples, -0.3 * samples.run_light, common, np.linalg.inv(crosstalk))
     assert (() if found is None else (found.key,)) == keys
+
+
+@pytest.mark.parametrize(("shift_px", "text"), [(1.2, "by 1.2 px"), (2.0, "by 2.0 px or more")])
+def test_a_movement_beyond_the_reach_of_the_fit_is_a_lower_bound(
+    shift_px: float, text: str
+) -> None:
+    values, sd = np.zeros(16), np.full(16, 1e-3)
+    values[SHIFT_U] = shift_px
+    found = moved_finding(SimpleNamespace(values=values, sd=sd, share=1.0), None)
+    assert found is not None and found.text.endswith(text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -20,6 +20,8 @@ from app.calibrate.marks import mirror_positions_px
 from app.calibrate.radiance import detect_whiteboard
 from app.calibrate.top_pose import detect_top_pose
 from app.live.live_detection import Detection
+from gelpolight_core.calibration.image_checks import require_lit_colours
+from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.camera import Camera
@@ -298,3 +300,10 @@ def test_the_image_of_another_stage_is_rejected_with_a_sentence(
     assert not seen.ready
     assert not seen.sentence[0].islower()
     assert seen.sentence.endswith(".")
+
+
+def test_a_board_left_in_place_of_the_mirror_is_named_not_the_grey_image(session: Session) -> None:
+    board = render_board(CAMERA, board_pose(tilt_deg=5.0, towards_deg=30.0))
+    image = replace(board, rgb=np.repeat(board.rgb[..., :1], 3, axis=2))
+    with pytest.raises(InputError, match="checkerboard is still in the image"):
+        require_lit_colours(image, replace(session, checkerboard=BOARD), where="mirror")

@@ -23,6 +23,7 @@ from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.in_place_session import SETTLED
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.in_place.preset import preset_named
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.session.description import create_session
@@ -60,7 +61,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     for path in files[:-1]:
         by_radius.setdefault(opened.ball_radius_mm(path.name), []).append(path)
     for number, (radius_mm, paths) in enumerate(by_radius.items()):
-        technician.wizard.at("balls").radius.box.setValue(2.0 * radius_mm)
+        technician.wizard.at("balls").radius.setValue(2.0 * radius_mm)
         wizard.open.import_files([*paths, *([nothing] if number == 0 else [])])
         technician.until(lambda: not wizard.model.busy_with_images)
     technician.rest()
@@ -134,6 +135,20 @@ def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician.until(lambda: technician.see("calibrate.capture").isEnabled())
     technician.click("calibrate.capture")
     assert "belongs to sensor c" in technician.see("calibrate.notice").text()
+
+
+def test_a_session_from_files_shows_its_own_images_beside_a_sensor_of_its_serial(
+    technician: Technician, small_session: Path, tmp_path: Path
+) -> None:
+    technician.page.context.source.choose_virtual_sensor()
+    project = closed_project(small_session, tmp_path, balls=1)
+    description = project.session.folder / "session.toml"
+    text = description.read_text("utf-8").replace('"c"', f'"{SensorDesign().serial}"')
+    description.write_text(text, "utf-8")
+    project.reload()
+    technician.begin(project, "balls")
+    assert not technician.wizard.model.camera_fault()
+    assert technician.wizard.model.shown == project.session.found("balls")[0].name
 
 
 def test_the_scale_is_measured_on_a_pressed_pin_grid(

@@ -125,7 +125,7 @@ def test_a_good_image_that_was_there_before_asks_for_a_movement(
     project = computed_project()
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
     technician.begin(project, "balls")
-    technician.wizard.at("balls").radius.box.setValue(
+    technician.wizard.at("balls").radius.setValue(
         2.0 * project.session.ball_radius_mm("ball_01.png")
     )
     panel, count = technician.wizard.panel, len(project.session.captured("balls"))

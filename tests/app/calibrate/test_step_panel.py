@@ -77,3 +77,11 @@ def test_the_first_remedies_are_buttons_and_an_action_that_failed_comes_first(
     assert panel.sentence.isHidden() and panel.buttons[0].isHidden()
     panel.show_notice("", "pass")
     assert not panel.sentence.isHidden() and not panel.buttons[0].isHidden()
+
+
+def test_a_complete_step_without_a_figure_waits_for_none(qtbot: QtBot) -> None:
+    panel = StepPanel()
+    qtbot.addWidget(panel)
+    for waits, text in ((True, "No result yet"), (False, "")):
+        panel.show_number(None, "", waits=waits)
+        assert panel.caption.text() == text

@@ -31,7 +31,7 @@ def test_a_reported_capture_is_on_disk_with_its_radius(
 ) -> None:
     technician.begin(computed_project(), "balls")
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
-    technician.wizard.at("balls").radius.box.setValue(5.0)
+    technician.wizard.at("balls").radius.setValue(5.0)
     name = technician.capture()
     kept = read_session(technician.session)
     assert kept.ball_radii_mm[name] == 2.5
@@ -47,7 +47,7 @@ def test_a_typed_radius_is_kept_and_used_without_enter(
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
     wizard, reported = technician.wizard, list[str]()
     wizard.model.captured.connect(lambda _stage, name: reported.append(name))
-    panel, radius = wizard.panel, wizard.at("balls").radius.box
+    panel, radius = wizard.panel, wizard.at("balls").radius
     radius.setFocus()
     radius.selectAll()
     qtbot.keyClicks(radius, "8")
@@ -193,7 +193,7 @@ def test_a_radius_corrected_on_a_capture_can_be_undone(
     name = project.session.found("balls")[0].name
     before = project.session.ball_radius_mm(name)
     technician.wizard.show_capture(name)
-    technician.wizard.at("balls").radius.box.setValue(2.0 * before + 1.0)
+    technician.wizard.at("balls").radius.setValue(2.0 * before + 1.0)
     assert read_session(technician.session).ball_radius_mm(name) == before + 0.5
     technician.wizard.model.undo.undo()
     assert read_session(technician.session).ball_radius_mm(name) == before

@@ -103,7 +103,7 @@ def test_a_wrong_ball_radius_changes_the_figures(
     technician.begin(project, "balls")
     name = project.session.found("balls")[0].name
     technician.wizard.show_capture(name)
-    technician.wizard.at("balls").radius.box.setValue(project.session.ball_radius_mm(name))
+    technician.wizard.at("balls").radius.setValue(project.session.ball_radius_mm(name))
     technician.rest()
     assert technician.state("balls") in ("warn", "fail")
     assert "radius" in technician.wizard.panel.sentence.text().lower()
@@ -151,7 +151,7 @@ def test_good_files_are_imported_with_the_shown_radius(
     cv2.imwrite(str(file), np.clip(shown - 1, 0, None).astype(np.uint16)[..., ::-1])
     if read_rgb(small_session / "balls" / "ball_01.png").dtype == np.uint8:
         cv2.imwrite(str(file), np.clip(shown - 1, 0, None).astype(np.uint8)[..., ::-1])
-    technician.wizard.at("balls").radius.box.setValue(7.0)
+    technician.wizard.at("balls").radius.setValue(7.0)
     before = set(project.session.captured("balls"))
     technician.wizard.open.import_files([file])
     technician.rest()

@@ -75,7 +75,7 @@ class Work:
             project.edit_curves({0: tuple((c, v) for c, v in nodes)})
             progress(decided="curve", value=nodes)
         else:
-            self._wizard.at("balls").radius.box.setValue(4.0 + 0.2 * self._random.randrange(10))
+            self._wizard.at("balls").radius.setValue(4.0 + 0.2 * self._random.randrange(10))
             self._wizard.panel.capture.click()
 
 
