@@ -21,7 +21,7 @@ def ask_open(
     settings : Settings
         Keep the folder.
     kind : str
-        One of FOLDER_KINDS.
+        Kind of file, such as ``recording``; each remembers a folder of its own.
     title : str
         Title of the dialog.
     patterns : str

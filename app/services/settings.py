@@ -29,13 +29,6 @@ Kept = TypeVar("Kept")
 _LOG = logging.getLogger(__name__)
 
 
-# Each kind of file dialog remembers a folder of its own.
-FOLDER_KINDS = (
-    "session", "calibration", "recording", "images", "press", "height_map", "table", "report",
-    "picture",
-)  # fmt: skip
-
-
 # How an INI file of Qt stores objects. Reading a Python object would execute its content.
 OBJECTS = re.compile(rb"@(Variant|DateTime)\(", re.IGNORECASE)
 
@@ -120,19 +113,13 @@ class Settings:
         return Path(chosen) if chosen else default_folder()
 
     def folder(self, kind: str) -> Path:
-        """Return the folder in which file dialogs of a kind start.
-
-        Parameters
-        ----------
-        kind : str
-            One of FOLDER_KINDS.
-        """
-        folder = Path(self._text(_folder_key(kind)) or Path.home())
+        """Return the folder in which file dialogs of a kind start."""
+        folder = Path(self._text(f"folders/{kind}") or Path.home())
         return folder if folder.is_dir() else Path.home()
 
     def keep_folder(self, kind: str, folder: Path) -> None:
         """Remember the folder that was chosen in a file dialog of a kind."""
-        self._store.setValue(_folder_key(kind), str(folder))
+        self._store.setValue(f"folders/{kind}", str(folder))
 
     @property
     def first_page(self) -> str:
@@ -231,9 +218,3 @@ def _value(text: str, f: Field[Any]) -> str | float | None:
             return None
         return number if 0.0 < number < 1e6 else None
     return text if text in f.metadata.get("choices", (text,)) else None
-
-
-def _folder_key(kind: str) -> str:
-    if kind not in FOLDER_KINDS:
-        raise ValueError(f"no kind of file dialog: {kind}")
-    return f"folders/{kind}"

@@ -7,8 +7,9 @@ import math
 import shutil
 import threading
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from app.sources.source import Frame, Source
 from app.sources.stopping import join
@@ -100,13 +101,11 @@ class Recorder:
         self.stream, self._header, self._queue_bytes = stream, header, queue_bytes
         self._changed = threading.Condition()
         self._queue: deque[tuple[Frame, int]] = deque()
-        self._ending = self._finished = False
-        self._failure: str | None = None
-        self._frames = self._size_bytes = self._lost = 0
-        self._overrun = False
+        self._ending = self._overrun = False
+        self._figures = RecorderFigures()
         self._raw_number: int | None = None
         self._number = -1
-        self._first_s = self._last_s = 0.0
+        self._first_s = 0.0
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
@@ -135,14 +134,7 @@ class Recorder:
     def figures(self) -> RecorderFigures:
         """Return the statistics of the recording."""
         with self._changed:
-            return RecorderFigures(
-                frames=self._frames,
-                lost=self._lost,
-                size_bytes=self._size_bytes,
-                seconds=self._last_s - self._first_s,
-                failure=self._failure,
-                finished=self._finished,
-            )
+            return self._figures
 
     def _take(self, frame: Frame) -> None:
         """Put a frame into the queue; called in the capture thread."""
@@ -156,11 +148,11 @@ class Recorder:
                 # A reopened source counts from 0 again; how many frames it made meanwhile is not
                 # known.
                 step = max(frame.number - self._raw_number, 1)
-            self._lost += step - 1
             self._number += step
-            self._raw_number, self._last_s = frame.number, frame.time_s
+            self._raw_number = frame.number
+            self._note(lost=step - 1, seconds=frame.time_s - self._first_s)
             if len(self._queue) >= max(LEAST_QUEUE, self._queue_bytes // frame.rgb.nbytes):
-                self._lost += 1
+                self._note(lost=1)
                 if not self._overrun:
                     self._overrun = True
                     _LOG.warning("The disk is too slow for %s: frames are lost", self.path)
@@ -184,10 +176,14 @@ class Recorder:
             failure = tr("Internal error: {kind}; see the log.").format(kind=type(error).__name__)
         self.stream.remove_tap(self._take)
         with self._changed:
-            self._ending = self._finished = True
-            self._failure = failure
-            self._lost += len(self._queue)  # frames that wait now are never written
+            self._ending = True
+            lost = len(self._queue)  # frames that wait now are never written
+            self._note(lost=lost, failure=failure, finished=True)
             self._queue.clear()
+
+    def _note(self, lost: int = 0, **values: Any) -> None:
+        """Change some of the statistics, and count further lost frames."""
+        self._figures = replace(self._figures, lost=self._figures.lost + lost, **values)
 
     def _write_all(self, writer: RecordingWriter) -> None:
         shape = None
@@ -207,7 +203,7 @@ class Recorder:
             writer.append(frame.rgb, number, frame.time_s)
             with self._changed:
                 self._queue.popleft()
-                self._frames, self._size_bytes = writer.frames, writer.size_bytes
+                self._note(frames=writer.frames, size_bytes=writer.size_bytes)
 
 
 # Left free for the system and for the results of measurements.

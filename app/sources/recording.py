@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -84,7 +84,7 @@ class RecordingSource:
         self.size = (0, 0)
         self._changed = threading.Condition()
         self._recording: Recording | None = None
-        self._playing, self._loop, self._speed = playing, loop, speed
+        self._now = Playback(playing=playing, loop=loop, speed=speed)
         self._position, self._direction = 0, 1
         self._pending: int | None = 0
         self._number = -1
@@ -142,8 +142,7 @@ class RecordingSource:
     def set(self, key: Literal["speed"], value: float) -> None:
         """Change the speed; 1 is the original one."""
         with self._changed:
-            self._speed = value
-            self._changed.notify_all()
+            self._change(speed=value)
 
     def close(self) -> None:
         """Close the file."""
@@ -159,32 +158,29 @@ class RecordingSource:
         with self._changed:
             recording = self._recording
             if recording is None:
-                return Playback(playing=self._playing, loop=self._loop, speed=self._speed)
+                return self._now
             at = self._position if self._pending is None else self._pending
-            return Playback(
+            return replace(
+                self._now,
                 position=at,
                 count=len(recording),
                 time_s=float(recording.times_s[at] - recording.times_s[0]),
                 duration_s=recording.duration_s,
-                playing=self._playing,
-                loop=self._loop,
-                speed=self._speed,
                 damaged=len(self._damaged),
             )
 
     def play(self) -> None:
         """Continue to play; from the start if the end was reached."""
         with self._changed:
-            if not self._playing and self._following() is None:
+            if not self._now.playing and self._following() is None:
                 self._pending = 0
-            self._playing, self._due_s = True, time.monotonic()
-            self._changed.notify_all()
+            self._due_s = time.monotonic()
+            self._change(playing=True)
 
     def pause(self) -> None:
         """Pause at the shown frame."""
         with self._changed:
-            self._playing = False
-            self._changed.notify_all()
+            self._change(playing=False)
 
     def seek(self, index: int) -> None:
         """Go to a frame, or the nearest one if the index does not exist; keep playing or paused."""
@@ -195,8 +191,8 @@ class RecordingSource:
 
     def step(self, count: int = 1) -> None:
         """Pause, and move forward by a number of frames (back if negative)."""
+        self.pause()
         with self._changed:
-            self._playing = False
             self._direction = 1 if count > 0 else -1
             at = self._position if self._pending is None else self._pending
         self.seek(at + count)
@@ -204,24 +200,28 @@ class RecordingSource:
     def set_loop(self, loop: bool) -> None:
         """Set whether to restart after the last frame."""
         with self._changed:
-            self._loop = loop
-            self._changed.notify_all()
+            self._change(loop=loop)
+
+    def _change(self, **values: Any) -> None:
+        """Change some of the state, and let the waiting thread see it."""
+        self._now = replace(self._now, **values)
+        self._changed.notify_all()
 
     def _following(self) -> int | None:
         """Return the frame after the shown one; None at the end."""
         assert self._recording is not None
         if self._position + 1 < len(self._recording):
             return self._position + 1
-        return 0 if self._loop else None
+        return 0 if self._now.loop else None
 
     def _next(self, now_s: float) -> tuple[int | None, float]:
         """Return when and which frame is due next; None means the same frame again."""
         if self._pending is not None:
             return self._pending, now_s
         again_s = self._delivered_s + REPEAT_S
-        following = self._following() if self._playing else None
+        following = self._following() if self._now.playing else None
         if following is None:
-            self._playing = False
+            self._now = replace(self._now, playing=False)
             return None, again_s
         due_s = self._due_s + self._interval_s(self._position)
         return (following, due_s) if due_s <= again_s else (None, again_s)
@@ -234,12 +234,12 @@ class RecordingSource:
             own_s = float(times_s[index + 1] - times_s[index])
         elif len(times_s) > 1:
             own_s = float(np.median(np.diff(times_s)))
-        return max(own_s, 1e-3) / self._speed
+        return max(own_s, 1e-3) / self._now.speed
 
     def _move_to(self, index: int, due_s: float, now_s: float) -> int:
         """Show a frame, or a later one when behind schedule; return how many were advanced."""
         self._pending, self._position, counted = None, index, 1
-        while self._speed > 1.0:
+        while self._now.speed > 1.0:
             following, next_s = self._following(), due_s + self._interval_s(self._position)
             if following is None or next_s > now_s:
                 break
@@ -260,7 +260,7 @@ class RecordingSource:
                 self._damaged.add(index)
                 if len(self._damaged) == len(recording):
                     raise
-                if not self._playing and self._pending is None:
+                if not self._now.playing and self._pending is None:
                     self._pending = (index + self._direction) % len(recording)
             return None
         self._shown = (index, rgb)
