@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.bench import BOARDS, PRESSED, Bench, Scene
-from app.sources.stopping import RENDERING, join, lower_priority
+from app.sources.stopping import RENDERING, Worker, lower_priority
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.boards import BoardPose, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -56,8 +56,8 @@ class _Superseded(Exception):
     """A newer scene is requested, or none is needed any more."""
 
 
-class Renderer:
-    """Renders requested scenes in a separate thread.
+class Renderer(Worker):
+    """Renders requested scenes in a separate thread, which runs until it is stopped.
 
     Parameters
     ----------
@@ -66,14 +66,13 @@ class Renderer:
     """
 
     def __init__(self, bench: Bench) -> None:
+        super().__init__("virtual sensor")
         self._bench = bench
         self._changed = threading.Condition()
         self._wanted: Scene | None = None
         self._newest: Rendering | None = None
         self._failure: Exception | None = None
-        self._closing = False
-        self._thread = threading.Thread(target=self._run, name="virtual sensor", daemon=True)
-        self._thread.start()
+        self.start()
 
     def request(self, scene: Scene) -> None:
         """Request a scene; it replaces all earlier requests."""
@@ -95,19 +94,15 @@ class Renderer:
                 raise self._failure
             return self._newest
 
-    def close(self) -> None:
-        """Stop rendering; may be called twice."""
-        with self._changed:
-            self._closing = True
-            self._changed.notify_all()
-        join(self._thread)
-
-    def _run(self) -> None:
+    def _run(self, end: threading.Event) -> None:
         lower_priority(RENDERING)
         try:
             makers = _Makers(self._bench)
             done: Scene | None = None
-            while (scene := self._next(done)) is not None:
+            while not end.is_set():
+                scene = self._next(done)
+                if scene is None:
+                    continue
                 try:
                     self._publish(makers.preview(scene, self._check_open))
                     makers.get_ready(self._check_open)
@@ -121,17 +116,19 @@ class Renderer:
                 self._changed.notify_all()
 
     def _next(self, done: Scene | None) -> Scene | None:
+        """Wait for another scene than the last one; None if none is requested in time."""
         with self._changed:
-            self._changed.wait_for(lambda: self._closing or self._wanted not in (None, done))
-            return None if self._closing else self._wanted
+            changed = self._changed.wait_for(lambda: self._wanted not in (None, done), 0.1)
+            return self._wanted if changed else None
 
     def _check_open(self) -> None:
-        if self._closing:
+        if self._end.is_set():
             raise _Superseded
 
     def _check_newest(self, scene: Scene) -> None:
+        self._check_open()
         with self._changed:
-            if self._closing or self._wanted != scene:
+            if self._wanted != scene:
                 raise _Superseded
 
     def _publish(self, rendering: Rendering | None) -> None:

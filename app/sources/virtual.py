@@ -103,7 +103,7 @@ class VirtualSource:
         """Stop rendering."""
         self._closed.set()
         if self._renderer is not None:
-            self._renderer.close()
+            self._renderer.stop()
         self._renderer, self._developed = None, None
 
     def _refuse_if_stopped(self, conditions: Conditions) -> None:
