@@ -106,7 +106,10 @@ class ResultStep(StepPresenter):
         self.report = push_button(
             "result.report", tr("Write the &report…"), partial(ask_report, self)
         )
-        self.own = tuple(map(self.panel.add_foot, (self.report, self.save)))
+        self.saved = named(PlainLabel(wrap=True), "result.saved", tr("Where it was saved"))
+        show_meaning(self.saved, "pass")
+        foot = self.saved, self.report, self.save
+        self.own = tuple(map(self.panel.add_foot, foot))
         self.tabs = named(QTabWidget(documentMode=True), "result.tabs", tr("Result"))
         self.tabs.addTab(self.overview, tr("Verdict"))
         if REFLECTANCE.key in self.model.statuses:
@@ -174,11 +177,6 @@ class ResultStep(StepPresenter):
         """Return nothing: the figures have their own place."""
         return ()
 
-    def progress_line(self) -> str:
-        """Return where the calibration of the present captures is saved."""
-        name = self.model.saved
-        return tr("Saved as {name}. Validate it next.").format(name=name) if name else ""
-
     def leave(self) -> None:
         """Make Next the main button again."""
         super().leave()
@@ -192,6 +190,8 @@ class ResultStep(StepPresenter):
     def refresh(self) -> None:
         """Show the present state of every stage."""
         model, statuses = self.model, self.model.statuses
+        text = tr("Saved as {name}. Validate it next.").format(name=model.saved)
+        self.saved.setText(text if model.saved else "")
         quality = {key: status.quality for key, status in statuses.items()}
         self._mend = mend_of(quality, model.project.results)
         _, tables = with_one_cause(quality)

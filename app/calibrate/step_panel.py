@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import isfinite
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFrame,
@@ -261,6 +262,13 @@ class StepPanel(QWidget):
         self.notice.setText(sentence)
         self._notice_role = role
         self._show_message()
+        if sentence:
+            self.reveal_message()
+
+    def reveal_message(self) -> None:
+        """Scroll to what is wrong or comes next, once it has its place."""
+        reveal = partial(self._scroll.ensureWidgetVisible, self._message)
+        QTimer.singleShot(0, self, reveal)
 
     def show_running(self) -> None:
         """Show that the step is being computed; its figures stay until new ones arrive."""

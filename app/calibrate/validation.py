@@ -244,6 +244,7 @@ class ValidationStep(StepPresenter):
                 "Calibration: {name}. Its captures or corrections have changed since. Save it "
                 "again."
             )
+        self.calibration.setVisible(not present)
         self.calibration.setText(text.format(name=self._path and self._path.stem))
         show_meaning(self.calibration, "" if present else "warn")
         self.keep.setEnabled(self._trial is not None and self._trial.recordable)
@@ -400,6 +401,7 @@ class ValidationStep(StepPresenter):
             return
         self.panel.show_notice("", "pass")
         self.context.requests.calibrations_changed.emit()
+        self.panel.reveal_message()
 
 
 def _known_in_folder(path: Path) -> Truth | None:

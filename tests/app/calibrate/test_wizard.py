@@ -226,7 +226,7 @@ def test_the_saved_calibration_equals_that_of_the_command_line(
     technician.begin(computed_project(), "result")
     technician.click("result.save")
     technician.rest()
-    assert "Saved as" in technician.wizard.panel.below.text()
+    assert "Saved as" in technician.see("result.saved").text()
     (path,) = (tmp_path / "workspace" / "sensors").rglob("*.gplcal")
     made, theirs = read_calibration(path), small_calibration
     assert made.identity == theirs.identity
@@ -308,13 +308,13 @@ def test_where_it_was_saved_is_shown_until_the_captures_change(
     assert step.save.property("primary") and not wizard.panel.next.property("primary")
     technician.click("result.save")
     technician.rest()
-    assert wizard.model.saved in wizard.panel.below.text()
+    assert wizard.model.saved in step.saved.text()
     assert step.overview.every.isVisible(), "the figures stay open"
     assert not step.save.property("primary") and wizard.panel.next.property("primary")
     wizard.model.exclude("balls", "ball_01.png", True)
     wizard.model.jobs.cancel()
     technician.rest()
-    assert not wizard.panel.below.text()
+    assert not step.saved.text()
 
 
 def test_curves_and_other_corrections_share_one_history(
