@@ -21,6 +21,10 @@ from gelpolight_core.translation import pattern, tr
 
 AUTO = "auto"
 """The value for automatic selection of the shape."""
+PIXEL = 1.0 / 12.0
+"""Variance of a pixel's own width, which the blur of the board's edges contains in part."""
+BOARD_PX = 0.1
+"""Pixels by which the blur of an image differs from that of the board."""
 
 
 def measure_heightmap(
@@ -82,6 +86,10 @@ def mode_error(heightmap: HeightMap) -> ModeError:
     effort = "fast" if heightmap.trace is None else heightmap.trace.effort
     found = MODE_ERRORS[Mode(heightmap.model, effort)]
     node_mm = heightmap.pitch_mm * found.node_mm
+    blur_mm2, blur_sd = node_mm**2 / 3.0, 1.0
+    if heightmap.image_blur_mm is not None:
+        blur_mm2 += heightmap.image_blur_mm**2
+        blur_sd = math.hypot(PIXEL, 2.0 * BOARD_PX * heightmap.image_blur_mm / heightmap.pitch_mm)
     # Beyond its margin, the drape may have any depth up to what is left of the smallest visible
     # one; the ground around an object is fitted with it.
     hidden_mm = math.exp(-MARGIN_DECAYS) * (heightmap.visible_depth_mm or 0.0)
@@ -90,7 +98,8 @@ def mode_error(heightmap: HeightMap) -> ModeError:
         depth_per_slope=found.depth_per_slope * (heightmap.pitch_mm / MODE_PITCH_MM) ** 2,
         lateral_per_mm=heightmap.lateral_per_mm,
         node_mm=node_mm,
-        blur_mm2=found.blur_mm2 * node_mm**2 / 3.0,
+        blur_mm2=found.blur_mm2 * blur_mm2,
+        blur_sd_mm2=found.blur_mm2 * blur_sd * heightmap.pitch_mm**2,
         smoothed_mm2=found.smoothed_mm2 * node_mm**2,
         level_mm=hidden_mm / math.sqrt(12.0),
     )

@@ -100,8 +100,7 @@ def measure_object(
             where=tr("shape"),
             advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
-    blur_mm2 = 0.0 if mode is None else mode.blur_mm2
-    window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, blur_mm2=blur_mm2)
+    window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, mode=mode)
     if shape == "ball" and mode is not None and mode.smoothed_mm2:
         window = replace(window, depth_mm=_sharpened(window, mode.smoothed_mm2))
     model = MODELS[shape]
@@ -132,17 +131,14 @@ def find_object(
     seed_mm: tuple[float, float] | None = None,
     *,
     reach_mm: float = 0.0,
-    blur_mm2: float = 0.0,
+    mode: ModeError | None = None,
 ) -> tuple[WindowData, PressedRegion, EdgePrior]:
     """Return the object with the ground around it, its segmented bump, and what its edge may be.
 
     Parameters
     ----------
-    heightmap, seed_mm, reach_mm
+    heightmap, seed_mm, reach_mm, mode
         As for :func:`measure_object`.
-    blur_mm2 : float, optional
-        Variance of the map's blur, a third of a node squared, known to one pixel squared; 0 if it
-        is not known.
 
     Raises
     ------
@@ -167,10 +163,11 @@ def find_object(
             advice=Remedy.PRESS_MIDDLE,
         )
     window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
-    pixel_mm2 = window.pitch_mm**2
-    blur = (blur_mm2, pixel_mm2) if blur_mm2 else (pixel_mm2, UNKNOWN_BLUR_MM**2)
-    # Nodes that do not resolve the drape have errors at walls that would be taken for a fillet.
-    known = 0.0 < blur_mm2 <= (MOST_PITCH * TYPICAL_DECAY_MM) ** 2 / 3.0
+    blur, known = (window.pitch_mm**2, UNKNOWN_BLUR_MM**2), False
+    if mode is not None and mode.blur_mm2 > 0.0:
+        blur = mode.blur_mm2, mode.blur_sd_mm2
+        # Nodes that do not resolve the drape have errors at walls that look like a fillet.
+        known = mode.node_mm <= MOST_PITCH * TYPICAL_DECAY_MM
     edge = EdgePrior(EDGE_RADIUS_MM, 0.5 * EDGE_RADIUS_MM, *blur, blur_known=known)
     return window, region, edge
 

@@ -58,7 +58,9 @@ class ModeError:
     node_mm : float
         Distance between the solved nodes: a large distance rounds the upper end of walls.
     blur_mm2 : float
-        Variance of the map's blur by these nodes; 0 if it is not known.
+        Variance of the map's blur by these nodes and by the camera; 0 if it is not known.
+    blur_sd_mm2 : float
+        Standard deviation of this variance.
     level_mm : float
         Standard deviation of heights by the drape beyond the solved region, which is left out.
     smoothed_mm2 : float
@@ -73,6 +75,7 @@ class ModeError:
     lateral_per_mm: float = 0.0
     node_mm: float = 0.0
     blur_mm2: float = 0.0
+    blur_sd_mm2: float = 0.0
     level_mm: float = 0.0
     smoothed_mm2: float = 0.0
     depth_by_lateral: float = 0.0
@@ -93,7 +96,7 @@ MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
         },
         **{
             Mode(IN_PLACE, effort): ModeError(
-                0.0, share, 0.0, 1.0, 0.0, 0.0, SMOOTHING_NODES**2, 2.0
+                0.0, share, node_mm=1.0, smoothed_mm2=SMOOTHING_NODES**2, depth_by_lateral=2.0
             )
             for effort, share in _PER_SLOPE.items()
         },

@@ -60,7 +60,7 @@ FLAG_NAMES = MappingProxyType({str(flag.name).lower(): flag.value for flag in Fl
 SD_MAPS = ("slope_sd", "depth_sd_mm", "slope_model_sd", "depth_model_sd_mm")
 """The maps of standard deviations that a height map can contain."""
 
-SENSOR_NUMBERS = ("depth_scale_sd", "lateral_scale_sd", "visible_depth_mm")
+SENSOR_NUMBERS = ("depth_scale_sd", "lateral_scale_sd", "visible_depth_mm", "image_blur_mm")
 """The numbers of the sensor that a height map can contain."""
 
 
@@ -110,6 +110,9 @@ class HeightMap:
         Smallest depth of a pressed flat face that is visible above the noise; a shallower face has
         depth 0. None where contacts were not looked for: the paper's model looks for one only in
         images that show none at first sight.
+    image_blur_mm : float or None
+        Standard deviation of the blur of the sensor's images, on the membrane. None where no board
+        showed it.
     trace : Trace or None
         Which steps were done, and why the others were left out.
     health : Health or None
@@ -150,6 +153,7 @@ class HeightMap:
     depth_scale_sd: float | None = None
     lateral_scale_sd: float | None = None
     visible_depth_mm: float | None = None
+    image_blur_mm: float | None = None
     trace: Trace | None = None
     health: Health | None = None
     lateral_per_mm: float = 0.0

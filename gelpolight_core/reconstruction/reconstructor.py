@@ -293,6 +293,7 @@ class Reconstructor:
             depth_scale_sd=solved.depth_scale_sd,
             lateral_scale_sd=solved.lateral_scale_sd,
             visible_depth_mm=solved.visible_depth_mm,
+            image_blur_mm=solved.image_blur_mm,
             trace=solved.trace,
             health=health,
             lateral_per_mm=solved.lateral_per_mm,

@@ -118,7 +118,7 @@ class Solved:
         What was done and what was left out.
     noise : DepthNoise or None
         Its uncertainty, if requested.
-    depth_scale_sd, lateral_scale_sd, visible_depth_mm, lateral_per_mm
+    depth_scale_sd, lateral_scale_sd, visible_depth_mm, image_blur_mm, lateral_per_mm
         As in :class:`HeightMap`.
     """
 
@@ -131,6 +131,7 @@ class Solved:
     depth_scale_sd: float | None = None
     lateral_scale_sd: float | None = None
     visible_depth_mm: float | None = None
+    image_blur_mm: float | None = None
     lateral_per_mm: float = 0.0
 
 

@@ -31,7 +31,8 @@ def measured(
     depth = gaussian_filter(surface.depth_mm.astype(float), blur_mm / surface.pitch_mm)
     depth += 2e-4 * np.random.default_rng(0).standard_normal(depth.shape)
     # A reconstruction's errors hang together over the drape.
-    mode = ModeError(0.0, 0.0, blur_mm2=blur_mm**2) if known else None
+    pixel_mm2 = surface.pitch_mm**2
+    mode = ModeError(0.0, 0.0, blur_mm2=blur_mm**2, blur_sd_mm2=pixel_mm2) if known else None
     x, y = surface.x_mm, surface.y_mm
     return measure_object(on_grid(depth, x, y), shape=shape, reach_mm=DECAY_MM, mode=mode)
 

@@ -266,7 +266,7 @@ class NearLightSolver(OpenSolver):
             record.left_out(tr("normals"), tr("not requested"))
         if not wanted.uncertainty:
             record.left_out(tr("standard deviations"), tr("not requested"))
-        scale = self.maps.full.scale_sd
+        scale, blur_px = self.maps.full.scale_sd, self.calibration.lens_blur_px
         stated = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
         return Solved(
             depth,
@@ -278,6 +278,9 @@ class NearLightSolver(OpenSolver):
             depth_scale_sd=None if scale is None else math.hypot(scale.depth, stated.depth),
             lateral_scale_sd=None if scale is None else math.hypot(scale.lateral, stated.lateral),
             visible_depth_mm=None if wanted.everywhere else self.visible_mm,
+            image_blur_mm=None
+            if blur_px is None
+            else blur_px * self.calibration.table.grid.pitch_mm,
         )
 
     def _noise(
