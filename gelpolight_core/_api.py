@@ -146,7 +146,11 @@ def read_image(path: AnyPath) -> NDArray[Any]:
 
 
 def measure(
-    height_map: HeightMap, *, shape: str = AUTO, at_mm: tuple[float, float] | None = None
+    height_map: HeightMap,
+    *,
+    shape: str = AUTO,
+    at_mm: tuple[float, float] | None = None,
+    edge_radius_mm: float | None = None,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane.
 
@@ -161,6 +165,9 @@ def measure(
         What is pressed. ``auto`` fits all three and refuses an unclear result.
     at_mm : (float, float), optional
         A point (x, y) on the object, needed where several are pressed.
+    edge_radius_mm : float, optional
+        Stated fillet of the edge of a cylinder or cuboid. By default it is fitted, and the
+        deviation of the sizes contains what the map does not show of it.
 
     Returns
     -------
@@ -184,7 +191,8 @@ def measure(
     """
     if height_map.health is not None:
         refuse_meaningless(height_map.health, where=height_map.source or tr("height map"))
-    return judged(measure_heightmap(height_map, shape=shape, seed_mm=at_mm), height_map)
+    found = measure_heightmap(height_map, shape=shape, seed_mm=at_mm, edge_radius_mm=edge_radius_mm)
+    return judged(found, height_map)
 
 
 def read_height_map(path: AnyPath) -> HeightMap:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.command_line.options import file, place, result
+from app.command_line.options import file, option, place, result
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import despite_faults, load_reconstructor, model, read_frame
 from app.command_line.terminal import say
@@ -33,6 +33,10 @@ class Measure(ToolArguments):
     calibration: Path = place("CALIBRATION")
     images: list[Path] = place("IMAGE")
     truth: Path | None = file(tr("truth.csv with these images; with --shape"))
+    edge_radius: float | None = option(
+        help=tr("edge radius of the cylinder or cuboid in mm, if it is known; with --shape"),
+        metavar="MM",
+    )
     json: Path | None = result()
     despite_faults: bool = despite_faults()
     model: str | None = model()
@@ -43,6 +47,12 @@ class Measure(ToolArguments):
         An image that cannot be measured is reported, and the other images are measured.
         """
         tools = self.tools()
+        if tools and self.edge_radius is not None:
+            raise InputError(
+                tr("Tools do not use an edge radius"),
+                where="--edge-radius",
+                advice=Remedy.REMOVE_OPTION,
+            )
         truths = self._truths()
         reconstructor = load_reconstructor(self.calibration, self.model)
         several = len(self.images) > 1
@@ -93,7 +103,9 @@ class Measure(ToolArguments):
             }
             return content, [*(x for result in results for x in tool_lines(result)), *corrected]
         assert self.shape is not None  # it or a tool is required
-        found = measure_heightmap(heightmap, shape=self.shape, seed_mm=self.seed())
+        found = measure_heightmap(
+            heightmap, shape=self.shape, seed_mm=self.seed(), edge_radius_mm=self.edge_radius
+        )
         measurement = judged(found, heightmap)
         values = measurement.as_json(truth)
         shape = [f"{tr('shape'):<12} {measurement.shape}"] if self.shape == AUTO else []

@@ -57,7 +57,9 @@ class EdgePrior:
     blur_mm2, blur_sd_mm2 : float
         Variance of the map's blur, in which the map is linear, and what is not known of it.
     blur_known : bool
-        Whether the blur follows from the nodes of the map, so that the fillet can be fitted freely.
+        Whether the blur follows from nodes and image, so that the map can show another fillet.
+    stated : bool
+        Whether the fillet was stated: then it is kept, and another one is only reported.
     """
 
     edge_radius_mm: float
@@ -65,6 +67,7 @@ class EdgePrior:
     blur_mm2: float
     blur_sd_mm2: float
     blur_known: bool
+    stated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +119,8 @@ class FitResult:
         How many neighbouring pixels have a common error.
     converged : bool
         Whether the solver converged.
+    other_edge_mm : float or None
+        The fillet that the map shows in place of the stated one.
     """
 
     values: Mapping[str, float]
@@ -126,6 +131,7 @@ class FitResult:
     residual_rms_mm: float
     correlated_pixels: float
     converged: bool
+    other_edge_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +168,8 @@ def fit_indenter(
 
     Weighted least squares with Huber weights. `edge` is the prior of the edge's fillet and the
     map's blur. Its weight depends on the number of independent errors in the data. If another
-    of `EDGES_MM` is clearly more likely than a usual fillet, it is fitted freely.
-    The standard deviations include the fillets that explain the map as well.
+    of `EDGES_MM` is clearly more likely than a usual fillet, it is fitted freely, or reported if
+    the fillet was stated. The standard deviations include the fillets that explain the map as well.
 
     Parameters
     ----------
@@ -182,9 +188,12 @@ def fit_indenter(
     if others is None:
         return fit
     best = int(np.argmin(others.excess))
-    if edge.blur_known and others.excess[best] + SURE**2 < others.usual:
-        moved = zip(fit.values.items(), others.changes[best], strict=True)
-        start = {name: value + float(change) for (name, value), change in moved}
+    moved = zip(fit.values.items(), others.changes[best], strict=True)
+    start = {name: value + float(change) for (name, value), change in moved}
+    other = edge.blur_known and others.excess[best] + SURE**2 < others.usual
+    if edge.stated:
+        return replace(fit, other_edge_mm=start["edge_radius_mm"] if other else None)
+    if other:
         fit, others = _fit(
             model, window, start, replace(edge, edge_radius_sd_mm=EDGES_MM[-1]), most_rounds
         )

@@ -53,6 +53,7 @@ def fit_problems(
         As for the fit.
     """
     return (
+        _other_edge(fit, edge),
         None if fit.converged else doubt("not_converged", tr("the fit did not converge")),
         _wrong_shape(shape, fit, window, region, edge),
         _wide(shape, fit),
@@ -128,6 +129,14 @@ def _odd_drape(fit: FitResult) -> Finding | None:
         return None
     text = tr("the fitted decay length of the drape is {decay:.2f} mm")
     return doubt("drape", text.format(decay=decay))
+
+
+def _other_edge(fit: FitResult, edge: EdgePrior) -> Finding | None:
+    if fit.other_edge_mm is None:
+        return None
+    text = tr("the map shows an edge radius of {shown:.2f} mm, not {stated:.2f} mm as stated")
+    text = text.format(shown=fit.other_edge_mm, stated=edge.edge_radius_mm)
+    return doubt("edge_radius", text)
 
 
 def _cut_drape(window: WindowData) -> Finding | None:

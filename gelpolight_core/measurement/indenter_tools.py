@@ -28,7 +28,11 @@ BOARD_PX = 0.1
 
 
 def measure_heightmap(
-    heightmap: HeightMap, *, shape: str, seed_mm: Point | None = None
+    heightmap: HeightMap,
+    *,
+    shape: str,
+    seed_mm: Point | None = None,
+    edge_radius_mm: float | None = None,
 ) -> Measurement:
     """Measure the pressed object with all data of a height map.
 
@@ -40,6 +44,8 @@ def measure_heightmap(
         What is pressed; ``auto`` fits all three.
     seed_mm : (float, float), optional
         A point (x, y) on the object; needed where several objects are pressed.
+    edge_radius_mm : float, optional
+        Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
 
     Raises
     ------
@@ -51,7 +57,14 @@ def measure_heightmap(
         if shape == AUTO:
             shape = _found_shape(heightmap, seed_mm)
         mode, reach_mm = mode_error(heightmap), TYPICAL_DECAY_MM
-        return measure_object(heightmap, shape=shape, seed_mm=seed_mm, mode=mode, reach_mm=reach_mm)
+        return measure_object(
+            heightmap,
+            shape=shape,
+            seed_mm=seed_mm,
+            mode=mode,
+            reach_mm=reach_mm,
+            edge_radius_mm=edge_radius_mm,
+        )
     except InputError as error:
         for doubt in heightmap.doubts:
             found = pattern("{cause}; {found}", cause=doubt.text, found=error.found)

@@ -14,6 +14,7 @@ from scipy import ndimage
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.fit import (
+    EDGES_MM,
     EdgePrior,
     FitResult,
     WindowData,
@@ -56,6 +57,9 @@ DRAPE_MM = 1.5
 EDGE_RADIUS_MM = 0.08
 """Fillet of an object's edge if the map does not show it, known to half of itself: edges of printed
 and machined indenters have 0.05 to 0.1 mm."""
+STATED_SHARE, STATED_SD_MM = 0.1, 0.01
+"""Standard deviation of a stated fillet, as a share of it and at least in mm: a radius gauge has
+steps of 0.1 mm or a fifth."""
 UNKNOWN_BLUR_MM = 0.1
 """Root of the sd of the squared blur where nothing is known of it."""
 SEED_REACH_MM = 1.0
@@ -69,6 +73,7 @@ def measure_object(
     seed_mm: tuple[float, float] | None = None,
     mode: ModeError | None = None,
     reach_mm: float = 0.0,
+    edge_radius_mm: float | None = None,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane; its drape is fitted, too.
 
@@ -87,12 +92,14 @@ def measure_object(
     reach_mm : float, optional
         Least correlation length of the map's errors. Errors of maps that were integrated from
         slopes are correlated over the drape; 0 if they can be white noise.
+    edge_radius_mm : float, optional
+        Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
 
     Raises
     ------
     InputError
-        Unknown shape, nothing pressed, several objects and no seed, no object at the seed, an
-        object cut by the border.
+        Unknown shape, an edge radius that cannot be, nothing pressed, several objects and no seed,
+        no object at the seed, an object cut by the border.
     """
     if shape not in MODELS:
         raise InputError(
@@ -101,6 +108,8 @@ def measure_object(
             advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
     window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, mode=mode)
+    if edge_radius_mm is not None:
+        prior = _stated(prior, shape, edge_radius_mm)
     if shape == "ball" and mode is not None and mode.smoothed_mm2:
         window = replace(window, depth_mm=_sharpened(window, mode.smoothed_mm2))
     model = MODELS[shape]
@@ -118,6 +127,26 @@ def measure_object(
     of_mode = {} if mode is None else mode_sd(shape, fit, window, mode)
     parts = (noise, scale, of_mode)
     return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
+
+
+def _stated(prior: EdgePrior, shape: str, edge_radius_mm: float) -> EdgePrior:
+    """Return what is known of an edge whose fillet was stated."""
+    if shape == "ball":
+        raise InputError(
+            tr("A ball has no edge radius"),
+            where=tr("edge radius"),
+            advice=tr("Leave it out, or measure a cylinder or a cuboid"),
+        )
+    if not 0.0 <= edge_radius_mm <= EDGES_MM[-1]:
+        raise InputError(
+            tr("The edge radius {radius:g} mm is not between 0 and {most:g} mm").format(
+                radius=edge_radius_mm, most=EDGES_MM[-1]
+            ),
+            where=tr("edge radius"),
+            advice=tr("Correct it, or leave it out: it is fitted then"),
+        )
+    sd_mm = max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
+    return replace(prior, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
 
 
 def _sharpened(window: WindowData, smoothed_mm2: float) -> Array:

@@ -6,12 +6,15 @@ corners of its own.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from maps import on_grid
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.indenter_tools import measure_heightmap, mode_error
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.spread import BALL_SLOPE, ModeError, calibration_sd
@@ -24,7 +27,12 @@ DECAY_MM = 0.7
 
 
 def measured(
-    indenter: Cylinder | Cuboid, shape: str, *, blur_mm: float, known: bool = False
+    indenter: Cylinder | Cuboid,
+    shape: str,
+    *,
+    blur_mm: float,
+    known: bool = False,
+    edge_radius_mm: float | None = None,
 ) -> Measurement:
     """Measure the true surface, blurred and with noise of 0.2 um."""
     surface = press(indenter, yaw_deg=20.0, decay_mm=DECAY_MM)
@@ -34,7 +42,13 @@ def measured(
     pixel_mm2 = surface.pitch_mm**2
     mode = ModeError(0.0, 0.0, blur_mm2=blur_mm**2, blur_sd_mm2=pixel_mm2) if known else None
     x, y = surface.x_mm, surface.y_mm
-    return measure_object(on_grid(depth, x, y), shape=shape, reach_mm=DECAY_MM, mode=mode)
+    return measure_object(
+        on_grid(depth, x, y),
+        shape=shape,
+        reach_mm=DECAY_MM,
+        mode=mode,
+        edge_radius_mm=edge_radius_mm,
+    )
 
 
 def sizes(measurement: Measurement) -> list[tuple[float, float]]:
@@ -84,6 +98,35 @@ def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(
             assert abs(size - 5.0) < 3.0 * sd or found.verdict == "doubtful"
             if known and blur_mm < 0.02 and edge_mm > 0.1:
                 assert abs(size - 5.0) < 0.02
+
+
+def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported() -> None:
+    options = {"blur_mm": 0.07, "known": True}
+    fitted = measured(Cylinder(5.0, 1.0, 0.0), "cylinder", **options)
+    stated = measured(Cylinder(5.0, 1.0, 0.0), "cylinder", **options, edge_radius_mm=0.0)
+    assert stated.diameter_mm == pytest.approx(5.0, abs=0.01)
+    assert stated.size_sd_mm < 0.5 * fitted.size_sd_mm
+    assert stated.verdict == "ok"
+
+    wrong = measured(Cylinder(5.0, 1.0, 0.5), "cylinder", **options, edge_radius_mm=0.1)
+    assert wrong.findings[0].key == "edge_radius"
+    assert wrong.verdict == "doubtful"
+
+
+@pytest.mark.parametrize(("shape", "radius_mm"), [("ball", 0.1), ("cylinder", -0.1)])
+def test_an_edge_radius_that_cannot_be_is_refused(shape: str, radius_mm: float) -> None:
+    with pytest.raises(InputError):
+        measured(Cylinder(5.0, 1.0, 0.1), shape, blur_mm=0.02, edge_radius_mm=radius_mm)
+
+
+def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board(sensor: KnownSensor) -> None:
+    surface = press(Cylinder(3.0, 0.5), decay_mm=DECAY_MM)
+    frame = sensor.sensor.frame(PressedMembrane(surface), stream="blur")
+    heightmap = Reconstructor(sensor.calibration).depth(frame, normals=False)
+    known = mode_error(replace(heightmap, image_blur_mm=0.5 * heightmap.pitch_mm))
+    unknown = mode_error(replace(heightmap, image_blur_mm=None))
+    assert known.blur_mm2 == pytest.approx(unknown.blur_mm2 + (0.5 * heightmap.pitch_mm) ** 2)
+    assert known.blur_sd_mm2 < 0.2 * unknown.blur_sd_mm2
 
 
 @pytest.fixture(scope="module")
