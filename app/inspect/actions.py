@@ -9,8 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QBuffer, QCoreApplication, QObject
-from PySide6.QtGui import QImage
+from PySide6.QtCore import QBuffer, QByteArray, QCoreApplication, QObject
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
@@ -160,8 +159,11 @@ class FileActions(QObject):
         name = f"inspect-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.png"
         path = self._ask_save("picture", tr("Save the image"), name, tr("Image (*.png)"))
         if path is not None:
-            data = png_bytes(image)
-            self._write(path, lambda path: write_atomically(path, lambda file: file.write(data)))
+            data = QByteArray()
+            image.save(QBuffer(data), b"PNG")
+            self._write(
+                path, lambda path: write_atomically(path, lambda file: file.write(data.data()))
+            )
 
     def _ask_save(self, kind: str, title: str, name: str, patterns: str) -> Path | None:
         return ask_save(self._owner, self._context.settings, kind, title, name, patterns)
@@ -173,14 +175,6 @@ class FileActions(QObject):
 
     def _report(self, text: str, kind: str, **more: Any) -> None:
         self._context.toasts.show(text, kind, **more)
-
-
-def png_bytes(image: QImage) -> bytes:
-    """Return an image as PNG."""
-    buffer = QBuffer()
-    buffer.open(QBuffer.OpenModeFlag.WriteOnly)
-    image.save(buffer, b"PNG")
-    return bytes(buffer.data().data())
 
 
 WAIT_S = 0.02

@@ -23,7 +23,6 @@ from app.live.depth import LiveDepth
 from app.live.frame_results import Shown
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
-from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.widgets.actions import action_button, make_action
 from app.widgets.label import PlainLabel, plain_tip
@@ -52,10 +51,9 @@ class InspectPage(QWidget):
         self.jobs = Jobs("inspect", self)
         self.live = LiveSession(context=context, name="inspect", parent=self)
         self.live_depth = LiveDepth(self.live, self.jobs, self, context=context)
-        self.zero = ZeroControl(self.live, self.jobs, context=context)
         self.modes = ModeChoice(self.jobs, self, self.live_depth.choose, context=context)
         idle = tr("Press an object into the membrane. Press Space to freeze it at full detail.")
-        self.banner = Banner(self.jobs, idle=idle, on_act=self._on_act)
+        self.banner = Banner(self.jobs, idle=idle, on_act=self.live_depth.act)
         self._value = named(PlainLabel(), "inspect.depth", tr("Depth under the cursor"))
         make_bold(self._value, size=1.7)
         self._readout = named(
@@ -78,7 +76,7 @@ class InspectPage(QWidget):
             inside=True,  # other pages use the space bar for something else
         )  # fmt: skip
         zero_action = make_action(
-            self, "inspect.zero", tr("Zero"), self.zero.set_zero, keys=("Ctrl+0",),
+            self, "inspect.zero", tr("Zero"), self.live_depth.zero.set_zero, keys=("Ctrl+0",),
             icon_name="zero", tip=tr("Use the current image as the zero reference"),
         )  # fmt: skip
         self.recorder = RecordControl(
@@ -243,9 +241,3 @@ class InspectPage(QWidget):
         self._shown = None
         self.processed.show_steps((), "")
         self.views.forget()
-
-    def _on_act(self, name: str) -> None:
-        if name == "zero":
-            self.zero.set_zero()
-        else:
-            self.live_depth.act(name)

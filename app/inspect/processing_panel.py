@@ -146,7 +146,7 @@ class ProcessedLine(QWidget):
         self.setVisible(bool(steps or refused))
 
 
-class DisplayPanel(QWidget):
+class DisplayPanel(Form[Display]):
     """Lets the user choose the display settings of depth.
 
     Parameters
@@ -156,26 +156,11 @@ class DisplayPanel(QWidget):
     """
 
     def __init__(self, on_changed: Slot) -> None:
-        super().__init__()
+        super().__init__(Display(), "inspect.display")
         named(self, "inspect.display", tr("Display"))
-        self._changed = on_changed
         self._range = 0.0, 1.0
-        self._form = Form(Display(), "inspect.display")
-        self._form.changed.connect(self._on_changed)
-        vbox(self._form, of=self, margins=0)
-
-    @property
-    def display(self) -> Display:
-        """The display settings."""
-        return self._form.value
-
-    def colour_by(self, quantity: str) -> None:
-        """Colour the surface in 3D by one of QUANTITIES."""
-        self._form.change(colour_by=quantity)
-
-    def show_display(self, display: Display) -> None:
-        """Show display settings without emitting a signal."""
-        self._form.show_value(display)
+        self._on_display = on_changed
+        self.changed.connect(self._on_changed)
 
     def show_range(self, low: float, high: float) -> None:
         """Note the range of a frame, which is that of a lock."""
@@ -183,19 +168,19 @@ class DisplayPanel(QWidget):
 
     def toggle_lock(self) -> None:
         """Lock the current range, or make it automatic."""
-        self._form.change(locked=not self.display.locked)
+        self.change(locked=not self.value.locked)
 
     def lock_range(self, low: float, high: float) -> None:
         """Lock the range at these depths, mm."""
         self._range = low, high
-        self._form.change(locked=True)
+        self.change(locked=True)
 
     def unlock_range(self) -> None:
         """Make the range automatic."""
-        self._form.change(locked=False)
+        self.change(locked=False)
 
     def _on_changed(self, name: str) -> None:
-        if name == "locked" and self.display.locked:
+        if name == "locked" and self.value.locked:
             low, high = self._range
-            self._form.show_value(replace(self.display, low_mm=low, high_mm=high))
-        self._changed()
+            self.show_value(replace(self.value, low_mm=low, high_mm=high))
+        self._on_display()

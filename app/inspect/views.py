@@ -117,7 +117,7 @@ class Views(QWidget):
             quality=self.quality.what if shown("quality") else "",
             section=self._section() if shown("section") else None,
             region=self.marks.rectangle if self._measures_region() else None,
-            display=self.display.display,
+            display=self.display.value,
             reference=self.reference,
             processing=self.processing.processing(self.marks.rectangle, self.marks.points_mm),
         )
@@ -159,7 +159,7 @@ class Views(QWidget):
     def compare_with(self, reference: Reference | None) -> None:
         """Show the difference from this height map in 3D from now on. None: no difference."""
         self.hold(reference)
-        self.display.colour_by("depth" if reference is None else "difference")
+        self.display.change(colour_by="depth" if reference is None else "difference")
         self._on_wanted()
 
     def hold(self, reference: Reference | None) -> None:
@@ -180,7 +180,7 @@ class Views(QWidget):
     def restore(self) -> None:
         """Restore the saved layout and display settings."""
         settings = self._context.settings
-        self.display.show_display(from_text(Display, settings.display("look")))
+        self.display.show_value(from_text(Display, settings.display("look")))
         self._on_display()
         self.stage.arrange(from_text(Layout, settings.display("inspect_layout")))
         self.follow_source()
@@ -189,7 +189,7 @@ class Views(QWidget):
         """Save the layout and display settings."""
         settings = self._context.settings
         settings.keep_display("inspect_layout", as_text(self.stage.arranged))
-        settings.keep_display("look", as_text(self.display.display))
+        settings.keep_display("look", as_text(self.display.value))
 
     def finish(self) -> None:
         """Release the resources of the views."""
@@ -214,8 +214,7 @@ class Views(QWidget):
         self._on_wanted()
 
     def _on_display(self) -> None:
-        display: Display = self.display.display
-        self.surface.set_exaggeration(display.exaggeration)
+        self.surface.set_exaggeration(self.display.value.exaggeration)
         self._on_wanted()
 
     def _on_image_clicked(self, u: float, v: float) -> None:

@@ -14,6 +14,7 @@ from app.live.calibration_choice import CalibrationChoice
 from app.live.first_calibration import begin_first_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
 from app.live.session import LiveSession
+from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
 from app.sources.source import SourceInfo
@@ -49,6 +50,8 @@ class LiveDepth(QObject):
         The images.
     calibrations : CalibrationChoice
         The library, and the calibration in use.
+    zero : ZeroControl
+        Sets zero with the next images.
     last : Shown or None
         The newest result.
 
@@ -76,6 +79,7 @@ class LiveDepth(QObject):
         super().__init__(live)
         self.live, self._jobs, self._context = live, jobs, context
         self.calibrations = CalibrationChoice(jobs, owner, self.load, context=context)
+        self.zero = ZeroControl(live, jobs, context=context)
         self.last: Shown | None = None
         self._maker = Maker(None)
         self._chosen: tuple[Reconstructor | None, Reconstructor | None] = None, None
@@ -125,6 +129,8 @@ class LiveDepth(QObject):
     def act(self, name: str) -> None:
         """Do what an advice proposes. Names that only the page knows have no effect."""
         match name:
+            case "zero":
+                self.zero.set_zero()
             case "virtual":
                 self._context.source.choose_virtual_sensor()
             case "calibrate":

@@ -312,7 +312,7 @@ class LiveView(QWidget):
         radius_step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ControlModifier else NUDGE_PX
         match event.key():
             case Qt.Key.Key_Left | Qt.Key.Key_Right | Qt.Key.Key_Up | Qt.Key.Key_Down:
-                du, dv = _ARROWS[Qt.Key(event.key())]
+                du, dv = ARROWS[Qt.Key(event.key())]
                 handle = move(handle, step * du, step * dv, self._drawing_size())
             case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
                 handle = resize(handle, radius_step)
@@ -366,7 +366,7 @@ class LiveView(QWidget):
         )
 
 
-_ARROWS = {
+ARROWS = {
     Qt.Key.Key_Left: (-1.0, 0.0),
     Qt.Key.Key_Right: (1.0, 0.0),
     Qt.Key.Key_Up: (0.0, -1.0),

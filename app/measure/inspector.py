@@ -22,6 +22,7 @@ from gelpolight_core.records.entry import UNJUDGED
 from gelpolight_core.translation import tr
 
 NAMES = "measured", "reference", "deviation"
+LEAST_PX, MOST_PX = 272, 380
 HEAD = "font-size: 11px; color: @muted"
 
 
@@ -86,7 +87,7 @@ class Inspector(QWidget):
         heading = PlainLabel(tr("Reference"))
         make_bold(heading)
         head = hbox((self.title, 1), (self.verdict, 0, Qt.AlignmentFlag.AlignTop), spacing=8)
-        self._panel = side_panel(
+        panel = side_panel(
             (
                 vbox(head, self.image, spacing=2),
                 self.table,
@@ -103,12 +104,10 @@ class Inspector(QWidget):
                 action_button(save, primary=True),
             ),
         )
-        vbox(self._panel, of=self, margins=0)
-
-    def set_width(self, width: int) -> None:
-        """Change the width."""
-        self._panel.setFixedWidth(width)
-        self.setFixedWidth(width)
+        for part in (self, panel):
+            part.setMinimumWidth(LEAST_PX)
+            part.setMaximumWidth(MOST_PX)
+        vbox(panel, of=self, margins=0)
 
     def show_state(self, state: PressState) -> None:
         """Show what was measured."""

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from app.bench.bench_area import BenchArea
@@ -21,7 +20,6 @@ from app.live.grips import grips_of
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
 from app.live.stage import Layout, Stage
-from app.live.zero import ZeroControl
 from app.measure.figures_text import figure_text
 from app.measure.inspector import Inspector
 from app.measure.judging import record_of
@@ -51,8 +49,6 @@ from gelpolight_core.translation import tr
 
 IMAGES = (".png", ".tif", ".tiff")
 TOOLS_WIDTH = 148
-INSPECTOR_SHARE, INSPECTOR_PX = 0.26, (272, 380)
-"""Width of the inspector: a share of the page, and its limits."""
 QUANTITIES = {"depth": tr("Depth"), "residual": tr("Residual of the fitted object")}
 """What colours the surface in 3D."""
 KEY = Qt.ItemDataRole.UserRole
@@ -93,7 +89,6 @@ class PressView(QWidget):
         self.work = Work(self)
         self.live = LiveSession(context=context, name="measure live", parent=self)
         self.live_depth = LiveDepth(self.live, jobs, self, context=context)
-        self.zero = ZeroControl(self.live, jobs, context=context)
         self._steady = SteadyPress()
         self._best: Reconstructor | None = None
         self._shown: Shown | None = None
@@ -185,7 +180,7 @@ class PressView(QWidget):
             spacing=6,
         )
         column = vbox(self.banner, (self.stage, 1), self.replay, margins=0, spacing=0)
-        hbox(tools, (column, 1), self.inspector, of=self, margins=0, spacing=0)
+        hbox(tools, (column, 70), (self.inspector, 30), of=self, margins=0, spacing=0)
 
     def _connect(self) -> None:
         self.live.source_changed.connect(self._on_source)
@@ -194,13 +189,6 @@ class PressView(QWidget):
         self.live_depth.calibration_loaded.connect(self._use)
         self.live_depth.changed.connect(self._advise)
         self.work.changed.connect(self._render)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give the inspector its share of the width."""
-        least, most = INSPECTOR_PX
-        width = round(INSPECTOR_SHARE * event.size().width())
-        self.inspector.set_width(min(max(width, least), most))
-        super().resizeEvent(event)
 
     # Called by the page
 
@@ -471,13 +459,10 @@ class PressView(QWidget):
         )
 
     def _on_act(self, name: str) -> None:
-        match name:
-            case "live":
-                self.release()
-            case "zero":
-                self.zero.set_zero()
-            case _:
-                self.live_depth.act(name)
+        if name == "live":
+            self.release()
+        else:
+            self.live_depth.act(name)
 
     # The calibration and the source
 

@@ -9,6 +9,7 @@ from PySide6.QtGui import QKeyEvent
 
 from app.live.grips import Point, grips_of, outline_of
 from app.live.height_panel import HeightPanel
+from app.live.live_view import ARROWS
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.figures_text import figure_text
 from app.measure.measuring import Answer
@@ -25,12 +26,6 @@ from gelpolight_core.translation import tr
 
 NUDGE_MM = 0.02
 LARGE_NUDGE_MM = 0.2
-_ARROWS = {
-    Qt.Key.Key_Left: (-1.0, 0.0),
-    Qt.Key.Key_Right: (1.0, 0.0),
-    Qt.Key.Key_Up: (0.0, -1.0),
-    Qt.Key.Key_Down: (0.0, 1.0),
-}
 
 
 class ToolMap(HeightPanel):
@@ -135,10 +130,10 @@ class ToolMap(HeightPanel):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Move the chosen grip, choose the next one, place, remove or cancel."""
         key = Qt.Key(event.key())
-        if key in _ARROWS:
+        if key in ARROWS:
             large = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             step = LARGE_NUDGE_MM if large else NUDGE_MM
-            dx, dy = _ARROWS[key]
+            dx, dy = ARROWS[key]
             if self._work.nudge(step * dx, step * dy):
                 return
         match key:

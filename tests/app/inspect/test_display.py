@@ -44,9 +44,9 @@ def test_the_views_restore_their_display_settings(context: AppContext) -> None:
         )  # fmt: skip
         if restored:
             views.restore()
-            assert views.display.display == CHOSEN
+            assert views.display.value == CHOSEN
         else:
-            views.display.show_display(CHOSEN)
+            views.display.show_value(CHOSEN)
             views.keep()
         views.finish()
         views.close()
@@ -56,6 +56,6 @@ def test_the_views_restore_their_display_settings(context: AppContext) -> None:
 
 def test_a_panel_shows_the_display_settings_exactly(qapp: object) -> None:
     panel = DisplayPanel(lambda: None)
-    panel.show_display(CHOSEN)
-    assert panel.display == CHOSEN
+    panel.show_value(CHOSEN)
+    assert panel.value == CHOSEN
     panel.deleteLater()

@@ -66,6 +66,17 @@ def _wait_for_depth(page: InspectPage, qtbot: QtBot) -> None:
     qtbot.waitUntil(there, timeout=WAIT_MS)
 
 
+@pytest.fixture
+def pressed(
+    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+) -> InspectPage:
+    """Return the page while it shows the depth of a press."""
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_depth(page, qtbot)
+    return page
+
+
 def _advice(page: InspectPage) -> tuple[str, QPushButton]:
     text = page.findChild(QLabel, "inspect.advice")
     button = page.findChild(QPushButton, "inspect.advised")
@@ -107,19 +118,14 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     assert middle != corner
 
 
-def test_all_views_share_the_cursor_and_its_values_are_shown(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    page.views.stage.point_at(1.0, 2.0)
-    readout = page.findChild(QLabel, "inspect.readout")
+def test_all_views_share_the_cursor_and_its_values_are_shown(pressed: InspectPage) -> None:
+    pressed.views.stage.point_at(1.0, 2.0)
+    readout = pressed.findChild(QLabel, "inspect.readout")
     assert readout is not None
     assert "x 1.00, y 2.00 mm" in readout.text()
-    value = page.findChild(QLabel, "inspect.depth")
+    value = pressed.findChild(QLabel, "inspect.depth")
     assert value is not None and value.text().endswith(" mm")
-    assert page.views.map_panel.map._lines[0].value() == 1.0
+    assert pressed.views.map_panel.map._lines[0].value() == 1.0
 
 
 def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
@@ -127,31 +133,26 @@ def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
 ) -> None:
     height, display = page.views.map_panel, page.views.display
     height.map.bar.range_dragged.emit(0.1, 0.45)
-    assert display.display.range_mm == pytest.approx((0.1, 0.45))
-    assert page.live_depth._maker.wanted.display.range_mm == display.display.range_mm
+    assert display.value.range_mm == pytest.approx((0.1, 0.45))
+    assert page.live_depth._maker.wanted.display.range_mm == display.value.range_mm
     height.map.bar_double_clicked.emit()
-    assert display.display.range_mm is None
+    assert display.value.range_mm is None
     assert page.live_depth._maker.wanted.display.range_mm is None
 
 
-def test_a_frozen_image_stays_until_it_is_continued(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
-) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    page.activateWindow()
-    page.setFocus()
-    qtbot.waitUntil(page.hasFocus, timeout=WAIT_MS)
-    qtbot.keyClick(page, Qt.Key.Key_Space)
-    assert page.live.paused
+def test_a_frozen_image_stays_until_it_is_continued(pressed: InspectPage, qtbot: QtBot) -> None:
+    pressed.activateWindow()
+    pressed.setFocus()
+    qtbot.waitUntil(pressed.hasFocus, timeout=WAIT_MS)
+    qtbot.keyClick(pressed, Qt.Key.Key_Space)
+    assert pressed.live.paused
     qtbot.wait(200)
-    assert page.live_depth.last is not None
-    number = page.live_depth.last.frame.number
+    assert pressed.live_depth.last is not None
+    number = pressed.live_depth.last.frame.number
     qtbot.wait(400)
-    assert page.live_depth.last.frame.number == number
-    page.pause_action.trigger()
-    qtbot.waitUntil(lambda: page.live_depth.last.frame.number > number, timeout=WAIT_MS)  # type: ignore[union-attr]
+    assert pressed.live_depth.last.frame.number == number
+    pressed.pause_action.trigger()
+    qtbot.waitUntil(lambda: pressed.live_depth.last.frame.number > number, timeout=WAIT_MS)  # type: ignore[union-attr]
 
 
 def test_a_calibration_of_another_image_size_is_refused_with_both_sizes(
@@ -242,19 +243,16 @@ def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: Q
 
 
 def test_the_frame_that_is_shown_is_exported_as_reconstructed(
-    page: InspectPage, presses: Path, small_calibration: Calibration, tmp_path: Path, qtbot: QtBot
+    pressed: InspectPage, tmp_path: Path, qtbot: QtBot
 ) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    page.pause(True)
+    pressed.pause(True)
     qtbot.wait(300)
-    last = page.live_depth.last
+    last = pressed.live_depth.last
     assert last is not None and last.heightmap is not None
     choice, shares = ExportChoice(tif=False, folder=str(tmp_path / "out")), list[float]()
     export_frame(last.heightmap, choice, "again.png", shares.append)
     assert shares[0] >= SHOWN_FROM  # a large file takes seconds
-    page.export.run(choice)
+    pressed.export.run(choice)
     path = tmp_path / "out" / f"frame-{last.frame.number:05d}.npz"
     qtbot.waitUntil(path.is_file, timeout=WAIT_MS)
     with np.load(path, allow_pickle=False) as stored:
@@ -262,31 +260,28 @@ def test_the_frame_that_is_shown_is_exported_as_reconstructed(
 
 
 def test_a_recording_is_made_replayed_and_saved_as_a_movie(
-    page: InspectPage, presses: Path, context: AppContext, small_calibration: Calibration,
+    pressed: InspectPage, context: AppContext, small_calibration: Calibration,
     tmp_path: Path, qtbot: QtBot,
 ) -> None:  # fmt: skip
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    page.recorder.start()
-    qtbot.waitUntil(lambda: page.recorder.action.text().endswith("left"), timeout=WAIT_MS)
+    pressed.recorder.start()
+    qtbot.waitUntil(lambda: pressed.recorder.action.text().endswith("left"), timeout=WAIT_MS)
     context.settings.prefer(recording_limit_gb=1e-6)  # it stops by itself
-    qtbot.waitUntil(lambda: not page.recorder.busy, timeout=4 * WAIT_MS)
-    assert page.recorder.action.text() == "Record"
+    qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=4 * WAIT_MS)
+    assert pressed.recorder.action.text() == "Record"
     assert any("size limit" in message.finding.text for message in context.toasts.history)
     (path,) = context.workspace.folder.glob("sensors/*/recordings/*.gplrec")
-    page.open_path(path)
-    _wait_for_depth(page, qtbot)
-    assert page.replay.isVisible()
-    source = page.live.stream.source  # type: ignore[union-attr]
+    pressed.open_path(path)
+    _wait_for_depth(pressed, qtbot)
+    assert pressed.replay.isVisible()
+    source = pressed.live.stream.source  # type: ignore[union-attr]
     assert source.header.calibration_id == small_calibration.identity  # type: ignore[attr-defined]
-    qtbot.waitUntil(lambda: page.views.surface.view is not None, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: pressed.views.surface.view is not None, timeout=WAIT_MS)
     choice = MovieChoice("recording", 160, 120, 10.0, 1.0)
-    page.views.surface.saving.save_movie(tmp_path / "press.mp4", choice)
+    pressed.views.surface.saving.save_movie(tmp_path / "press.mp4", choice)
     movie = cv2.VideoCapture(str(tmp_path / "press.mp4"))
     assert movie.get(cv2.CAP_PROP_FRAME_COUNT) == source.playback().count  # type: ignore[attr-defined]
-    shown = page.views.map_panel.map.shown_images
-    qtbot.waitUntil(lambda: page.views.map_panel.map.shown_images > shown, timeout=WAIT_MS)
+    shown = pressed.views.map_panel.map.shown_images
+    qtbot.waitUntil(lambda: pressed.views.map_panel.map.shown_images > shown, timeout=WAIT_MS)
 
 
 def test_zero_uses_the_present_background_and_can_be_undone(
@@ -302,11 +297,11 @@ def test_zero_uses_the_present_background_and_can_be_undone(
     context.workspace.use(path)
     page.enter()
     qtbot.waitUntil(lambda: page.live_depth.reconstructor is not None, timeout=4 * WAIT_MS)
-    page.zero.set_zero()
+    page.live_depth.zero.set_zero()
     zero = path.with_name("mine-zero.gplcal")
     qtbot.waitUntil(lambda: context.workspace.in_use == zero, timeout=WAIT_MS)
     qtbot.waitUntil(lambda: not page.jobs.busy, timeout=4 * WAIT_MS)
-    page.zero._use(path)
+    page.live_depth.zero._use(path)
     assert context.workspace.in_use == path
 
 
@@ -326,7 +321,7 @@ def test_undo_of_a_second_zero_restores_the_original(
     monkeypatch.setattr(
         context.toasts, "show", lambda *said, actions: shown.append((said, actions))
     )
-    page.zero._on_zeroed(second)
+    page.live_depth.zero._on_zeroed(second)
     (((text, verdict), ((_, undo),)),) = shown
     assert verdict == "warn" and "The background had changed" in text
     undo()
@@ -342,7 +337,7 @@ def test_leaving_while_zero_waits_for_frames_is_reported_as_zero_not_set(
     write_calibration(small_calibration, path)
     context.workspace.use(path)
     page.enter()
-    page.zero.set_zero()
+    page.live_depth.zero.set_zero()
     assert page.live.capturing
     page.leave()
     assert not page.live.capturing  # its frames never arrived
@@ -357,47 +352,41 @@ def _region_shown(page: InspectPage) -> bool:
 
 
 def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstructed(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+    pressed: InspectPage, qtbot: QtBot
 ) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    line = page.findChild(QLabel, "inspect.processed.steps")
-    level = page.findChild(QComboBox, "inspect.processing.level")
-    reset = page.findChild(QPushButton, "inspect.processed.reset")
+    line = pressed.findChild(QLabel, "inspect.processed.steps")
+    level = pressed.findChild(QComboBox, "inspect.processing.level")
+    reset = pressed.findChild(QPushButton, "inspect.processed.reset")
     assert line is not None and level is not None and reset is not None
     level.setCurrentIndex(level.findData("plane"))
-    assert not page.processed.isVisible()
-    page.pause(True)
-    qtbot.waitUntil(page.processed.isVisible, timeout=WAIT_MS)
-    last = page.live_depth.last
+    assert not pressed.processed.isVisible()
+    pressed.pause(True)
+    qtbot.waitUntil(pressed.processed.isVisible, timeout=WAIT_MS)
+    last = pressed.live_depth.last
     assert last is not None and last.raw is not None and last.heightmap is not None
     assert last.processed[0] in line.text()
     assert not np.array_equal(last.raw.depth_mm, last.heightmap.depth_mm)
-    mask = page.findChild(QComboBox, "inspect.processing.mask")
+    mask = pressed.findChild(QComboBox, "inspect.processing.mask")
     assert mask is not None
     mask.setCurrentIndex(mask.findData("outside"))
-    qtbot.waitUntil(lambda: len(page.live_depth.last.processed) == 2, timeout=WAIT_MS)  # type: ignore[union-attr]
-    assert _region_shown(page)
+    qtbot.waitUntil(lambda: len(pressed.live_depth.last.processed) == 2, timeout=WAIT_MS)  # type: ignore[union-attr]
+    assert _region_shown(pressed)
     reset.click()
-    qtbot.waitUntil(lambda: not page.processed.isVisible(), timeout=WAIT_MS)
-    assert mask.currentData() == "none" and not _region_shown(page)
-    assert page.live_depth.last is not None and page.live_depth.last.heightmap is last.raw
+    qtbot.waitUntil(lambda: not pressed.processed.isVisible(), timeout=WAIT_MS)
+    assert mask.currentData() == "none" and not _region_shown(pressed)
+    assert pressed.live_depth.last is not None and pressed.live_depth.last.heightmap is last.raw
 
 
 def test_the_held_reference_is_subtracted_as_it_was_reconstructed(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+    pressed: InspectPage, qtbot: QtBot
 ) -> None:
-    page.enter()
-    _use(page, small_calibration)
-    _wait_for_depth(page, qtbot)
-    page.pause(True)
-    hold = page.findChild(QPushButton, "inspect.processing.hold")
-    subtract = page.findChild(QCheckBox, "inspect.processing.subtract")
+    pressed.pause(True)
+    hold = pressed.findChild(QPushButton, "inspect.processing.hold")
+    subtract = pressed.findChild(QCheckBox, "inspect.processing.subtract")
     assert hold is not None and subtract is not None and not subtract.isEnabled()
     hold.click()
     subtract.setChecked(True)
-    qtbot.waitUntil(page.processed.isVisible, timeout=WAIT_MS)
-    last = page.live_depth.last
+    qtbot.waitUntil(pressed.processed.isVisible, timeout=WAIT_MS)
+    last = pressed.live_depth.last
     assert last is not None and last.heightmap is not None
     assert np.abs(last.heightmap.depth_mm).max() == pytest.approx(0.0, abs=1e-6)
