@@ -298,4 +298,4 @@ def _use_settings(path: Path) -> None:
     path.rename(other)
     settings = Settings(other)
     _ = settings.preferences, settings.workspace_folder, settings.folder("session"), settings.limits
-    _ = settings.recent("sessions"), settings.window_state(), settings.layout("a")
+    _ = settings.recent("sessions"), settings.window_state(), settings.display("a")

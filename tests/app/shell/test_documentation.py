@@ -57,7 +57,7 @@ def test_the_help_of_a_page_opens_the_guide_there(
     window.resize(1024, 700)
     window.show()
     context.requests.guide.emit("guide/calibrate", "Lights")
-    guide = window._guide
+    guide = window.findChild(GuideWindow)
     assert guide is not None and guide.isVisible()
     assert guide.text.textCursor().block().text().endswith("Lights")
     assert guide.text.verticalScrollBar().value() > 0
