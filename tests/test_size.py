@@ -84,7 +84,7 @@ MOST = {
     "tests/image": 176,
     "tests/in_place": 1174,
     "tests/io": 228,
-    "tests/light": 686,
+    "tests/light": 688,
     "tests/lights": 206,
     "tests/long": 1601,
     "tests/measurement": 1825,

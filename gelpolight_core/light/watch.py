@@ -118,7 +118,7 @@ class Recovery:
 def _change(left: Array) -> float:
     """Return how what is left of a press, (frames, 2) times and shares, has changed; 0 if not."""
     times_s, share = left.T
-    if np.ptp(times_s) < 2.0 * LASTS_S:
+    if len(left) < 3 or np.ptp(times_s) < 2.0 * LASTS_S:
         return 0.0
     change, scatter = straight_line(share, times_s)
     sd = float(scatter) * math.sqrt(12.0 / len(left))

@@ -38,15 +38,15 @@ def test_the_worst_comes_first_and_makes_the_line() -> None:
     refuse_meaningless(health_of([DIM]), where="press.png")
 
 
-def follow(left: list[float]) -> list[tuple[str, ...]]:
-    """Return what is shown of a press that leaves a share of itself, ten frames a second."""
+def follow(left: list[float], every_s: float = 0.1) -> list[tuple[str, ...]]:
+    """Return what is shown of a press that leaves a share of itself, frame by frame."""
     rng = np.random.default_rng(1)
     press = np.zeros((300, 3))
     press[100:140] = rng.uniform(-0.3, 0.3, (40, 3))
     watch = HealthWatch()
     return [
-        watch.update(Health(cells=share * press + rng.normal(0.0, 2e-3, press.shape)), 0.1 * n).keys
-        for n, share in enumerate(left)
+        watch.update(Health(cells=share * press + rng.normal(0.0, 2e-3, press.shape)), time_s).keys
+        for time_s, share in zip(every_s * np.arange(len(left)), left, strict=True)
     ]
 
 
@@ -56,6 +56,10 @@ def test_a_gel_that_has_not_recovered_is_reported_until_it_has() -> None:
     assert ("not_recovered",) in shown[25:40]
     assert shown[-1] == ()
     assert not any(shown[:10])
+
+
+def test_two_slow_frames_say_nothing_of_a_recovery() -> None:
+    assert not any(follow([1.0, 0.08, 0.05], every_s=1.5))
 
 
 @pytest.mark.parametrize("after", [0.0, 0.08])
