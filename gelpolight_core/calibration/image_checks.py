@@ -76,8 +76,8 @@ def require_lit_colours(image: LinearImage, session: Session, *, where: str) -> 
 def refuse_board(image: LinearImage, boards: Sequence[BoardSpec], *, where: str) -> None:
     """Raise InputError if an image shows one of some checkerboards."""
     grey = image.rgb.mean(axis=2)
-    for board in boards:
-        if find_rough_corners(grey, board.inner_corners) is not None:
+    for inner_corners in {board.inner_corners for board in boards}:
+        if find_rough_corners(grey, inner_corners) is not None:
             raise InputError(
                 tr("the checkerboard is still in the image"),
                 where=where,

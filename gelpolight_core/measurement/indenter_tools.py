@@ -24,7 +24,7 @@ AUTO = "auto"
 PIXEL = 1.0 / 12.0
 """Variance of a pixel's own width, which the blur of the board's edges contains in part."""
 BOARD_PX = 0.1
-"""Pixels by which the blur of an image differs from that of the board."""
+"""Pixels by which an image's blur may differ from the board's; 0.03 on sensors of known blur."""
 
 
 def measure_heightmap(

@@ -22,7 +22,7 @@ from gelpolight_core.measurement.fit import (
     near_wall,
 )
 from gelpolight_core.measurement.fit_checks import fit_problems, no_anchor
-from gelpolight_core.measurement.indenter import MODELS, TYPICAL_DECAY_MM
+from gelpolight_core.measurement.indenter import MODELS, TYPICAL_DECAY_MM, IndenterModel
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.segmentation import (
     SECONDARY_SHARE,
@@ -58,8 +58,8 @@ EDGE_RADIUS_MM = 0.08
 """Fillet of an object's edge if the map does not show it, known to half of itself: edges of printed
 and machined indenters have 0.05 to 0.1 mm."""
 STATED_SHARE, STATED_SD_MM = 0.1, 0.01
-"""Standard deviation of a stated fillet, as a share of it and at least in mm: a radius gauge has
-steps of 0.1 mm or a fifth."""
+"""Standard deviation of a stated fillet, as a share of it and at least in mm: an edge that is
+called sharp is broken by about 0.01 mm."""
 UNKNOWN_BLUR_MM = 0.1
 """Root of the sd of the squared blur where nothing is known of it."""
 SEED_REACH_MM = 1.0
@@ -108,11 +108,11 @@ def measure_object(
             advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
     window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, mode=mode)
-    if edge_radius_mm is not None:
-        prior = _stated(prior, shape, edge_radius_mm)
     if shape == "ball" and mode is not None and mode.smoothed_mm2:
         window = replace(window, depth_mm=_sharpened(window, mode.smoothed_mm2))
     model = MODELS[shape]
+    if edge_radius_mm is not None:
+        prior = _stated(prior, model, edge_radius_mm)
     fit = fit_indenter(model, window, model.start(region), edge=prior)
     anchor = no_anchor(heightmap.flags, region)
     problems = (*fit_problems(shape, fit, window, region, prior), anchor)
@@ -129,9 +129,9 @@ def measure_object(
     return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
 
 
-def _stated(prior: EdgePrior, shape: str, edge_radius_mm: float) -> EdgePrior:
+def _stated(prior: EdgePrior, model: IndenterModel, edge_radius_mm: float) -> EdgePrior:
     """Return what is known of an edge whose fillet was stated."""
-    if shape == "ball":
+    if "edge_radius_mm" not in model.names:
         raise InputError(
             tr("A ball has no edge radius"),
             where=tr("edge radius"),
