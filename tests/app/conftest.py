@@ -161,7 +161,10 @@ def _left_windows(before: list[QWidget]) -> list[QWidget]:
     return [
         widget
         for widget in QApplication.topLevelWidgets()
-        if widget.parent() is None and not any(widget is old for old in before)
+        # A dead window can leave its Python object at the address of a new widget (PySide 6.11).
+        if isinstance(widget, QWidget)
+        and widget.parent() is None
+        and not any(widget is old for old in before)
     ]
 
 
