@@ -62,6 +62,7 @@ class InspectPage(QWidget):
         self._readout.setMinimumHeight(2 * self._readout.fontMetrics().lineSpacing())
         show_meaning(self._readout, "muted")
         self._rate = named(PlainLabel(wrap=True), "inspect.rate", tr("Rate and processing time"))
+        self._rate.setMinimumHeight(2 * self._rate.fontMetrics().lineSpacing())
         show_meaning(self._rate, "muted")
         self._shown: Shown | None = None
         self._recorded = ""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any, cast
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -144,21 +145,23 @@ class VirtualSource:
         kind = np.uint8 if camera.bit_depth == 8 else np.uint16
         if conditions.noise == 0.0:
             quiet = np.rint(full * np.clip(signal, 0.0, 1.0)).astype(kind)
-            return lambda number: _rgb(quiet)
-        level = np.maximum(full * signal, 0.0).astype(np.float32)
+            return lambda number: _rgb(quiet.copy())
+        depth = cv2.CV_8U if camera.bit_depth == 8 else cv2.CV_16U
+        level = full * np.maximum(signal.astype(np.float32), 0.0)
         # Light and read noise are amplified alike: with the gain g, a signal s has the variance
         # g shot_variance s + (g read_sd)^2.
         gain, scale = full * _amplification(conditions), conditions.noise
-        variance = gain * scale**2 * camera.shot_variance * level
-        deviation = np.sqrt(variance + np.float32((gain * scale * camera.read_sd) ** 2))
+        shot, read = gain * scale**2 * camera.shot_variance, (gain * scale * camera.read_sd) ** 2
+        deviation = cv2.sqrt(cv2.addWeighted(level, shot, level, 0.0, read))
         noise = _standard_noise(level.size)
+        change = np.empty_like(level)
 
         def make(number: int) -> Rgb:
             start = np.random.default_rng(seed + number).integers(NOISE_STARTS)
-            values = deviation * noise[start : start + level.size].reshape(level.shape)
-            values += level
-            np.clip(np.rint(values, out=values), 0.0, full, out=values)
-            return _rgb(values.astype(kind))
+            drawn = noise[start : start + level.size].reshape(level.shape)
+            # Rounded, and within the range of the type.
+            counts = cv2.add(cv2.multiply(deviation, drawn, change), level, dtype=depth)
+            return _rgb(np.minimum(counts, kind(full), out=counts))
 
         return make
 
@@ -171,7 +174,7 @@ def _standard_noise(size: int) -> NDArray[np.float32]:
 
 def _rgb(counts: NDArray[Any]) -> Rgb:
     """Return three channels in memory of their own; they are equal if the counts are grey."""
-    return cast(Rgb, np.dstack([counts] * 3) if counts.ndim == 2 else counts.copy())
+    return cast(Rgb, np.dstack([counts] * 3) if counts.ndim == 2 else counts)
 
 
 def _amplification(conditions: Conditions) -> float:

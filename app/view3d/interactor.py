@@ -98,13 +98,12 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self._plane: object | None = None
         self._settle = QTimer(self, singleShot=True, interval=250)
         self._settle.timeout.connect(self._refine)
-        self.enable_anti_aliasing("fxaa")
         self._follow_theme()
 
     # Called by the panel
 
     def show_surface(self, surface: Surface, *, still: bool = False) -> None:
-        """Show the surface of a frame. One that stays is drawn with soft shadows."""
+        """Show the surface of a frame. One that stays gets smooth edges and soft shadows."""
         self._settle.stop()
         self._polish(False)
         self.scene.show_surface(surface)
@@ -218,11 +217,13 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self.update()
 
     def _polish(self, on: bool) -> None:
-        """Draw shadows in hollows, which takes too long for live images."""
+        """Draw smooth edges and shadows in hollows, which takes too long for live images."""
         if on and not self._polished:
+            self.enable_anti_aliasing("fxaa")
             self.enable_ssao(radius=SHADOW_MM, bias=0.05, kernel_size=64)
         elif self._polished and not on:
             self.disable_ssao()
+            self.disable_anti_aliasing()
         self._polished = on
 
     def _on_plane(self, normal: object, origin: object) -> None:

@@ -86,19 +86,20 @@ class Measurement:
         """Forget what was measured while all warmed up."""
         for values in (self._lateness.late_ms, self._depth_ms, self._ages_ms):
             values.clear()
-        self._before = self._counts()
+        self._drawn = self._drawings()
         self._spent, self._memory_mb = Spent(), resident_mb()
 
-    def _counts(self) -> tuple[int, int]:
-        view, stream = self.page.views.surface.view, self.page.live.stream
-        assert stream is not None
-        return stream.figures().made, 0 if view is None else view.drawings
+    def _drawings(self) -> int:
+        view = self.page.views.surface.view
+        return 0 if view is None else view.drawings
 
     def end(self) -> None:
         """Print what was measured, and end everything."""
-        made, drawn = (a - b for a, b in zip(self._counts(), self._before, strict=True))
+        stream = self.page.live.stream
+        assert stream is not None
+        made_hz, drawn = stream.figures().rate_hz, self._drawings() - self._drawn
         span_s, shown = self._spent.wall_s, len(self._ages_ms)
-        print(f"made: {made / span_s:.1f} frames/s; shown: {shown / span_s:.1f} frames/s")
+        print(f"made: {made_hz:.1f} frames/s; shown: {shown / span_s:.1f} frames/s")
         print(f"drawings of the surface for each shown frame: {drawn / max(shown, 1):.2f}")
         print(reported("reconstruction", self._depth_ms, "ms"))
         print(reported("lateness of the user interface", self._lateness.late_ms, "ms"))

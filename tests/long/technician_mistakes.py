@@ -88,7 +88,7 @@ class MistakenTrial(Trial):
         hand.click_item(wizard.step_list, keys.index("lights"))
         hand.until(lambda: wizard.area.strip.count(), "the captured mirror")
         hand.click_item(wizard.area.strip, 0)
-        view = wizard.area.view._image
+        view = wizard.area.view.image
         hand.until(lambda: view.overlay.handles, "the handles of the spots")
         hand.pause()
         spot = view.overlay.handles[0]
@@ -103,6 +103,8 @@ class MistakenTrial(Trial):
         hand.pause(2.0)
         state, sentence = model.states["lights"]
         self._note("moved centroid", held=state in ("warn", "fail"), answer=f"{state}: {sentence}")
+        hand.window.activateWindow()  # without a window manager no window may be active
+        hand.pause()
         QTest.keyClick(wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
         hand.until(lambda: not model.busy, "the undone drag")
         hand.click_item(wizard.step_list, keys.index("radiance"))

@@ -16,6 +16,7 @@ import argparse
 import os
 import sys
 import tempfile
+import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -168,6 +169,8 @@ def run(*, by_hand: bool, mistakes: bool) -> bool:
             wizard = trials[0].wizard
             states = {} if wizard is None else wizard.model.states
             print(f"{type(error).__name__}: {error}; states: {states}", flush=True)
+        except Exception:  # the program itself would only log it
+            traceback.print_exc()
         finally:
             print(trials[0].hand.table(), flush=True)
             window.close()
