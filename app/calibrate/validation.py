@@ -36,6 +36,7 @@ from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
 from gelpolight_core.io.user import user_name
+from gelpolight_core.lab.trend import keep_sample, sample_of_validation
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
@@ -396,6 +397,8 @@ class ValidationStep(StepPresenter):
         )
         try:
             write_validation(validation, self._path)
+            folder = self.context.workspace.sensor_folder(self._reconstructor.calibration.serial)
+            keep_sample(sample_of_validation(validation), folder)
         except InputError as error:
             self._say(str(error), "fail")
             return

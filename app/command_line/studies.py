@@ -68,15 +68,15 @@ class Evaluate(Command):
         presses = presses_folder(self.presses)  # before a folder is created for nothing
         make_folder(self.output)
         with stage_progress() as progress:
+            evaluated = partial(
+                evaluate_presses, presses, progress=progress, reconstructor=reconstructor
+            )
             if self.workers > 1:
                 remote = partial(measure_with, self.calibration, self.model)
                 with processes(self.workers) as pool:
-                    evaluation = evaluate_presses(
-                        presses, remote, progress=progress, submit=pool.submit
-                    )
+                    evaluation = evaluated(measure=remote, submit=pool.submit)
             else:
-                measure = press_measurement(reconstructor)
-                evaluation = evaluate_presses(presses, measure, progress=progress)
+                evaluation = evaluated(measure=press_measurement(reconstructor))
         written = write_evaluation_files(
             evaluation, self.output, calibration=reconstructor.calibration
         )

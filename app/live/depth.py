@@ -14,6 +14,7 @@ from app.live.calibration_choice import CalibrationChoice
 from app.live.first_calibration import begin_first_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
 from app.live.session import LiveSession
+from app.live.trend_log import TrendLog
 from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
@@ -88,6 +89,7 @@ class LiveDepth(QObject):
         self._lost = self._failure = ""
         self._watch = HealthWatch()
         self._gel = PressCounter(self, context=context)
+        self._trend = TrendLog(self, context=context)
         self._fault: Finding | None = None
         self._shown_s: deque[float] = deque()
         self._tally = TraceTally()
@@ -110,6 +112,7 @@ class LiveDepth(QObject):
         """Release the source and the reconstructors, whose threads end with them."""
         self.live.finish()
         self._gel.flush()
+        self._trend.flush()
         self._chosen = None, None
         self._use(None, None)
 
@@ -285,15 +288,21 @@ class LiveDepth(QObject):
         """Forget everything: the camera, the calibration or a setting is another."""
         self._watch = HealthWatch()
         self._gel.restart()
+        self._trend.flush()
         self._set_fault(None)
 
     def _follow_health(self, shown: Shown) -> None:
         heightmap = shown.heightmap
         if heightmap is None or heightmap.health is None or not shown.frame.settled:
             return
-        findings = self._watch.update(heightmap.health, shown.frame.time_s).findings
+        health = heightmap.health
+        findings = self._watch.update(health, shown.frame.time_s).findings
         if self._info is not None and self._info.kind in PRESSED_LIVE:
-            self._gel.follow(heightmap.calibration_id, self._watch.presses)
+            identity, live = heightmap.calibration_id, self._maker.live
+            self._gel.follow(identity, self._watch.presses)
+            free = self._watch.is_free and not health.faults
+            if live is not None and free and health.change is not None:
+                self._trend.follow(live.calibration.serial, identity, health.change)
         self._set_fault(findings[0] if findings else None)
 
     def _set_fault(self, fault: Finding | None) -> None:

@@ -11,7 +11,7 @@ from app.services.preferences import Limits
 from app.theme import theme
 from app.widgets.layout import vbox
 from app.widgets.naming import named
-from app.widgets.plots import without_menus
+from app.widgets.plots import apply_theme, bare_plot
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.translation import tr
 
@@ -26,13 +26,8 @@ class ErrorPlot(QWidget):
     def __init__(self) -> None:
         super().__init__()
         named(self, "measure.drift", tr("Error over time"))
-        axis = pg.DateAxisItem(orientation="bottom")
-        self._plot = without_menus(
-            pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False), axisItems={"bottom": axis})
-        )
-        self._plot.hideButtons()
+        self._plot = bare_plot(bottom=pg.DateAxisItem())
         self._plot.setLabel("left", tr("error (%)"))
-        self._plot.getAxis("left").enableAutoSIPrefix(False)
         self._legend = self._plot.addLegend(offset=(-8, 8))
         self._series = {
             "plane": self._plot.plot([], [], symbol="o", symbolSize=8),
@@ -93,10 +88,7 @@ class ErrorPlot(QWidget):
     def _colour(self) -> None:
         dark = theme.is_dark()
         text = theme.colour("text")
-        self._plot.setBackground(theme.colour("base"))
-        for name in ("left", "bottom"):
-            self._plot.getAxis(name).setPen(theme.colour("line"))
-            self._plot.getAxis(name).setTextPen(text)
+        apply_theme(self._plot)
         self._legend.setLabelTextColor(text)
         for _, label in self._legend.items:
             label.setText(label.text)  # otherwise it keeps its first colour

@@ -28,6 +28,7 @@ from app.sources.processor import Failure
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox
 from app.widgets.naming import named
+from gelpolight_core.measurement.characteristics import LEAST_FLAT
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.steadiness import judge_press
 from gelpolight_core.translation import tr
@@ -143,7 +144,7 @@ class PressingView(QWidget):
 
     def take_bare(self) -> None:
         """Capture the image of the bare membrane as the reference for all presses."""
-        self.live.capture(1, self._keep_bare, self.panel.show_live)
+        self.live.capture(LEAST_FLAT, self._keep_bare, self.panel.show_live)
 
     def _keep_bare(self, frames: list[NDArray[Any]]) -> None:
         camera, seen = self._work.calibration.camera, frames[-1].shape
@@ -163,6 +164,7 @@ class PressingView(QWidget):
             self._context.toasts.show(tr("Refused: {why}").format(why=problem), "fail")
             return
         self._bare = frames[-1]
+        self._work.keep_flat(frames)
         self._aim()
 
     # Presses

@@ -144,6 +144,7 @@ class ResultView(QWidget):
         for widget in filter(None, old):
             widget.deleteLater()
         first, *more = document.sections
+        last = more.pop()
         quality = QualityTableWidget("protocol.errors", tr("Errors and their limits"))
         quality.set_table(first.quality)
         self._add_tab(tr("Summary"), quality, None)
@@ -155,6 +156,9 @@ class ResultView(QWidget):
             pooled = named(PlainLabel(text, wrap=True), "protocol.pooled", words)
             table = listing_table("protocol.gauge", gauge.listings[0])
             self._add_tab(tr("Repeatability"), pooled, table)
+        known = QualityTableWidget("protocol.characteristics", last.title)
+        known.set_table(last.quality)
+        self._add_tab(tr("Characteristics"), known, None)
         presses = listing_table("protocol.presses", document.listings[0])
         self._add_tab(tr("Every press"), presses)
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))

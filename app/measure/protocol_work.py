@@ -17,6 +17,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
+from gelpolight_core.measurement.characteristics import FLAT
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.evaluation_run import Outcome, evaluate_presses, press_measurement
 from gelpolight_core.measurement.ledger import Ledger
@@ -25,6 +26,7 @@ from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.evaluation import write_evaluation_files
 from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import write_image
 from gelpolight_core.translation import tr
 
 REPORT, LEDGER = "report", "measurements.jsonl"
@@ -128,6 +130,16 @@ class ProtocolWork(QObject):
             self._measure(press)
         return accepted
 
+    def keep_flat(self, frames: Sequence[NDArray[Any]]) -> None:
+        """Save images of the bare membrane, for noise and flatness of the sensor."""
+
+        def keep() -> None:
+            folder = self.run.presses / FLAT
+            for number, frame in enumerate(frames, len(list(folder.glob("*.png"))) + 1):
+                write_image(frame, folder / f"{number:03d}.png")
+
+        self._change(keep)
+
     def refuse(self, press: Press, reason: str) -> None:
         """Count a refused press."""
         self._change(lambda: self.run.refuse(press, reason))
@@ -141,9 +153,12 @@ class ProtocolWork(QObject):
 
     def evaluate(self, done: Callable[[Evaluation], None]) -> None:
         """Compare all presses with their true values, after the running measurements."""
-        self._do(
-            tr("Evaluating"), lambda: evaluate_presses(self.run.presses, self._outcome_of), done
-        )
+        reconstructor = self._equipped.reconstructor
+
+        def work() -> Evaluation:
+            return evaluate_presses(self.run.presses, self._outcome_of, reconstructor=reconstructor)
+
+        self._do(tr("Evaluating"), work, done)
 
     def _do(self, title: str, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         """Work in the background."""

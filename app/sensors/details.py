@@ -7,9 +7,10 @@ from datetime import datetime
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
-from PySide6.QtWidgets import QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QLineEdit, QProgressBar, QTabWidget, QWidget
 
 from app.sensors.tables import made_cell
+from app.sensors.trend_view import TrendView
 from app.theme.icons import icon
 from app.widgets.actions import action_button
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
@@ -74,7 +75,11 @@ class Details(QWidget):
         self._gel = QWidget()
         vbox(hbox(label, (self.elastomer, 1)), self.presses, of=self._gel, margins=0)
         parts = self._title, self._facts, self._gel, buttons, self._message, self.busy
-        vbox(*parts, (self._area, 1), of=self, margins=(12, 0, 0, 0))
+        self.trend = TrendView()
+        tabs = named(QTabWidget(documentMode=True), "sensors.tabs", tr("Quality and trend"))
+        tabs.addTab(self._area, tr("Quality"))
+        tabs.addTab(self.trend, tr("Trend"))
+        vbox(*parts, (tabs, 1), of=self, margins=(12, 0, 0, 0))
 
     def show_entry(self, entry: Entry | None, uses: str = "", presses: str = "") -> None:
         """Show a calibration, or none; how often it was used, and the presses on its gel."""

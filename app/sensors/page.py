@@ -27,6 +27,7 @@ from app.workspace.gel_care import presses_text, read_presses
 from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.lab.trend import Sample, read_samples, sample_of_validation
 from gelpolight_core.translation import tr
 
 
@@ -37,6 +38,7 @@ class SensorsPage(QWidget):
         super().__init__()
         self._context = context
         self._writing = False
+        self._entries: tuple[Entry, ...] = ()
         self._library = CalibrationActions(self, context=context)
         self._trash: TrashDialog | None = None
         named(self, "sensors", tr("Sensors"))
@@ -254,7 +256,7 @@ class SensorsPage(QWidget):
 
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
-        entries = self._library.entries()
+        entries = self._entries = self._library.entries()
         self._table.show_items(entries)
         sessions = self._library.sessions()
         self._sessions.set_entries(sessions)
@@ -270,6 +272,9 @@ class SensorsPage(QWidget):
     def _show_chosen(self) -> None:
         entry = self.chosen()
         self._details.show_entry(entry, self._uses(entry), self._presses(entry))
+        identity = "" if entry is None or entry.summary is None else entry.summary.identity
+        limits = self._context.settings.limits.percent
+        self._details.trend.show_trend(self._samples(entry), identity, limits)
         self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
         self.report.setEnabled(entry is not None and not entry.broken and not self._writing)
         self.reveal.setEnabled(entry is not None)
@@ -295,6 +300,20 @@ class SensorsPage(QWidget):
             return presses_text(max(seen, workspace.uses(identity)[0]))
         except InputError as error:
             return str(error)
+
+    def _samples(self, entry: Entry | None) -> tuple[Sample, ...]:
+        """Return what was seen of the sensor of a calibration."""
+        if entry is not None:
+            with self._context.toasts.errors():
+                samples = read_samples(entry.path.parent)
+                known = {sample.time for sample in samples}
+                earlier = (
+                    sample_of_validation(other.validation)
+                    for other in self._entries
+                    if other.validation is not None and other.serial == entry.serial
+                )
+                return *samples, *(sample for sample in earlier if sample.time not in known)
+        return ()
 
     def _on_elastomer(self, name: str) -> None:
         self._with_chosen(lambda entry: self._library.name_elastomer(entry, name))

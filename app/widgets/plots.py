@@ -5,6 +5,11 @@ from __future__ import annotations
 import pyqtgraph as pg
 from PySide6.QtWidgets import QWidget
 
+from app.theme import theme
+
+# (light, dark): both contrast with the theme's base colour.
+CHANNEL_COLOURS = (("#b3211d", "#ff8a80"), ("#1b6e3a", "#7fdc9a"), ("#1f4fbf", "#8ab4ff"))
+
 
 def without_menus(plot: pg.PlotWidget) -> pg.PlotWidget:
     """Switch off a plot's own context menus, and make the plot own what remains of them.
@@ -20,6 +25,23 @@ def without_menus(plot: pg.PlotWidget) -> pg.PlotWidget:
     """
     own_plot_menus(plot.getPlotItem(), plot)
     return plot
+
+
+def bare_plot(**axes: pg.AxisItem) -> pg.PlotWidget:
+    """Return a plot without menus and prefixes of units; an axis by its side, if it is special."""
+    plot = without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False), axisItems=axes))
+    plot.hideButtons()
+    for side in ("left", "bottom"):
+        plot.getAxis(side).enableAutoSIPrefix(False)
+    return plot
+
+
+def apply_theme(plot: pg.PlotWidget) -> None:
+    """Apply the colours of the present theme to a plot."""
+    plot.setBackground(theme.colour("base"))
+    for side in ("bottom", "left"):
+        plot.getAxis(side).setPen(pg.mkPen(theme.colour("muted")))
+        plot.getAxis(side).setTextPen(pg.mkPen(theme.colour("text")))
 
 
 def own_plot_menus(item: pg.PlotItem, owner: QWidget) -> None:

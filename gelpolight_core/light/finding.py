@@ -56,6 +56,21 @@ class LightGain:
 
 
 @dataclass(frozen=True, slots=True)
+class StateChange:
+    """How the sensor differs from its calibration, as its untouched membrane shows it.
+
+    Attributes
+    ----------
+    values, sd : (6,) float64
+        Change of the light of each channel in percent, shift along u and v in px, and what blur
+        adds to the variance of a point in px**2; NaN without texture. Standard deviations.
+    """
+
+    values: NDArray[np.float64]
+    sd: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class Health:
     """Faults of an image.
 
@@ -75,6 +90,8 @@ class Health:
         or if the change cannot be corrected.
     bad : BadPixels or None
         Bad pixels of the image, which the depth leaves out; None where there are none.
+    change : StateChange or None
+        Change of the sensor, also one that is no fault; None if it is not known.
     """
 
     findings: tuple[Finding, ...] = ()
@@ -83,6 +100,7 @@ class Health:
     cells: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
     light: LightGain | None = field(default=None, compare=False)
     bad: BadPixels | None = field(default=None, repr=False, compare=False)
+    change: StateChange | None = field(default=None, repr=False, compare=False)
 
     @property
     def faults(self) -> tuple[Finding, ...]:
@@ -112,6 +130,7 @@ def health_of(
     untouched: float = 1.0,
     cells: NDArray[np.float64] | None = None,
     light: LightGain | None = None,
+    change: StateChange | None = None,
 ) -> Health:
     """Return the health with findings in the order of their severity."""
 
@@ -119,7 +138,8 @@ def health_of(
         severe = finding.verdict is Verdict.FAIL
         return not finding.meaningless, not severe, not finding.doubtful, KEYS.index(finding.key)
 
-    return Health(tuple(sorted(findings, key=weight)), unknown, untouched, cells, light)
+    ordered = tuple(sorted(findings, key=weight))
+    return Health(ordered, unknown, untouched, cells, light, change=change)
 
 
 def refuse_meaningless(health: Health, *, where: str) -> None:

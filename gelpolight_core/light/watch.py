@@ -60,6 +60,11 @@ class HealthWatch:
         """Number of presses seen so far."""
         return self._recovery.presses
 
+    @property
+    def is_free(self) -> bool:
+        """Whether nothing has been pressed for a while, and nothing of a press is left."""
+        return self._recovery.is_free
+
 
 class Recovery:
     """Looks for what is left of the last press after it was released.
@@ -71,10 +76,12 @@ class Recovery:
     ----------
     presses : int
         Number of presses seen so far. One that was there from the start is not among them.
+    is_free : bool
+        Whether nothing has been pressed for a while, and nothing of a press is left.
     """
 
     def __init__(self) -> None:
-        self.presses = 0
+        self.presses, self.is_free = 0, False
         self._strongest, self._press = 0.0, np.zeros(())
         self._limit = CONTACT_CHANGE
         self._free, self._free_since = False, Lasting()
@@ -91,6 +98,7 @@ class Recovery:
         time_s : float
             When it was taken.
         """
+        self.is_free = False
         if cells is None or not cells.size:
             return None
         size = float(np.quantile(np.abs(cells).max(axis=1), 1.0 - PRESSED_SHARE))
@@ -112,7 +120,9 @@ class Recovery:
         change = _change(left)
         remains = left[:, 1].mean() > REPEATABILITY
         self._recovers = remains and (change < 0.0 or (self._recovers and not change))
-        return share if self._recovers and share > REPEATABILITY else None
+        recovering = self._recovers and share > REPEATABILITY
+        self.is_free = self._free and not recovering
+        return share if recovering else None
 
 
 def _change(left: Array) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,9 @@ class Evaluation:
         Files of shapes without a size.
     crossing : Crossing or None
         Which presses count in which direction; None: all in both.
+    flat_um : tuple of (rows, columns) float64
+        Heights of the untouched membrane, from
+        :func:`~gelpolight_core.measurement.characteristics.flat_maps`.
     """
 
     results: tuple[Press, ...]
@@ -121,6 +124,7 @@ class Evaluation:
     repeatability: tuple[Repeatability, ...]
     skipped: tuple[str, ...] = ()
     crossing: Crossing | None = None
+    flat_um: tuple[NDArray[np.float64], ...] = field(default=(), repr=False, compare=False)
 
     @property
     def failed(self) -> tuple[Press, ...]:

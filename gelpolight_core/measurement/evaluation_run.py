@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, as_completed
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.measurement.characteristics import flat_maps
 from gelpolight_core.measurement.evaluation import Evaluation, evaluate
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -49,6 +51,7 @@ def evaluate_presses(
     *,
     progress: Callable[[str, float], None] = lambda _name, _share: None,
     submit: Callable[..., Future[Outcome]] | None = None,
+    reconstructor: Reconstructor | None = None,
 ) -> Evaluation:
     """Measure every press of a folder with ``truth.csv`` and compare it with the truth.
 
@@ -62,6 +65,8 @@ def evaluate_presses(
         Called with the file name and the share done, 0..1.
     submit : callable, optional
         Of an executor: sends a function and its arguments to another process.
+    reconstructor : Reconstructor, optional
+        Of the sensor, for the images of its untouched membrane in the folder ``flat``.
 
     Raises
     ------
@@ -94,7 +99,9 @@ def evaluate_presses(
             progress(jobs[job], len(outcomes) / len(jobs))
     progress("", 1.0)
     found = [outcomes[row.file] for row in table.rows]
-    return evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
+    evaluation = evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
+    flat = () if reconstructor is None else flat_maps(reconstructor, folder)
+    return replace(evaluation, flat_um=flat)
 
 
 def measure_with(calibration: Path, model: str | None, image: Path, shape: str) -> Outcome:

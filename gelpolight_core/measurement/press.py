@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -36,7 +37,9 @@ class Press:
     region, repeat : str
         Position on the sensor, and number of the repeat; empty if the file does not state it.
     position_mm : (float, float)
-        Where a protocol wants its middle, (x, y) in the sensor frame.
+        Where a protocol wants its middle, (x, y) in the sensor frame, or where it is stated to be.
+    position_sd_mm : float
+        Standard deviation of a stated position along each axis; NaN: it is not known.
     yaw_deg : float
         Rotation of a cuboid, from x to y, in a protocol.
     outcome : Measurement or str
@@ -49,6 +52,7 @@ class Press:
     repeat: str = ""
     position_mm: tuple[float, float] = (0.0, 0.0)
     yaw_deg: float = 0.0
+    position_sd_mm: float = math.nan
     outcome: Measurement | str = field(default="", compare=False)
 
     @property
@@ -188,7 +192,24 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
 def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
     key = "side_mm" if shape == "cuboid" else "diameter_mm"
     truth = Truth(shape, _length(record, key, where), _length(record, "height_mm", where))
-    return Press(file, truth, record.get("region", ""), record.get("repeat", ""))
+    names = record.get("region", ""), record.get("repeat", "")
+    if not record.get("position_sd_mm"):
+        return Press(file, truth, *names)
+    x, y = (_number(record, key, where) for key in ("x_mm", "y_mm"))
+    return Press(
+        file, truth, *names, (x, y), position_sd_mm=_length(record, "position_sd_mm", where)
+    )
+
+
+def _number(record: dict[str, str], key: str, where: str) -> float:
+    text = record.get(key, "")
+    with suppress(ValueError):
+        if math.isfinite(value := float(text)):
+            return value
+    found = tr("{key} is '{text}'") if text else tr("{key} is empty")
+    raise InputError(
+        found.format(key=key, text=brief(text)), where=where, advice=Remedy.CORRECT_VALUE
+    )
 
 
 def _length(record: dict[str, str], key: str, where: str) -> float:

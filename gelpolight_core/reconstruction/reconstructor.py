@@ -246,6 +246,7 @@ class Reconstructor:
         name: str = "",
         normals: bool = True,
         uncertainty: bool = False,
+        everywhere: bool = False,
         health: Health | None = None,
     ) -> HeightMap:
         """Reconstruct a raw frame.
@@ -261,6 +262,8 @@ class Reconstructor:
         uncertainty : bool, optional
             Whether the result contains standard deviations of each pixel; takes several times as
             long. The paper's model has none.
+        everywhere : bool, optional
+            Whether the full model also solves what no contact has touched, which otherwise reads 0.
         health : Health, optional
             Of this frame, where it is known; by default the quick check for live images is made.
 
@@ -273,7 +276,10 @@ class Reconstructor:
         health = self.solver.check(frame) if health is None else health
         solved = self.solver.depth(
             self._evened(frame, health),
-            self._wanted(health, normals=normals, uncertainty=uncertainty),
+            replace(
+                self._wanted(health, normals=normals, uncertainty=uncertainty),
+                everywhere=everywhere,
+            ),
         )
         fault = calibration_fault(self.calibration.quality)
         failed = () if fault is None else (fault,)

@@ -14,6 +14,7 @@ from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
 from gelpolight_core.labels import label
+from gelpolight_core.measurement.characteristics import Characteristic, characteristics
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
@@ -75,6 +76,17 @@ def evaluation_document(
     gauge = gauge_rows(evaluation)
     if gauge:
         sections.append(_gauge_section(evaluation, gauge))
+    sections.append(
+        Section(
+            "characteristics",
+            tr("Characteristics of the sensor"),
+            tr(
+                "In the terms of ISO 25178-600. U is the expanded uncertainty (k = 2); a surface "
+                "that is finer than the lateral period limit has less than half its height"
+            ),
+            QualityTable(tuple(known.finding for known in _characteristics(evaluation))),
+        )
+    )
     return Report(
         title=tr("Evaluation on objects of known size"),
         verdict=errors.verdict,
@@ -130,6 +142,10 @@ def evaluation_errors(
                 text = title_in.format(direction=name, regions=label(group.regions))
                 figures.append(judge(f"{direction}_{regions}", text, mean, "%"))
     return QualityTable(tuple(figures))
+
+
+def _characteristics(evaluation: Evaluation) -> tuple[Characteristic, ...]:
+    return characteristics(evaluation.results, evaluation.flat_um)
 
 
 @drawing(70.0)
@@ -252,6 +268,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
     presses = known_objects(evaluation, tr("Every press"))
     lines = [*text_lines(presses), "", *text_lines(_groups(evaluation)), ""]
     lines += [f"{name}: {value}" for name, value in _pooled(evaluation)]
+    lines += [known.finding.stated for known in _characteristics(evaluation)]
     lines.append(evaluation_sentence(evaluation))
     if evaluation.failed:
         lines.append(evaluation.failure)
@@ -287,6 +304,7 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
             }
             for pooled in evaluation.repeatability
         ],
+        "characteristics": [known.as_json() for known in _characteristics(evaluation)],
         "presses": [press.as_row() for press in evaluation.results],
         "failed": len(evaluation.failed),
         "skipped": list(evaluation.skipped),

@@ -14,32 +14,13 @@ from PySide6.QtGui import QColor
 
 from app.calibrate.reflectance.lut_model import Curve
 from app.theme import theme
-from app.widgets.plots import without_menus
+from app.widgets.plots import CHANNEL_COLOURS, apply_theme, without_menus
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.translation import tr
 
-# (light, dark): both contrast with the theme's base colour.
-CHANNEL_COLOURS = (("#b3211d", "#ff8a80"), ("#1b6e3a", "#7fdc9a"), ("#1f4fbf", "#8ab4ff"))
 BINS = 240
 GRAB_PX = 14
 NODE_PX = 11
-
-
-def bare_plot() -> pg.PlotWidget:
-    """Return a plot without menus and prefixes of units."""
-    plot = without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False)))
-    plot.hideButtons()
-    for side in ("left", "bottom"):
-        plot.getAxis(side).enableAutoSIPrefix(False)
-    return plot
-
-
-def apply_theme(plot: pg.PlotWidget) -> None:
-    """Apply the colours of the present theme to a plot."""
-    plot.setBackground(theme.colour("base"))
-    for side in ("bottom", "left"):
-        plot.getAxis(side).setPen(pg.mkPen(theme.colour("muted")))
-        plot.getAxis(side).setTextPen(pg.mkPen(theme.colour("text")))
 
 
 class CurvePlot(pg.PlotWidget):  # type: ignore[misc]

@@ -13,13 +13,13 @@ from PySide6.QtWidgets import QWidget
 
 from app.calibrate.reflectance.lut_effect import Effect
 from app.calibrate.reflectance.lut_model import CurveSet
-from app.calibrate.reflectance.lut_plot import apply_theme, bare_plot
 from app.services.newest_wins import NewestWins
 from app.theme import theme
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
+from app.widgets.plots import apply_theme, bare_plot
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 

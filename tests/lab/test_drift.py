@@ -1,0 +1,53 @@
+"""A drift is told from scatter with a stated rate of false alarms, and its line is the true one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelpolight_core.lab.drift import CONFIDENCE, drifts
+from tests.studies.drift import days_to_alarm, false_alarms
+
+
+def test_one_percent_a_month_of_one_led_is_reported_within_two_weeks() -> None:
+    # Daily values with a scatter of 0.1 %, after two weeks without drift.
+    days = days_to_alarm(40, stable=14)
+    assert days.min() > 0 and days.max() <= 14
+
+
+def test_constant_light_raises_no_alarm_in_years() -> None:
+    # tests/studies/drift.py simulates 1,000 years.
+    assert false_alarms(8).sum() == 0
+
+
+@pytest.mark.parametrize("sds", [0.0, 0.05])
+def test_the_line_and_the_date_hold_the_truth_as_often_as_stated(sds: float) -> None:
+    rng = np.random.default_rng(0)
+    days = np.sort(rng.choice(60, 30, replace=False)).astype(np.float64)
+    true, limit, held = 0.02, 2.0, 0
+    scores = []
+    for _ in range(300):
+        values = 0.1 + true * (days - days[0])[:, None] + rng.normal(0.0, 0.1, (30, 1))
+        (line,) = drifts(days, values, np.full(30, sds))
+        scores.append((line.per_day - true) / line.per_day_sd)
+        when, earliest, latest = line.reaches(limit)
+        assert earliest < when < latest
+        held += earliest < days[0] + (limit - 0.1) / true < latest
+    assert np.std(scores) == pytest.approx(1.0, abs=0.15)
+    assert held / 300 == pytest.approx(CONFIDENCE, abs=0.04)
+
+
+def test_days_of_large_scatter_count_less() -> None:
+    days = np.arange(20.0)
+    sds = np.where(days % 2, 1.0, 0.001)
+    values = np.where(days % 2, 5.0, 0.0)[:, None] * 0.2 + 0.01 * days[:, None]
+    (line,) = drifts(days, values, sds)
+    assert line.per_day == pytest.approx(0.01, abs=0.03)
+    assert line.level < 0.5
+
+
+def test_without_a_trend_the_limit_has_an_earliest_day_and_no_latest() -> None:
+    values = np.random.default_rng(3).normal(0.0, 0.1, (40, 1))
+    (line,) = drifts(np.arange(40.0), values, np.zeros(40))
+    _, earliest, latest = line.reaches(0.44)
+    assert not line.alarm and earliest > 39.0 and latest == np.inf
