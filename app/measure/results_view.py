@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QComboBox, QHeaderView, QStackedWidget, QWidget
 
 from app.context.context import AppContext
-from app.measure.error_plot import ErrorPlot
+from app.measure.error_plot import errors_over_time
 from app.measure.figures_text import unit_behind, unit_of
 from app.measure.record_book import RecordBook
 from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
@@ -22,6 +22,7 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
+from app.widgets.time_chart import TimeChart
 from gelpolight_core.measurement.statistics import Statistics, statistics_of
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.translation import tr
@@ -73,8 +74,9 @@ class ResultsView(QWidget):
         )
         self.statistics.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
-        self.drift = ErrorPlot()
-        self.drift_title = named(PlainLabel(), "measure.results.drift_title", tr("Error over time"))
+        title = tr("Error over time")
+        self.drift = TimeChart("measure.drift", title)
+        self.drift_title = named(PlainLabel(), "measure.results.drift_title", title)
         self._lay_out()
         book.changed.connect(self.refresh)
         self.refresh()
@@ -163,7 +165,9 @@ class ResultsView(QWidget):
         self.statistics.setText(_statistics_text(group))
         serial = group[0].serial if group else ""
         records = tuple(r for r in self.table.shown if r.serial == serial)
-        self.drift.show_records(records, self._context.settings.limits)
+        self.drift.show_series(
+            errors_over_time(records, self._context.settings.limits), tr("error (%)")
+        )
         title = tr("Error of {serial} over time, with the limits").format(serial=serial)
         self.drift_title.setText(title if serial else "")
 

@@ -43,9 +43,9 @@ def test_the_drift_of_an_led_is_drawn_and_named_with_its_day(qtbot: QtBot) -> No
     true = BEGIN + timedelta(days=LED_PERCENT / 0.015)
     assert abs(day - true.timestamp() / DAY_S) < 2.0
     assert f"{datetime.fromtimestamp(DAY_S * day, UTC).astimezone():%Y-%m-%d}" in view.words.text()
-    drawn = [item for item in view._plot.listDataItems() if item.xData is not None]
-    assert np.allclose(drawn[0].xData, DAY_S * red.days)
-    assert np.allclose(drawn[0].yData, red.values)
+    drawn = view.chart.shown[0]
+    assert np.allclose(drawn.times_s, DAY_S * red.days) and np.allclose(drawn.values, red.values)
+    assert drawn.limit == LED_PERCENT
 
 
 def test_other_values_are_chosen_and_a_sensor_without_any_says_so(qtbot: QtBot) -> None:
