@@ -134,8 +134,8 @@ def screen() -> Iterator[None]:
         if not answers:
             raise InputError(
                 tr("No display is available for a window"),
-                where=f"DISPLAY={display}",
-                advice=tr(
+                f"DISPLAY={display}",
+                tr(
                     "Start the program on a desktop, use ssh -X, or use the commands that "
                     "need no display (gelpolight --help)"
                 ),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import StrEnum, unique
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -135,15 +134,11 @@ class InputError(Exception):
     missing.gplcal
     """
 
-    def __init__(self, found: str, *, where: str | Path, advice: str) -> None:
+    def __init__(self, found: str, where: str | Path, advice: str) -> None:
         self.found = found
         self.where = where if isinstance(where, str) else str(where)
         self.advice = translated(advice)
         super().__init__(found, self.where, self.advice)
-
-    def __reduce__(self) -> tuple[partial[InputError], tuple[str]]:
-        """Return what a copy in another process is made from."""
-        return partial(type(self), where=self.where, advice=self.advice), (self.found,)
 
     @property
     def text(self) -> str:

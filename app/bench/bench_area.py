@@ -24,8 +24,8 @@ class BenchArea(QWidget):
 
     def follow(self) -> bool:
         """Show the bench of the selected source. Return whether there is one."""
-        info, bench = self._source.info, self._source.bench
-        if info is None or info.kind != "virtual" or bench is None:
+        bench = self._source.virtual
+        if bench is None:
             return False
         if not self._column.count():
             from app.bench.bench_panel import BenchPanel  # only needed by the demo

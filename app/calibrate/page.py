@@ -112,7 +112,7 @@ class CalibratePage(QWidget):
 
     def begin_demo(self) -> None:
         """Start with the virtual sensor."""
-        self.context.requests.demo.emit()
+        self.context.source.choose_virtual_sensor()
         self.begin()
 
     def _on_answer(self, opens: bool) -> None:

@@ -3,13 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QImage, QPixmap
-from PySide6.QtWidgets import (
-    QGroupBox,
-    QProgressBar,
-    QSizePolicy,
-    QWidget,
-)
+from PySide6.QtWidgets import QGroupBox, QProgressBar, QSizePolicy, QWidget
 
 from app.cameras.control_rows import ControlRows
 from app.cameras.format_rows import FormatRows
@@ -18,13 +12,14 @@ from app.sources.camera.applying import is_locked, lock_quality
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.steadiness import SteadinessTest
-from app.sources.source import Rgb, Setting
+from app.sources.source import Setting
 from app.sources.stream import Stream
 from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
+from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
@@ -140,7 +135,10 @@ class CameraPanel(QWidget):
             return
         frame = self._stream.newest.take()
         if frame is not None:
-            self.image.setPixmap(_small(frame.rgb, self.image.height()))
+            height, smooth = self.image.height(), Qt.TransformationMode.SmoothTransformation
+            step = max(1, frame.rgb.shape[0] // height)
+            image = pixmap_of(frame.rgb[::step, ::step])
+            self.image.setPixmap(image.scaledToHeight(height, smooth))
         if self._test is not None:
             self._follow_test(self._test)
         self._show_state()
@@ -224,15 +222,3 @@ class CameraPanel(QWidget):
             return tr("Locked, and the image is stable. Close this window and calibrate."), "pass"
         text = tr("Not stable yet: {advice}.")
         return text.format(advice="; ".join(self._result.remedies)), verdict.value
-
-
-def _small(rgb: Rgb, height: int) -> QPixmap:
-    """Return a reduced copy of an image for display, without copying all of it."""
-    step = max(1, rgb.shape[0] // height)
-    part = rgb[::step, ::step]
-    part = (part if part.dtype.itemsize == 1 else part >> 8).astype("uint8", order="C")
-    image = QImage(
-        part.data, part.shape[1], part.shape[0], 3 * part.shape[1], QImage.Format.Format_RGB888
-    )
-    kept = QPixmap.fromImage(image)
-    return kept.scaledToHeight(height, Qt.TransformationMode.SmoothTransformation)

@@ -36,9 +36,7 @@ def _workers(text: str) -> AbstractContextManager[Workers]:
     if not text.isdecimal():
         return cluster(text)
     if int(text) < 1:
-        raise InputError(
-            tr("At least one worker is needed"), where="--workers", advice=Remedy.CORRECT_VALUE
-        )
+        raise InputError(tr("At least one worker is needed"), "--workers", Remedy.CORRECT_VALUE)
     return processes(int(text))
 
 
@@ -148,8 +146,8 @@ def _report(progress: BatchProgress, out: Path) -> None:
             tr("{n} of {total} frames could not be used, for the reason in the last column").format(
                 n=progress.bad, total=progress.total
             ),
-            where=out / SUMMARY,
-            advice=Remedy.CORRECT_AND_REPEAT,
+            out / SUMMARY,
+            Remedy.CORRECT_AND_REPEAT,
         )
 
 

@@ -102,8 +102,8 @@ class Refresh(Command):
             if not recipe.fits(session):
                 raise InputError(
                     tr("the session is of an open sensor: session.toml has no table [in_place]"),
-                    where=self.session,
-                    advice=Remedy.CHOOSE_SESSION,
+                    self.session,
+                    Remedy.CHOOSE_SESSION,
                 )
             new = calibrate(session, recipe).calibration
         write_calibration(new, self.output)

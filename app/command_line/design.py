@@ -35,7 +35,7 @@ class Simulate(Command):
 
 
 @dataclass(frozen=True)
-class Check(Command):
+class Design(Command):
     """The check of a sensor design before it is built."""
 
     design: Path = place("FILE")

@@ -75,19 +75,15 @@ def open_inputs(
             where = tr("{path}, frame {n}").format(path=path, n=index)
             inputs.append(Input(name, where, partial(_read_frame, recording, index)))
     if frames and not recordings:
-        raise InputError(
-            tr("None of the inputs is a recording"),
-            where="--frames",
-            advice=Remedy.REMOVE_OPTION,
-        )
+        raise InputError(tr("None of the inputs is a recording"), "--frames", Remedy.REMOVE_OPTION)
     # Some file systems ignore case.
     names = Counter(item.stem.casefold() for item in inputs)
     twins = [item.stem for item in inputs if names[item.stem.casefold()] > 1]
     if twins:
         raise InputError(
             tr("Two images have the name {name}").format(name=twins[0]),
-            where=tr("IMAGE"),
-            advice=Remedy.SEPARATE_FOLDERS,
+            tr("IMAGE"),
+            Remedy.SEPARATE_FOLDERS,
         )
     return inputs, recordings
 
@@ -101,17 +97,15 @@ def frame_range(text: str, count: int, *, where: str) -> range:
         If there are none.
     """
     if not count:
-        raise InputError(
-            tr("The recording contains no frames"), where=where, advice=Remedy.CHOOSE_FILE
-        )
+        raise InputError(tr("The recording contains no frames"), where, Remedy.CHOOSE_FILE)
     selected = range(count)[frame_slice(text)]
     if not selected:
         raise InputError(
             tr("{text} selects none of the {count} frames, which are 0:{count}").format(
                 text=text, count=count
             ),
-            where="--frames",
-            advice=Remedy.CORRECT_VALUE,
+            "--frames",
+            Remedy.CORRECT_VALUE,
         )
     return selected
 
@@ -128,8 +122,8 @@ def frame_slice(text: str) -> slice:
     if match is None:
         raise InputError(
             tr("{text} is not a range of frames such as 0:1000 or 0:1000:10").format(text=text),
-            where="--frames",
-            advice=Remedy.CORRECT_VALUE,
+            "--frames",
+            Remedy.CORRECT_VALUE,
         )
     first, colon, end, step = match.groups()
     last = int(end) if end else int(first) + 1 if first and not colon else None

@@ -40,7 +40,7 @@ class Inspect(Command):
 
 
 def _recording_facts(recording: Recording) -> list[tuple[str, str]]:
-    header = recording.header
+    header, (w, h) = recording.header, recording.size
     rows = [
         (tr("recording"), recording.path.name),
         (tr("sensor"), header.serial or tr("not given")),
@@ -48,12 +48,11 @@ def _recording_facts(recording: Recording) -> list[tuple[str, str]]:
         (tr("source"), f"{header.source} ({header.kind})" if header.source else tr("not given")),
         (tr("created"), header.started),
         (tr("program"), header.program),
-        (tr("image"), tr("{w}x{h} px, {bits} bit").format(
-            w=recording.size[0], h=recording.size[1], bits=recording.bits)),
+        (tr("image"), tr("{w}x{h} px, {bits} bit").format(w=w, h=h, bits=recording.bits)),
         (tr("frames"), tr("{n} in {s:.2f} s").format(n=len(recording), s=recording.duration_s)),
         (tr("frames lost"), str(recording.lost)),
         (tr("complete"), tr("no") if recording.truncated else tr("yes")),
-    ]  # fmt: skip
+    ]
     rows += [(key, str(value)) for key, value in header.settings.items()]
     return [*rows, (tr("note"), header.note)] if header.note else rows
 

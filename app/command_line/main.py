@@ -64,9 +64,7 @@ def _run(given: list[str]) -> int:
     if all(file.suffix.lower() in OPENED for file in files):
         for file in files:
             if not file.is_file():
-                raise InputError(
-                    tr("The file does not exist"), where=file, advice=Remedy.CHECK_NAME
-                )
+                raise InputError(tr("The file does not exist"), file, Remedy.CHECK_NAME)
         return _open_desktop(given)
     parsed = build_parser().parse_args(split_numbers(given))
     if parsed.command is None:
@@ -111,8 +109,8 @@ def _environment_fault(error: OSError) -> str:
     _write_log(traceback.format_exc())
     found = InputError(
         tr("The operating system refused it ({reason})").format(reason=error.strerror or error),
-        where=error.filename or tr("Files"),
-        advice=Remedy.CHECK_DISK,
+        error.filename or tr("Files"),
+        Remedy.CHECK_DISK,
     )
     return f"gelpolight: {found}"
 

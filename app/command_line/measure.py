@@ -49,9 +49,7 @@ class Measure(ToolArguments):
         tools = self.tools()
         if tools and self.edge_radius is not None:
             raise InputError(
-                tr("Tools do not use an edge radius"),
-                where="--edge-radius",
-                advice=Remedy.REMOVE_OPTION,
+                tr("Tools do not use an edge radius"), "--edge-radius", Remedy.REMOVE_OPTION
             )
         truths = self._truths()
         reconstructor = load_reconstructor(self.calibration, self.model)
@@ -117,17 +115,15 @@ class Measure(ToolArguments):
             return {}
         if self.shape is None:
             raise InputError(
-                tr("Tools cannot be compared with true sizes"),
-                where="--truth",
-                advice=Remedy.REMOVE_OPTION,
+                tr("Tools cannot be compared with true sizes"), "--truth", Remedy.REMOVE_OPTION
             )
         rows = {row.file: row.truth for row in read_truth(self.truth).rows}
         for image in self.images:
             if image.name not in rows:
                 raise InputError(
                     tr("There is no row for {name}").format(name=image.name),
-                    where=self.truth,
-                    advice=Remedy.TRUTH_ROW,
+                    self.truth,
+                    Remedy.TRUTH_ROW,
                 )
         return rows
 

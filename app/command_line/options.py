@@ -127,8 +127,6 @@ def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:
         inside = target.suffix.lower() in KEPT and target.exists() and used & {*target.parents}
         if target in used or inside:
             raise InputError(
-                tr("The result would overwrite a file that is used here"),
-                where=path,
-                advice=Remedy.CHOOSE_NAME,
+                tr("The result would overwrite a file that is used here"), path, Remedy.CHOOSE_NAME
             )
         used.add(target)

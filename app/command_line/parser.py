@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, NoReturn
@@ -69,59 +70,36 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(
         title=tr("commands"), metavar=tr("COMMAND"), parser_class=CommandParser
     )
-    for name, command, summary in _commands():
+    for command, summary in _commands().items():
+        name = re.sub(r"(?<!^)(?=[A-Z])", "-", command.partition(".")[2]).lower()
         commands.add_parser(name, help=summary, command=command)
     return parser
 
 
-def _commands() -> tuple[tuple[str, str, str], ...]:
-    """Return name, module and class, and summary of each command, in the order of the help."""
-    return (
-        ("simulate", "design.Simulate", tr("create a session folder of the virtual sensor")),
-        ("calibrate", "calibrate.Calibrate", tr("create a calibration from a session folder")),
-        (
-            "import",
-            "calibrate.Import",
-            tr("turn a calibration folder of another library into a closed sensor's session"),
+def _commands() -> dict[str, str]:
+    """Return the summary of each command by its module and class, in the order of the help."""
+    return {
+        "design.Simulate": tr("create a session folder of the virtual sensor"),
+        "calibrate.Calibrate": tr("create a calibration from a session folder"),
+        "calibrate.Import": tr(
+            "turn a calibration folder of another library into a closed sensor's session"
         ),
-        ("inspect", "inspect_file.Inspect", tr("show the content of a calibration or a recording")),
-        (
-            "reconstruct",
-            "reconstruct.Reconstruct",
-            tr("turn images and recordings into depth maps in mm"),
+        "inspect_file.Inspect": tr("show the content of a calibration or a recording"),
+        "reconstruct.Reconstruct": tr("turn images and recordings into depth maps in mm"),
+        "batch.Batch": tr("turn recordings and folders of any size into depth maps, on many cores"),
+        "measure.Measure": tr("measure the pressed object, or apply a measuring tool"),
+        "reconstruct.Profile": tr("write the depth along a line as CSV"),
+        "studies.Evaluate": tr("compare measured presses with their true values"),
+        "records.Records": tr("list earlier measurements, or write them as CSV"),
+        "calibrate.Refresh": tr("a closed sensor's calibration after its gel was changed"),
+        "calibrate.Drift": tr(
+            "compare an image of the untouched sensor with the calibration's background"
         ),
-        (
-            "batch",
-            "batch.Batch",
-            tr("turn recordings and folders of any size into depth maps, on many cores"),
-        ),
-        ("measure", "measure.Measure", tr("measure the pressed object, or apply a measuring tool")),
-        ("profile", "reconstruct.Profile", tr("write the depth along a line as CSV")),
-        ("evaluate", "studies.Evaluate", tr("compare measured presses with their true values")),
-        ("records", "records.List", tr("list earlier measurements, or write them as CSV")),
-        (
-            "refresh",
-            "calibrate.Refresh",
-            tr("a closed sensor's calibration after its gel was changed"),
-        ),
-        (
-            "drift",
-            "calibrate.Drift",
-            tr("compare an image of the untouched sensor with the calibration's background"),
-        ),
-        ("report", "report.WriteReport", tr("write a calibration's report as PDF")),
-        (
-            "benchmark",
-            "reconstruct.Benchmark",
-            tr("show the processing time of each step of a frame"),
-        ),
-        ("work-precision", "studies.WorkPrecision", tr("show error against run time")),
-        ("stability", "studies.Stability", tr("run extreme cases")),
-        ("design", "design.Check", tr("check a sensor design before it is built")),
-        ("board", "board.Board", tr("create a checkerboard to print, A4 at true size")),
-        (
-            "cameras",
-            "cameras.Cameras",
-            tr("list the connected cameras, their formats and settings"),
-        ),
-    )
+        "report.Report": tr("write a calibration's report as PDF"),
+        "reconstruct.Benchmark": tr("show the processing time of each step of a frame"),
+        "studies.WorkPrecision": tr("show error against run time"),
+        "studies.Stability": tr("run extreme cases"),
+        "design.Design": tr("check a sensor design before it is built"),
+        "board.Board": tr("create a checkerboard to print, A4 at true size"),
+        "cameras.Cameras": tr("list the connected cameras, their formats and settings"),
+    }

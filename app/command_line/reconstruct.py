@@ -12,14 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from app.command_line.inputs import open_inputs
-from app.command_line.options import (
-    Command,
-    option,
-    output,
-    place,
-    refuse_overwriting,
-    result,
-)
+from app.command_line.options import Command, option, output, place, refuse_overwriting, result
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import (
     despite_faults,
@@ -73,8 +66,8 @@ class Reconstruct(Command):
         if self.uncertainty and "npz" not in files:
             raise InputError(
                 tr("Only npz can contain standard deviations"),
-                where="--uncertainty",
-                advice=Remedy.REMOVE_OPTION,
+                "--uncertainty",
+                Remedy.REMOVE_OPTION,
             )
         endings = ["png" if name == PREVIEW else ending(name) for name in self.format]
         with ExitStack() as opened:

@@ -60,8 +60,8 @@ def formats(names: Iterable[str] = FORMATS) -> Any:
         if unknown or not found:
             raise InputError(
                 tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
-                where="--format",
-                advice=Remedy.ONE_OF.format(names=", ".join(names)),
+                "--format",
+                Remedy.ONE_OF.format(names=", ".join(names)),
             )
         return found
 

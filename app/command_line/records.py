@@ -11,14 +11,15 @@ from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.records.records import NAME
+from gelpolight_core.records.records import Records as Database
 from gelpolight_core.translation import tr
 
 _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
 
 
 @dataclass(frozen=True)
-class List(Command):
+class Records(Command):
     """Earlier measurements."""
 
     workspace: Path = option(
@@ -34,12 +35,10 @@ class List(Command):
         file = self.workspace / NAME
         if not file.is_file():
             raise InputError(
-                tr("There are no records"),
-                where=file,
-                advice=Remedy.STATE_WITH.format(option="--workspace"),
+                tr("There are no records"), file, Remedy.STATE_WITH.format(option="--workspace")
             )
         refuse_overwriting([self.csv] if self.csv else [], [file])
-        with Records.open(file) as records:
+        with Database.open(file) as records:
             if records.notice:
                 say(records.notice, file=sys.stderr)
             say("\n".join(table_lines(records.measurements(self.sensor))))
@@ -49,16 +48,14 @@ class List(Command):
 
 def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
     """Return the measurements as lines of text, one per measured value."""
-    head = _LINE.format(
-        "id", tr("time (UTC)"), tr("sensor"), tr("shape"), tr("quantity"), tr("measured"),
-        "sd", tr("true"), tr("error %"), tr("verdict"), tr("note"),
-    )  # fmt: skip
-    lines = [head]
+    which = "id", tr("time (UTC)"), tr("sensor"), tr("shape"), tr("quantity")
+    numbers = tr("measured"), "sd", tr("true"), tr("error %")
+    lines = [_LINE.format(*which, *numbers, tr("verdict"), tr("note"))]
     for record in records:
         who = (str(record.id), f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
         rest = record.verdict, record.note.replace("\n", " ")
         for quantity in record.quantities:
-            numbers = (
+            texts = (
                 "" if value is None else f"{value:{form}}"
                 for value, form in (
                     (quantity.value, ".4f"),
@@ -67,7 +64,7 @@ def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
                     (quantity.error_percent, "+.2f"),
                 )
             )
-            cells = (*who, quantity.name, *numbers, *rest)
+            cells = (*who, quantity.name, *texts, *rest)
             lines.append(_LINE.format(*(harmless(str(cell)) for cell in cells)))
             who, rest = ("", "", "", ""), ("", "")  # once for each record
     return [line.rstrip() for line in lines]

@@ -18,7 +18,8 @@ from gelpolight_core.measurement.evaluation_run import evaluate_presses, press_m
 from gelpolight_core.measurement.protocol_run import presses_folder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import calibration_report, run_report
-from gelpolight_core.report.document import Report, Validation
+from gelpolight_core.report.document import Report as Document
+from gelpolight_core.report.document import Validated
 from gelpolight_core.report.evaluation import validation_of
 from gelpolight_core.report.file import refuse_other_endings, write_report
 from gelpolight_core.sensor_calibration import MODELS, Calibration
@@ -26,7 +27,7 @@ from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True)
-class WriteReport(Command):
+class Report(Command):
     """The report of a calibration, or of a session, which is calibrated again."""
 
     source: Path = place(
@@ -47,9 +48,7 @@ class WriteReport(Command):
         refuse_other_endings(self.output)
         if self.presses and not self.presses.is_dir():
             raise InputError(
-                tr("The path is not a folder with truth.csv"),
-                where=self.presses,
-                advice=Remedy.CHOOSE_FOLDER,
+                tr("The path is not a folder with truth.csv"), self.presses, Remedy.CHOOSE_FOLDER
             )
         # Before minutes of work for nothing.
         presses = presses_folder(self.presses) if self.presses else None
@@ -63,18 +62,16 @@ class WriteReport(Command):
             )
         )
 
-    def _of_calibration(self, presses: Path | None, progress: Any) -> Report:
+    def _of_calibration(self, presses: Path | None, progress: Any) -> Document:
         if self.model:
             raise InputError(
-                tr("A calibration already has its model"),
-                where="--model",
-                advice=Remedy.REMOVE_OPTION,
+                tr("A calibration already has its model"), "--model", Remedy.REMOVE_OPTION
             )
         calibration = read_calibration(self.source)
         validation = _validation(calibration, presses, progress)
         return calibration_report(calibration, validation=validation)
 
-    def _of_session(self, presses: Path | None, progress: Any) -> Report:
+    def _of_session(self, presses: Path | None, progress: Any) -> Document:
         session = session_to_calibrate(self.source)
         run = calibrate(session, recipe_of(session, self.model), progress=progress)
         validation = _validation(run.calibration, presses, progress)
@@ -82,7 +79,7 @@ class WriteReport(Command):
         return run_report(run, validation=validation)
 
 
-def _validation(calibration: Calibration, presses: Path | None, progress: Any) -> Validation | None:
+def _validation(calibration: Calibration, presses: Path | None, progress: Any) -> Validated | None:
     if presses is None:
         return None
     measure = press_measurement(Reconstructor(calibration))

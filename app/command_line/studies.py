@@ -87,8 +87,8 @@ class Evaluate(Command):
                 tr("None of the {n} presses could be measured ({reason})").format(
                     n=len(evaluation.results), reason=str(evaluation.failed[0].outcome).rstrip(".")
                 ),
-                where=presses,
-                advice=Remedy.SAME_SENSOR,
+                presses,
+                Remedy.SAME_SENSOR,
             )
 
 

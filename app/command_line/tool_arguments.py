@@ -76,8 +76,8 @@ class ToolArguments(Command):
         if len(points) > 1:
             raise InputError(
                 tr("Number of points: {n} instead of one").format(n=len(points)),
-                where="--at",
-                advice=Remedy.CORRECT_VALUE,
+                "--at",
+                Remedy.CORRECT_VALUE,
             )
         return points[0] if points else None
 
@@ -85,8 +85,8 @@ class ToolArguments(Command):
         if len(self.at) % 2:
             raise InputError(
                 tr("Number of values: {n}, but each point needs two").format(n=len(self.at)),
-                where="--at",
-                advice=Remedy.CORRECT_VALUE,
+                "--at",
+                Remedy.CORRECT_VALUE,
             )
         return list(zip(self.at[::2], self.at[1::2], strict=True))
 
@@ -103,8 +103,8 @@ class ToolArguments(Command):
                     tr("Number of points: {n} instead of {least}").format(
                         n=len(points), least=len(types)
                     ),
-                    where=where,
-                    advice=Remedy.STATE_WITH.format(option="--at X Y ..."),
+                    where,
+                    Remedy.STATE_WITH.format(option="--at X Y ..."),
                 )
             content = dict(zip(types, points, strict=False))
         if "Rectangle" not in types.values():
@@ -112,8 +112,8 @@ class ToolArguments(Command):
         elif len(self.size) not in (2, 3):
             raise InputError(
                 tr("The size in mm is missing"),
-                where=where,
-                advice=Remedy.STATE_WITH.format(option="--size A B"),
+                where,
+                Remedy.STATE_WITH.format(option="--size A B"),
             )
         for name in content:
             if types[name] == "Rectangle":
@@ -132,8 +132,8 @@ class ToolArguments(Command):
                     tr("This option cannot be used with {name}").format(
                         name=self.tool or "--shape"
                     ),
-                    where=f"--{name}",
-                    advice=Remedy.REMOVE_OPTION,
+                    f"--{name}",
+                    Remedy.REMOVE_OPTION,
                 )
 
 
@@ -153,6 +153,6 @@ def read_tools(path: Path) -> Any:
     except (FileNotFoundError, ValueError) as error:
         raise InputError(
             tr("This is neither a measuring tool nor a JSON file"),
-            where=f"--tool {path}",
-            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
+            f"--tool {path}",
+            Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         ) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -10,6 +11,7 @@ from PySide6.QtWidgets import QMenu, QToolButton
 from app.context.calibration_status import put_into_use
 from app.context.context import AppContext
 from app.theme.icons import icon
+from app.widgets.actions import add_item
 from app.widgets.label import plain_tip
 from app.widgets.meaning import show_ground
 from app.widgets.naming import named
@@ -58,23 +60,20 @@ class CalibrationButton(QToolButton):
                 if entry.serial == serial:
                     self._add(entry)
         menu.addSeparator()
-        none = menu.addAction(tr("No calibration"), lambda: self.use(None))
-        none.setObjectName("state.calibration.none")
-        page = self._context.requests.page
-        others = menu.addAction(tr("All sensors and calibrations"), lambda: page.emit("sensors"))
-        others.setObjectName("state.calibration.sensors")
+        add_item(menu, "state.calibration.none", tr("No calibration"), lambda: self.use(None))
+        others = partial(self._context.requests.page.emit, "sensors")
+        add_item(menu, "state.calibration.sensors", tr("All sensors and calibrations"), others)
 
     def _add(self, entry: Entry) -> None:
         assert entry.summary is not None
         word, role = entry.state
         text = f"{entry.name}  ({word})".replace("&", "&&")
-        action = self.menu().addAction(icon(SIGNS[role], role), text)
-        action.setObjectName(f"state.calibration.{entry.name}")
+        name, use = f"state.calibration.{entry.name}", partial(self.use, entry.path)
+        action = add_item(self.menu(), name, text, use, checkable=True)
+        action.setIcon(icon(SIGNS[role], role))
         size = "x".join(map(str, entry.summary.image_size))
         action.setToolTip(plain_tip(f"{entry.serial}, {entry.summary.identity}, {size}"))
-        action.setCheckable(True)
         action.setChecked(entry.in_use)
-        action.triggered.connect(lambda _=False: self.use(entry.path))
 
     def use(self, path: Path | None) -> None:
         """Put a calibration into use, or none."""

@@ -71,6 +71,11 @@ class SourceChoice(QObject):
             self.choose(image_folder(folder))
 
     @property
+    def virtual(self) -> Bench | None:
+        """The bench of the virtual sensor, if that is the source."""
+        return self.bench if self.info is not None and self.info.kind == "virtual" else None
+
+    @property
     def idle_name(self) -> str | None:
         """Name of the source while no page uses it. None if there is none."""
         return None if self.info is None else tr("{name}, idle").format(name=self.info.name)
@@ -106,14 +111,11 @@ class Requests(QObject):
     """Requests from a page to the main window."""
 
     page = Signal(str)  # name: show that page
-    path = Signal(str, str)  # name, path: show that page and open a folder or file in it
     session = Signal(str)  # folder: calibrate from it and remember it
-    choose_session = Signal()  # the same, but let the user choose the folder first
     guide = Signal(str, str)  # page, heading: show what the guide says about it
-    open_files = Signal()  # let the user choose files, and open them
-    new_sensor = Signal()  # start another calibration; an open session is closed
-    demo = Signal()  # select the virtual sensor as the source
-    begin_demo = Signal()  # the same, and start calibrating it
+    # "sensor": start another calibration; "demo": the same with the virtual sensor; "session",
+    # "files": let the user choose them, and open them.
+    begin = Signal(str)
     rest = Signal(bool)  # pause the processing of live images while times are measured, or continue
     preferences_changed = Signal()  # the mode of the live depth, or the unit of lengths
     calibrations_changed = Signal()  # calibrations added, removed, validated or put into use

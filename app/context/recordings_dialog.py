@@ -2,69 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QImage, QPixmap
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
-from app.widgets.buttons import push_button
+from app.widgets.buttons import Slot, push_button
 from app.widgets.dialog import Dialog, Kinds
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
+from app.widgets.pixmaps import pixmap_of
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 PREVIEW = QSize(320, 240)
 
 
-@dataclass(frozen=True, slots=True)
-class Preview:
-    """What the list shows of a recording.
-
-    Attributes
-    ----------
-    text : str
-        Its length, images and losses, or why it cannot be read.
-    image : QImage or None
-        Its first image.
-    """
-
-    text: str
-    image: QImage | None = None
-
-
-def read_preview(path: Path) -> Preview:
-    """Read the description and the first image of a recording."""
+def read_preview(path: Path) -> tuple[str, QPixmap]:
+    """Return what there is to say of a recording, and its first image."""
     from gelpolight_core.recording.reader import Recording  # slow import: loads NumPy
 
     try:
-        recording = Recording.open(path)
+        with Recording.open(path) as recording:
+            text = tr("{n} frames, {s:.1f} s, {w} x {h} px, {lost} lost").format(
+                n=len(recording),
+                s=recording.duration_s,
+                w=recording.size[0],
+                h=recording.size[1],
+                lost=recording.lost,
+            )
+            return text, pixmap_of(recording.frame(0).rgb) if len(recording) else QPixmap()
     except InputError as error:
-        return Preview(str(error))
-    try:
-        text = tr("{n} frames, {s:.1f} s, {w} x {h} px, {lost} lost").format(
-            n=len(recording),
-            s=recording.duration_s,
-            w=recording.size[0],
-            h=recording.size[1],
-            lost=recording.lost,
-        )
-        if not len(recording):
-            return Preview(text)
-        rgb = recording.frame(0).rgb
-        kind = QImage.Format.Format_RGB888
-        if rgb.dtype.itemsize == 2:
-            rgb = (rgb >> 8).astype("uint8")
-        image = QImage(rgb.data, rgb.shape[1], rgb.shape[0], 3 * rgb.shape[1], kind)
-        return Preview(text, image.copy())
-    except InputError as error:
-        return Preview(str(error))
-    finally:
-        recording.close()
+        return str(error), QPixmap()
 
 
 class RecordingsDialog(Dialog):
@@ -74,22 +47,23 @@ class RecordingsDialog(Dialog):
     ----------
     recordings : tuple of Path
         The recordings, newest first.
+    play : callable
+        Called with the recording to play.
+    choose_other : callable
+        Called to choose another file.
     parent : QWidget
         The window.
-
-    Signals
-    -------
-    chosen(str)
-        Path of the recording to play.
-    other_wanted()
-        The user wants to choose another file.
     """
 
-    chosen = Signal(str)
-    other_wanted = Signal()
-
-    def __init__(self, recordings: tuple[Path, ...], parent: QWidget) -> None:
+    def __init__(
+        self,
+        recordings: tuple[Path, ...],
+        play: Callable[[Path], object],
+        choose_other: Slot,
+        parent: QWidget,
+    ) -> None:
         super().__init__(parent, "recordings", tr("Recordings"), Kinds.Cancel, once=True)
+        self._play, self._choose_other = play, choose_other
         self.list = named(QListWidget(self), "recordings.list", tr("Recordings, newest first"))
         self.list.setMinimumWidth(300)
         for path in recordings:
@@ -121,25 +95,20 @@ class RecordingsDialog(Dialog):
         item = self.list.currentItem()
         if item is not None:
             self.accept()
-            self.chosen.emit(item.data(Qt.ItemDataRole.UserRole))
+            self._play(Path(item.data(Qt.ItemDataRole.UserRole)))
 
     def _ask_for_other(self) -> None:
         self.accept()
-        self.other_wanted.emit()
+        self._choose_other()
 
     def _show_chosen(self, item: QListWidgetItem | None) -> None:
-        if item is None:
-            return
-        preview = read_preview(Path(item.data(Qt.ItemDataRole.UserRole)))
-        self.text.setText(preview.text)
-        pixmap = QPixmap() if preview.image is None else QPixmap.fromImage(preview.image)
-        if not pixmap.isNull():
-            pixmap = pixmap.scaled(
-                PREVIEW,
-                Qt.AspectRatioMode.KeepAspectRatio,
-                Qt.TransformationMode.SmoothTransformation,
-            )
-        self.image.setPixmap(pixmap)
+        if item is not None:
+            text, image = read_preview(Path(item.data(Qt.ItemDataRole.UserRole)))
+            whole, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode
+            self.text.setText(text)
+            if not image.isNull():
+                image = image.scaled(PREVIEW, whole, smooth.SmoothTransformation)
+            self.image.setPixmap(image)
 
 
 def _line(path: Path) -> str:

@@ -12,6 +12,7 @@ from app.context.context import AppContext
 from app.context.recordings_dialog import RecordingsDialog
 from app.services.file_dialogs import ask_folder, ask_open
 from app.sources.source import SourceInfo
+from app.widgets.actions import add_item
 from app.widgets.label import plain_tip
 from app.widgets.meaning import show_ground
 from app.widgets.naming import named
@@ -44,11 +45,11 @@ class SourceButton(QToolButton):
             ("recording", tr("Recording…"), self.show_recordings),
             ("none", tr("No camera"), lambda: context.source.choose(None)),
         ):
-            action = menu.addAction(text, choose)
-            action.setObjectName(f"state.camera.{name}")
+            add_item(menu, f"state.camera.{name}", text, choose)
         menu.addSeparator()
-        self._settings = menu.addAction(tr("Camera settings…"), self.show_settings)
-        self._settings.setObjectName("state.camera.settings")
+        self._settings = add_item(
+            menu, "state.camera.settings", tr("Camera settings…"), self.show_settings
+        )
         menu.aboutToShow.connect(self.list_cameras)
         self.setMenu(menu)
         context.source.changed.connect(self._show)
@@ -97,10 +98,8 @@ class SourceButton(QToolButton):
 
     def show_recordings(self) -> RecordingsDialog:
         """Show the recordings of the workspace, to play one instead of the camera."""
-        recordings = self._context.workspace.recordings()
-        dialog = RecordingsDialog(recordings, self)
-        dialog.chosen.connect(lambda path: self.use_recording(Path(path)))
-        dialog.other_wanted.connect(lambda: self.choose_recording())
+        recordings, use = self._context.workspace.recordings(), self.use_recording
+        dialog = RecordingsDialog(recordings, use, self.choose_recording, self)
         dialog.open()
         return dialog
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import QBuffer, QByteArray, QCoreApplication, QObject
 from PySide6.QtWidgets import QWidget
@@ -53,15 +53,17 @@ class FileActions(QObject):
         super().__init__(owner)
         self._depth, self._views = depth, views
         self._owner, self._context = owner, context
+        text, tip = (
+            tr("Screenshot…"),
+            tr("Save an image of the views or of the surface in any size"),
+        )
+        key, name = ("Ctrl+Shift+P",), "inspect.screenshot"
         self.image_action = make_action(
-            owner, "inspect.screenshot", tr("Screenshot…"), self.screenshot,
-            keys=("Ctrl+Shift+P",), icon_name="picture",
-            tip=tr("Save an image of the views or of the surface in any size"),
-        )  # fmt: skip
-        self.profile_action = make_action(
-            owner, "inspect.save_profile", tr("Profile…"), self.save_profile,
-            tip=tr("Save the profiles of all section lines as a table (CSV)"),
-        )  # fmt: skip
+            owner, name, text, self.screenshot, keys=key, icon_name="picture", tip=tip
+        )
+        text, tip = tr("Profile…"), tr("Save the profiles of all section lines as a table (CSV)")
+        name = "inspect.save_profile"
+        self.profile_action = make_action(owner, name, text, self.save_profile, tip=tip)
         references = {
             "hold": tr("Use the current frame"),
             "load": tr("Load from a file…"),
@@ -76,15 +78,13 @@ class FileActions(QObject):
         """Ask for a file, and write the profiles of all lines as a table."""
         profiles = self._views.section.cut.profiles
         if not profiles:
-            self._report(tr("There is no profile yet."), "warn")
+            self._context.toasts.show(tr("There is no profile yet."), "warn")
             return
         last = self._depth.last
-        processed = last is not None and bool(last.processed)
         name = "profiles" if len(profiles) > 1 else "profile"
-        file = f"{name}-processed.csv" if processed else f"{name}.csv"
-        path = self._ask_save("table", tr("Save the profiles"), file, tr("Table (*.csv)"))
-        if path is not None:
-            self._write(path, lambda path: write_profiles(profiles, path))
+        file = f"{name}-processed.csv" if last is not None and last.processed else f"{name}.csv"
+        kind, title = ("table", tr("Table (*.csv)")), tr("Save the profiles")
+        self._save(kind, title, file, partial(write_profiles, profiles))
 
     # The 3D view
 
@@ -101,20 +101,16 @@ class FileActions(QObject):
         """Keep the height map of now, as reconstructed, as the reference. Return whether it is."""
         last = self._depth.last
         if last is None or last.raw is None:
-            self._report(tr("There is no depth to use as a reference yet."), "warn")
+            text = tr("There is no depth to use as a reference yet.")
+            self._context.toasts.show(text, "warn")
             return False
         name = tr("frame {n}").format(n=last.frame.number)
         self._views.hold(Reference(replace(last.raw, source=name), name))
         return True
 
     def _ask_reference(self) -> None:
-        path = ask_open(
-            self._owner,
-            self._context.settings,
-            "height_map",
-            tr("Load a reference"),
-            tr("Height map (*.npz)"),
-        )
+        settings, title = self._context.settings, tr("Load a reference")
+        path = ask_open(self._owner, settings, "height_map", title, tr("Height map (*.npz)"))
         if path is not None:
             self.load_reference(path)
 
@@ -155,26 +151,23 @@ class FileActions(QObject):
         if choice.what == "surface":
             self._views.surface.saving.ask_image_file(choice)
             return
-        image = self._views.grab().toImage()
+        data = QByteArray()
+        self._views.grab().toImage().save(QBuffer(data), b"PNG")
         name = f"inspect-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}.png"
-        path = self._ask_save("picture", tr("Save the image"), name, tr("Image (*.png)"))
+        kind, title = ("picture", tr("Image (*.png)")), tr("Save the image")
+        write = partial(write_atomically, writer=lambda file: file.write(data.data()))
+        self._save(kind, title, name, write)
+
+    def _save(
+        self, kind: tuple[str, str], title: str, name: str, write: Callable[[Path], object]
+    ) -> None:
+        """Ask for a file of a kind (its folder and its patterns), and write it."""
+        folder, patterns = kind
+        path = ask_save(self._owner, self._context.settings, folder, title, name, patterns)
         if path is not None:
-            data = QByteArray()
-            image.save(QBuffer(data), b"PNG")
-            self._write(
-                path, lambda path: write_atomically(path, lambda file: file.write(data.data()))
-            )
-
-    def _ask_save(self, kind: str, title: str, name: str, patterns: str) -> Path | None:
-        return ask_save(self._owner, self._context.settings, kind, title, name, patterns)
-
-    def _write(self, path: Path, write: Callable[[Path], object]) -> None:
-        with self._context.toasts.errors():
-            write(path)
-            self._report(tr("Saved to {path}").format(path=path), "pass")
-
-    def _report(self, text: str, kind: str, **more: Any) -> None:
-        self._context.toasts.show(text, kind, **more)
+            with self._context.toasts.errors():
+                write(path)
+                self._context.toasts.show(tr("Saved to {path}").format(path=path))
 
 
 WAIT_S = 0.02
@@ -202,17 +195,12 @@ def recorded_surfaces(
     """
     maker = Maker(reconstructor)
     maker.wanted = Wanted(surface=True, display=wanted.display, reference=wanted.reference)
-    recording = Recording.open(path)
-    try:
-        with ThreadPoolExecutor(1, "movie") as pool:
-            for index in range(len(recording)):
-                kept = recording.frame(index)
-                frame = Frame(kept.rgb, kept.number, kept.time_s)
-                made = pool.submit(lambda frame: maker(frame).surface, frame)
-                while wait([made], WAIT_S).not_done:
-                    QCoreApplication.processEvents()
-                surface = made.result()
-                if surface is not None:
-                    yield surface
-    finally:
-        recording.close()
+    with Recording.open(path) as recording, ThreadPoolExecutor(1, "movie") as pool:
+        for index in range(len(recording)):
+            kept = recording.frame(index)
+            frame = Frame(kept.rgb, kept.number, kept.time_s)
+            made = pool.submit(lambda frame: maker(frame).surface, frame)
+            while wait([made], WAIT_S).not_done:
+                QCoreApplication.processEvents()
+            if (surface := made.result()) is not None:
+                yield surface

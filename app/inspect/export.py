@@ -123,8 +123,7 @@ def export_recording(
 
     assert choice.frames is not None
     written: list[Path] = []
-    recording = Recording.open(path)
-    try:
+    with Recording.open(path) as recording:
         for done, index in enumerate(choice.frames):
             progress(done / len(choice.frames))
             frame = recording.frame(index)
@@ -132,8 +131,6 @@ def export_recording(
             written += write_heightmap(
                 heightmap, Path(choice.folder), formats=choice.formats, stride=choice.stride
             )
-    finally:
-        recording.close()
     return written
 
 
@@ -200,10 +197,10 @@ class ExportControl(QObject):
         super().__init__(owner)
         self._depth, self._jobs = depth, jobs
         self._owner, self._context = owner, context
+        keys, tip = ("Ctrl+E",), tr("Write the depth to files")
         self.action = make_action(
-            owner, "inspect.export", tr("Export…"), self.ask, keys=("Ctrl+E",),
-            icon_name="export", tip=tr("Write the depth to files"),
-        )  # fmt: skip
+            owner, "inspect.export", tr("Export…"), self.ask, keys=keys, icon_name="export", tip=tip
+        )
 
     def ask(self) -> None:
         """Ask what to export, and export it."""

@@ -71,15 +71,16 @@ class InspectPage(QWidget):
         self.views.restore()
 
     def _lay_out(self) -> None:
+        tip, pause = tr("Freeze the image at full detail"), lambda: self.pause(not self.live.paused)
+        # Inside: other pages use the space bar for something else.
         self.pause_action = make_action(
-            self, "inspect.pause", tr("Freeze"), lambda: self.pause(not self.live.paused),
-            keys=("Space",), tip=tr("Freeze the image at full detail"), checkable=True,
-            inside=True,  # other pages use the space bar for something else
-        )  # fmt: skip
+            self, "inspect.pause", tr("Freeze"), pause, keys=("Space",), tip=tip, inside=True
+        )
+        self.pause_action.setCheckable(True)
+        tip, zero = tr("Use the current image as the zero reference"), self.live_depth.zero.set_zero
         zero_action = make_action(
-            self, "inspect.zero", tr("Zero"), self.live_depth.zero.set_zero, keys=("Ctrl+0",),
-            icon_name="zero", tip=tr("Use the current image as the zero reference"),
-        )  # fmt: skip
+            self, "inspect.zero", tr("Zero"), zero, keys=("Ctrl+0",), icon_name="zero", tip=tip
+        )
         self.recorder = RecordControl(
             self.live_depth, self, self._on_recorded, context=self.context
         )

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject, QTimer
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
@@ -45,10 +44,11 @@ class RecordControl(QObject):
         self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
         self._warned = False
-        self.action: QAction = make_action(
-            owner, "inspect.record", tr("Record"), self.toggle, keys=("R",),
-            icon_name="record", tip=tr("Record every frame without loss"), checkable=True,
-        )  # fmt: skip
+        tip, text = tr("Record every frame without loss"), tr("Record")
+        self.action = make_action(
+            owner, "inspect.record", text, self.toggle, keys=("R",), icon_name="record", tip=tip
+        )
+        self.action.setCheckable(True)
         self._timer = QTimer(self, interval=300)
         self._timer.timeout.connect(self._poll)
         depth.live.switched.connect(self._on_switched)

@@ -145,10 +145,9 @@ class LineChoice(QWidget):
     def __init__(self, marks: SectionMarks) -> None:
         super().__init__()
         self._marks = marks
-        self._box = named(
-            ComboBox(), "inspect.section.line", tr("Line whose values are shown"),
-            tr("The values below belong to this line. A click on a line also selects it"),
-        )  # fmt: skip
+        tip = tr("The values below belong to this line. A click on a line also selects it")
+        words = tr("Line whose values are shown")
+        self._box = named(ComboBox(), "inspect.section.line", words, tip)
         self._box.activated.connect(lambda at: marks.on_tool(self._box.itemData(at)))
         self._add, self._remove = (
             tool_button(

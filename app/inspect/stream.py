@@ -232,8 +232,8 @@ class Publisher:
         if not (network or is_local(host)):
             raise InputError(
                 tr("other computers can reach this address"),
-                where=host,
-                advice=tr("Use 127.0.0.1, or allow the network explicitly"),
+                host,
+                tr("Use 127.0.0.1, or allow the network explicitly"),
             )
         self._zmq = _library()
         self._context = self._zmq.Context()
@@ -247,8 +247,8 @@ class Publisher:
             self.close()
             raise InputError(
                 tr("the address cannot be used ({reason})").format(reason=error.strerror),
-                where=f"{host}:{port}",
-                advice=Remedy.CLOSE_PROGRAM,
+                f"{host}:{port}",
+                Remedy.CLOSE_PROGRAM,
             ) from error
         self.address: str = self._socket.getsockopt_string(self._zmq.LAST_ENDPOINT)
 
@@ -274,7 +274,7 @@ def is_local(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError as error:
         raise InputError(
-            tr("it is not an IP address such as 127.0.0.1"), where=host, advice=Remedy.CORRECT_VALUE
+            tr("it is not an IP address such as 127.0.0.1"), host, Remedy.CORRECT_VALUE
         ) from error
 
 
@@ -284,7 +284,7 @@ def _library() -> Any:
     except ImportError as error:
         raise InputError(
             tr("the package pyzmq is not installed"),
-            where=tr("stream"),
-            advice=Remedy.INSTALL.format(package="pyzmq>=26"),
+            tr("stream"),
+            Remedy.INSTALL.format(package="pyzmq>=26"),
         ) from error
     return zmq

@@ -99,10 +99,8 @@ class Views(QWidget):
         self.stage.camera.clicked.connect(self._on_image_clicked)
         self.map_panel.map.bar.range_dragged.connect(self.display.lock_range)
         self.map_panel.map.bar_double_clicked.connect(self.display.unlock_range)
-        make_action(
-            self, "inspect.lock", tr("Lock the colour range"), self.display.toggle_lock,
-            keys=("K",),
-        )  # fmt: skip
+        text, lock = tr("Lock the colour range"), self.display.toggle_lock
+        make_action(self, "inspect.lock", text, lock, keys=("K",))
 
     # Called by the page
 
@@ -218,6 +216,5 @@ class Views(QWidget):
         self._on_wanted()
 
     def _on_image_clicked(self, u: float, v: float) -> None:
-        source = self._context.source
-        if source.info is not None and source.info.kind == "virtual" and source.bench is not None:
-            source.bench.drag_to(u, v)
+        if (bench := self._context.source.virtual) is not None:
+            bench.drag_to(u, v)

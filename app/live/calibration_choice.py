@@ -42,9 +42,13 @@ class CalibrationChoice(QObject):
     """
 
     def __init__(
-        self, jobs: Jobs, owner: QWidget, on_loaded: Callable[[Any, Any], object], *,
+        self,
+        jobs: Jobs,
+        owner: QWidget,
+        on_loaded: Callable[[Any, Any], object],
+        *,
         context: AppContext,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(owner)
         self._loaded = on_loaded
         self._jobs, self._owner, self._context = jobs, owner, context

@@ -10,13 +10,12 @@ from typing import Any
 
 import cv2
 import numpy as np
-import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
 
+from app.live.dragging import LEFT, Draggable
 from app.live.overlay import (
     Circle,
-    Grip,
     Handle,
     Line,
     Marker,
@@ -43,11 +42,9 @@ ROLE_COLOURS: dict[str, str] = {
 HALO = QColor(0, 0, 0, 170)
 RING_COLOUR = "#2a7de1"
 PLATE = QColor(0, 0, 0, 150)
-# How near to a handle the pointer must be, in screen pixels.
-REACH_PX = 12.0
 
 
-class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
+class OverlayItem(Draggable):
     """Shows an overlay in image coordinates; its handles can be dragged.
 
     Signals
@@ -63,7 +60,7 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         self._overlay = Overlay()
         self._size = (1, 1)
         self._masks: list[tuple[QRectF, QImage]] = []
-        self._held: tuple[Handle, Grip] | None = None
+        self._held: tuple[Handle, bool] | None = None
         self._dragged: Handle | None = None
         self.selected = ""
 
@@ -98,50 +95,36 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         # Marks have a constant width on the screen, which does not scale with the image.
         return QRectF(-0.5 * width, -0.5 * height, 2.0 * width, 2.0 * height)
 
-    def hoverEvent(self, event: Any) -> None:  # noqa: D102
-        over = None if event.isExit() else self._grip_at(event.pos())
-        if over is None:
-            self.unsetCursor()
-            return
-        event.acceptDrags(Qt.MouseButton.LeftButton)
-        event.acceptClicks(Qt.MouseButton.LeftButton)
-        resizes = over[1] is Grip.RADIUS
-        self.setCursor(Qt.CursorShape.SizeHorCursor if resizes else Qt.CursorShape.SizeAllCursor)
-
     def mouseClickEvent(self, event: Any) -> None:  # noqa: D102
-        over = self._grip_at(event.pos())
-        if over is None or event.button() != Qt.MouseButton.LeftButton or event.double():
+        if event.button() != LEFT or event.double() or not self.grab(event.pos()):
             event.ignore()
             return
         event.accept()
-        self._take(over)
-        self._held = None
 
-    def mouseDragEvent(self, event: Any) -> None:  # noqa: D102
-        if event.isStart():
-            over = self._grip_at(event.buttonDownPos())
-            if over is None or event.button() != Qt.MouseButton.LeftButton:
-                event.ignore()
-                return
-            self._take(over)
-        if self._held is None:
-            event.ignore()
-            return
-        event.accept()
-        down, now = event.buttonDownPos(), event.pos()
-        self._dragged = drag(*self._held, (down.x(), down.y()), (now.x(), now.y()), self._size)
-        self.place(self._dragged)
-        if event.isFinish():
-            moved, self._held, self._dragged = self._dragged, None, None
+    def cursor_at(self, at: QPointF) -> Qt.CursorShape | None:
+        """Return the pointer over a handle."""
+        if (over := self._grip_at(at)) is None:
+            return None
+        return Qt.CursorShape.SizeHorCursor if over[1] else Qt.CursorShape.SizeAllCursor
+
+    def grab(self, at: QPointF) -> bool:
+        """Select a handle, and begin to drag it."""
+        self._held = self._grip_at(at)
+        if self._held is not None:
+            self.select(self._held[0].handle)
+        return self._held is not None
+
+    def drag_to(self, down: QPointF, now: QPointF, *, ended: bool) -> None:
+        """Move or resize the handle; report it at the end."""
+        assert self._held is not None
+        moved = drag(*self._held, (down.x(), down.y()), (now.x(), now.y()), self._size)
+        self._dragged = None if ended else moved
+        self.place(moved)
+        if ended:
             self.handle_moved.emit(moved)
 
-    def _take(self, over: tuple[Handle, Grip]) -> None:
-        self._held = over
-        self.select(over[0].name)
-
-    def _grip_at(self, position: QPointF) -> tuple[Handle, Grip] | None:
-        width_px = self.pixelLength(pg.Point(1.0, 0.0)) or 1.0
-        return find_grip(self.handles, position.x(), position.y(), reach_px=REACH_PX * width_px)
+    def _grip_at(self, at: QPointF) -> tuple[Handle, bool] | None:
+        return find_grip(self.handles, at.x(), at.y(), reach_px=self._reach(1.0))
 
     def paint(self, painter: QPainter, *_: Any) -> None:  # noqa: D102
         self._paint_masks(painter)

@@ -313,43 +313,39 @@ class _Images:
 
     def height(self) -> NDArray[np.uint8]:
         """Return the height map."""
-        if self._display.relief:
-            rgb = self._shaded().copy()
-        else:
-            rgb = self._with_contours(self._coloured()).copy()
-        return shading.outside_filled(rgb, self._outside, SURROUND)
+        relief = self._display.relief
+        rgb = self._shaded() if relief else self._with_contours(self._coloured())
+        return self._within(rgb.copy())
 
     def normals(self) -> NDArray[np.uint8]:
         """Return the normals or the slope as colours."""
         assert self._raw.normals is not None
         normals = shading.fitted(self._raw.normals, self._px)
         if self._wanted.normals == "slope":
-            rgb = _in_colours(shading.steepness_deg(normals), slope_scale())
-        else:
-            rgb = shading.normal_colours(normals)
-        return shading.outside_filled(rgb, self._outside, SURROUND)
+            return self._within(_in_colours(shading.steepness_deg(normals), slope_scale()))
+        return self._within(shading.normal_colours(normals))
 
     def quality(self) -> tuple[NDArray[np.uint8] | None, float]:
         """Return the flags over the dimmed relief, or a quantity in colours, and its upper end."""
-        sd = self._raw.depth_sd_mm
+        sd, top = self._raw.depth_sd_mm, self._misfit_top
         if self._misfit is not None:
-            top = self._misfit_top
             rows, columns = self._depth.shape
             shown = np.asarray(cv2.resize(np.nan_to_num(self._misfit), (columns, rows)), np.float32)
-            rgb = shading.coloured(shown, colour_table("inferno"), 0.0, top)
-            return shading.outside_filled(rgb, self._outside, SURROUND), top
+            return self._within(shading.coloured(shown, colour_table("inferno"), 0.0, top)), top
         if self._wanted.quality == "uncertainty":
             if sd is None:
                 return None, 0.0
             shown = np.asarray(shading.fitted(sd, self._px), np.float32)
             inside = shown[self._outside == 0]
             top = float(np.percentile(inside, 99.0)) if inside.size else 1.0
-            rgb = shading.coloured(shown, colour_table("inferno"), 0.0, top)
-            return shading.outside_filled(rgb, self._outside, SURROUND), top
+            return self._within(shading.coloured(shown, colour_table("inferno"), 0.0, top)), top
         grey = cv2.cvtColor(self._shaded(), cv2.COLOR_RGB2GRAY)
         dim = cv2.convertScaleAbs(cv2.merge([grey] * 3), alpha=0.6, beta=25)
         rgb = shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
-        return shading.outside_filled(rgb, self._outside, SURROUND), 0.0
+        return self._within(rgb), 0.0
+
+    def _within(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        return shading.outside_filled(rgb, self._outside, SURROUND)
 
     def surface(self) -> Surface | None:
         """Return the mesh nodes, their colours and the colour scale."""
@@ -408,10 +404,10 @@ class _Images:
     def _light(self) -> NDArray[np.uint8]:
         """Return the relief under the lamp, without colours."""
         white = np.full((256, 3), 255, np.uint8)
+        light, stretch = self._display.light, self._display.exaggeration
         return shading.shaded(
-            self._depth, self._pitch_mm, white, self.range_mm, self._display.light,
-            exaggeration=self._display.exaggeration,
-        )  # fmt: skip
+            self._depth, self._pitch_mm, white, self.range_mm, light, exaggeration=stretch
+        )
 
 
 def _in_colours(values: NDArray[Any], scale: ColourScale) -> NDArray[np.uint8]:

@@ -29,6 +29,7 @@ from app.live.overlay import Handle, Overlay, move, next_name, resize
 from app.sources.stream import Stream
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
+from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_ground
@@ -140,9 +141,9 @@ class LiveView(QWidget):
         row = hbox(of=self._bar, margins=(4, 2, 8, 2), spacing=2)
         for name, (text, key, stays, sign) in TOOLS.items():
             self.tools[name] = make_action(
-                self, f"live.{name}", text, slots[name], keys=(key,), icon_name=sign,
-                checkable=stays, inside=True,
-            )  # fmt: skip
+                self, f"live.{name}", text, slots[name], keys=(key,), icon_name=sign, inside=True
+            )
+            self.tools[name].setCheckable(stays)
             button = icon_button(self.tools[name])
             button.setAutoRaise(True)
             button.setIconSize(QSize(20, 20))
@@ -199,9 +200,7 @@ class LiveView(QWidget):
         """
         if self._rgb is None:
             raise InputError(
-                tr("there is no image to save"),
-                where=tr("Live view"),
-                advice=tr("Select a source first"),
+                tr("there is no image to save"), tr("Live view"), tr("Select a source first")
             )
         _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
         write_atomically(path, lambda file: file.write(png.tobytes()))
@@ -290,16 +289,16 @@ class LiveView(QWidget):
 
     def _on_handle_moved(self, handle: Handle) -> None:
         self._nudge_end.stop()
-        self.moved.emit(handle.name, handle.u, handle.v, handle.radius_px)
+        self.moved.emit(handle.handle, handle.u, handle.v, handle.radius_px)
 
     def _selected(self) -> Handle | None:
         item = self.image.overlay
-        return next((h for h in item.handles if h.name == item.selected), None)
+        return next((h for h in item.handles if h.handle == item.selected), None)
 
     def _end_nudge(self) -> None:
         handle = self._selected()
         if handle is not None:
-            self.moved.emit(handle.name, handle.u, handle.v, handle.radius_px)
+            self.moved.emit(handle.handle, handle.u, handle.v, handle.radius_px)
 
     def _nudge(self, event: QKeyEvent) -> bool:
         """Move or resize the selected handle if the key is for it; return whether it was."""
@@ -310,14 +309,12 @@ class LiveView(QWidget):
         step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ShiftModifier else NUDGE_PX
         # A plus needs Shift on many keyboards, so Ctrl makes the large step here.
         radius_step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ControlModifier else NUDGE_PX
-        match event.key():
-            case Qt.Key.Key_Left | Qt.Key.Key_Right | Qt.Key.Key_Up | Qt.Key.Key_Down:
-                du, dv = ARROWS[Qt.Key(event.key())]
+        match Qt.Key(event.key()):
+            case key if key in ARROWS:
+                du, dv = ARROWS[key]
                 handle = move(handle, step * du, step * dv, self._drawing_size())
-            case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
-                handle = resize(handle, radius_step)
-            case Qt.Key.Key_Minus:
-                handle = resize(handle, -radius_step)
+            case key if key in ZOOMS:
+                handle = resize(handle, ZOOMS[key] * radius_step)
             case _:
                 return False
         self.image.overlay.place(handle)
@@ -330,16 +327,14 @@ class LiveView(QWidget):
         item = self.image.overlay
         if self._nudge(event):
             return
-        match event.key():
-            case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp if item.handles:
-                step = 1 if event.key() == Qt.Key.Key_PageDown else -1
+        match Qt.Key(event.key()):
+            case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp as key if item.handles:
+                step = 1 if key == Qt.Key.Key_PageDown else -1
                 item.select(next_name(item.handles, item.selected, step))
             case Qt.Key.Key_Escape if item.selected:
                 item.select("")
-            case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
-                self.image.zoom_by(ZOOM_STEP)
-            case Qt.Key.Key_Minus:
-                self.image.zoom_by(1.0 / ZOOM_STEP)
+            case key if key in ZOOMS:
+                self.image.zoom_by(ZOOM_STEP ** ZOOMS[key])
             case _:
                 super().keyPressEvent(event)
 
@@ -364,14 +359,6 @@ class LiveView(QWidget):
             room.width() - self._histogram.width() - CORNER_PX,
             room.height() - checks - self._histogram.height() - CORNER_PX,
         )
-
-
-ARROWS = {
-    Qt.Key.Key_Left: (-1.0, 0.0),
-    Qt.Key.Key_Right: (1.0, 0.0),
-    Qt.Key.Key_Up: (0.0, -1.0),
-    Qt.Key.Key_Down: (0.0, 1.0),
-}
 
 
 def _default_folder() -> Path:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +43,7 @@ class Marker:
     role: Role
     text: str = ""
     handle: str = ""
+    radius_px: ClassVar[float] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,60 +121,45 @@ def hold_ring(overlay: Overlay, size: tuple[int, int], share: float) -> tuple[Ri
 LEAST_RADIUS_PX = 1.0
 
 
-class Grip(Enum):
-    """The grabbed part of a handle."""
-
-    CENTRE = "centre"
-    RADIUS = "radius"
-
-
-@dataclass(frozen=True, slots=True)
-class Handle:
-    """Something that can be moved; `radius_px` is 0 for a marker."""
-
-    name: str
-    u: float
-    v: float
-    radius_px: float = 0.0
+Handle = Circle | Marker
+"""What can be moved: an item with a name as its `handle`."""
 
 
 def handles_of(overlay: Overlay) -> tuple[Handle, ...]:
     """Return all handles, in the order of the keyboard."""
-    circles = (Handle(c.handle, c.u, c.v, c.radius_px) for c in overlay.circles if c.handle)
-    markers = (Handle(m.handle, m.u, m.v) for m in overlay.markers if m.handle)
-    return (*circles, *markers)
+    items: tuple[Handle, ...] = (*overlay.circles, *overlay.markers)
+    return tuple(item for item in items if item.handle)
 
 
 def find_grip(
     handles: Iterable[Handle], u: float, v: float, *, reach_px: float
-) -> tuple[Handle, Grip] | None:
-    """Return the handle nearest to a point and its part; None beyond `reach_px`."""
-    near: list[tuple[float, Handle, Grip]] = []
+) -> tuple[Handle, bool] | None:
+    """Return the handle nearest to a point, and whether it is held at its rim, which resizes it.
+
+    None if there is no handle within `reach_px`.
+    """
+    near: list[tuple[float, Handle, bool]] = []
     for handle in handles:
-        near.append((math.hypot(handle.u - u, handle.v - v), handle, Grip.CENTRE))
+        away = math.hypot(handle.u - u, handle.v - v)
+        near.append((away, handle, False))
         if handle.radius_px > 0.0:
             # The whole circle resizes, so that nobody has to aim at the small square.
-            off = abs(math.hypot(handle.u - u, handle.v - v) - handle.radius_px)
-            near.append((off, handle, Grip.RADIUS))
-    near = [item for item in near if item[0] <= reach_px]
-    if not near:
-        return None
-    _, handle, grip = min(near, key=lambda item: item[0])
-    return handle, grip
+            near.append((abs(away - handle.radius_px), handle, True))
+    off, found, resizes = min(near, key=lambda item: item[0], default=(math.inf, None, False))
+    return None if found is None or off > reach_px else (found, resizes)
 
 
 def drag(
     handle: Handle,
-    grip: Grip,
+    resizes: bool,
     start: tuple[float, float],
     now: tuple[float, float],
     size: tuple[int, int],
 ) -> Handle:
     """Return a handle after a drag from `start` to `now`; its centre stays in the image."""
-    if grip is Grip.RADIUS:
-        before = math.hypot(start[0] - handle.u, start[1] - handle.v)
-        after = math.hypot(now[0] - handle.u, now[1] - handle.v)
-        return resize(handle, after - before)
+    if resizes:
+        centre = handle.u, handle.v
+        return resize(handle, math.dist(now, centre) - math.dist(start, centre))
     return move(handle, now[0] - start[0], now[1] - start[1], size)
 
 
@@ -188,35 +173,24 @@ def move(handle: Handle, du: float, dv: float, size: tuple[int, int]) -> Handle:
 
 
 def resize(handle: Handle, by_px: float) -> Handle:
-    """Return a circle's handle with another radius; a marker has no radius and does not change."""
-    if handle.radius_px <= 0.0:
+    """Return a circle with another radius; a marker has no radius and does not change."""
+    if isinstance(handle, Marker):
         return handle
     return replace(handle, radius_px=max(handle.radius_px + by_px, LEAST_RADIUS_PX))
 
 
 def next_name(handles: Sequence[Handle], name: str, step: int) -> str:
     """Return the name of the handle `step` positions after `name`, cyclically."""
-    names = [handle.name for handle in handles]
-    if not names:
-        return ""
+    names = [handle.handle for handle in handles]
     if name not in names:
-        return names[0 if step > 0 else -1]
+        return names[0 if step > 0 else -1] if names else ""
     return names[(names.index(name) + step) % len(names)]
 
 
 def with_handle(overlay: Overlay, handle: Handle) -> Overlay:
     """Return an overlay with the item of that name moved to the handle."""
 
-    def marker(item: Marker) -> Marker:
-        return replace(item, u=handle.u, v=handle.v) if item.handle == handle.name else item
+    def moved(items: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(handle if item.handle == handle.handle else item for item in items)
 
-    def circle(item: Circle) -> Circle:
-        if item.handle != handle.name:
-            return item
-        return replace(item, u=handle.u, v=handle.v, radius_px=handle.radius_px)
-
-    return replace(
-        overlay,
-        markers=tuple(marker(item) for item in overlay.markers),
-        circles=tuple(circle(item) for item in overlay.circles),
-    )
+    return replace(overlay, markers=moved(overlay.markers), circles=moved(overlay.circles))

@@ -41,8 +41,8 @@ class ReplayBar(QWidget):
             ("on", tr("Next frame"), lambda: self._step(1), ".", "step-on"),
         ):
             action = make_action(
-                self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name,
-            )  # fmt: skip
+                self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name
+            )
             button = icon_button(action)
             button.setAutoRaise(True)
             row.addWidget(button)
@@ -117,7 +117,7 @@ class ReplayBar(QWidget):
 
     def _set_speed(self, index: int) -> None:
         if self._source is not None:
-            self._source.set("speed", float(self._speed.itemData(index)))
+            self._source.set_speed(float(self._speed.itemData(index)))
 
 
 def playback_text(now: Playback) -> str:

@@ -169,11 +169,9 @@ class LiveSession(QObject):
     @property
     def serial(self) -> str:
         """Serial of the sensor of the open source. Empty if unknown."""
-        choice, source = self._context.source, self.source
-        if choice.info is None or source is None:
-            return ""
-        if choice.info.kind == "virtual" and choice.bench is not None:
-            return choice.bench.design.serial
+        source, bench = self.source, self._context.source.virtual
+        if source is not None and bench is not None:
+            return bench.design.serial
         if isinstance(source, RecordingSource) and source.header is not None:
             return source.header.serial
         return ""

@@ -147,16 +147,13 @@ class Stage(QWidget):
             player=player,
         )
         for name, (text, keys) in DIRECTIONS.items():
-            make_action(
-                self, f"{page}.view_{name}", tr("3D: {name}").format(name=text),
-                partial(self.surface.view_from, name), keys=(keys,),
-            )  # fmt: skip
+            title, view = tr("3D: {name}").format(name=text), partial(self.surface.view_from, name)
+            make_action(self, f"{page}.view_{name}", title, view, keys=(keys,))
         self.map_panel, self.section, self._beside = map_panel, section, beside
         self.camera = ImageView()
         self.panels: dict[str, FramePanel] = {"height": map_panel, **more}
-        self._parts: dict[str, Any] = {
-            "surface": self.surface, "camera": self.camera, **self.panels,
-        }  # fmt: skip
+        own = {"surface": self.surface, "camera": self.camera}
+        self._parts: dict[str, Any] = {**own, **self.panels}
         self._lay_out()
         self._pointed_views: tuple[Any, ...] = (
             *(panel.map for panel in self.panels.values()),

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
-import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QPainter, QPolygonF, QTransform
 
+from app.live.dragging import LEFT, Draggable
 from app.live.drawing import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
 from app.live.grips import Grip, Point, nearest_grip
 
-REACH_PX = 12.0
 REACH_MM = 80.0
 BAND_ALPHA = 60
 MEASURED, CHOSEN = ROLE_COLOURS["info"], "#5fd0ff"
@@ -68,7 +67,7 @@ class LayerUser(Protocol):
         """Move a grip of the chosen tool."""
 
 
-class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
+class ToolLayer(Draggable):
     """The tools; in mm, x right and y down.
 
     Parameters
@@ -102,23 +101,26 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
     def boundingRect(self) -> QRectF:  # noqa: D102
         return QRectF(-REACH_MM, -REACH_MM, 2.0 * REACH_MM, 2.0 * REACH_MM)
 
-    def hoverEvent(self, event: Any) -> None:  # noqa: D102
-        if event.isExit():
-            self.unsetCursor()
-            return
-        over = self._grip_at(event.pos())
+    def cursor_at(self, at: QPointF) -> Qt.CursorShape | None:
+        """Return the pointer over a grip, or during placement."""
         if self.placing:
-            event.acceptClicks(Qt.MouseButton.LeftButton)
-            self.setCursor(Qt.CursorShape.CrossCursor)
-        elif over is not None:
-            event.acceptClicks(Qt.MouseButton.LeftButton)
-            event.acceptDrags(Qt.MouseButton.LeftButton)
-            self.setCursor(Qt.CursorShape.SizeAllCursor)
-        else:
-            self.unsetCursor()
+            return Qt.CursorShape.CrossCursor
+        return None if self._grip_at(at) is None else Qt.CursorShape.SizeAllCursor
+
+    def grab(self, at: QPointF) -> bool:
+        """Choose a grip, and begin to drag it."""
+        grip = None if self.placing else self._grip_at(at)
+        if grip is not None:
+            self._dragged = grip.name
+            self._user.on_grip(grip.name)
+        return grip is not None
+
+    def drag_to(self, down: QPointF, now: QPointF, *, ended: bool) -> None:
+        """Move the grip."""
+        self._user.on_drag(self._dragged, (now.x(), now.y()), ended=ended)
 
     def mouseClickEvent(self, event: Any) -> None:  # noqa: D102
-        if event.button() != Qt.MouseButton.LeftButton or event.double():
+        if event.button() != LEFT or event.double():
             event.ignore()
             return
         at = (float(event.pos().x()), float(event.pos().y()))
@@ -133,32 +135,12 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
         else:
             event.ignore()
 
-    def mouseDragEvent(self, event: Any) -> None:  # noqa: D102
-        if event.isStart():
-            grip = None if self.placing else self._grip_at(event.buttonDownPos())
-            if grip is None or event.button() != Qt.MouseButton.LeftButton:
-                event.ignore()
-                return
-            self._dragged = grip.name
-            self._user.on_grip(grip.name)
-        if not self._dragged:
-            event.ignore()
-            return
-        event.accept()
-        name, at = self._dragged, (float(event.pos().x()), float(event.pos().y()))
-        if event.isFinish():
-            self._dragged = ""
-        self._user.on_drag(name, at, ended=event.isFinish())
-
-    def _reach_mm(self) -> float:
-        return REACH_PX * float(self.pixelLength(pg.Point(1.0, 0.0)) or 0.01)
-
     def _grip_at(self, at: QPointF) -> Grip | None:
-        return nearest_grip(self._grips, (at.x(), at.y()), reach_mm=self._reach_mm())
+        return nearest_grip(self._grips, (at.x(), at.y()), reach_mm=self._reach(0.01))
 
     def _tool_at(self, at: Point) -> int:
         """Return the key of the tool whose line passes a point, or 0."""
-        reach = self._reach_mm()
+        reach = self._reach(0.01)
         found = [
             (_distance(at, line), tool.key) for tool in self.tools for line in tool.lines if line
         ]

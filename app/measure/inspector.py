@@ -70,10 +70,8 @@ class Inspector(QWidget):
         form.addRow(tr("Operator"), self.operator)
         form.addRow(tr("Note"), self.note)
         self.bench = Fold("measure.bench", tr("Virtual bench"), bench)
-        self.auto = named(
-            QCheckBox(tr("Freeze when steady")), "measure.auto",
-            tr("Freeze the image and detect the object when a press is steady"),
-        )  # fmt: skip
+        words = tr("Freeze the image and detect the object when a press is steady")
+        self.auto = named(QCheckBox(tr("Freeze when steady")), "measure.auto", words)
         self.auto.setChecked(True)
         self.busy = named(QProgressBar(), "measure.busy", tr("Measuring"))
         self.busy.setRange(0, 0)

@@ -202,8 +202,8 @@ def _require_sensor(image: MeasuredImage, calibration: Calibration) -> None:
                 "The image comes from sensor {other}, but the calibration in use belongs to "
                 "sensor {one}"
             ).format(other=image.serial, one=serial),
-            where=image.name,
-            advice=Remedy.SAME_SENSOR,
+            image.name,
+            Remedy.SAME_SENSOR,
         )
 
 

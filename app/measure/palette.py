@@ -9,7 +9,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
-from app.measure.placing import Kind, kinds
+from app.measure.placing import KINDS, Kind
 from app.widgets.actions import icon_button, make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
@@ -35,17 +35,22 @@ class Palette(QWidget):
         self.group.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
         self.buttons: dict[str, QToolButton] = {}
         column = vbox(of=self, margins=0, spacing=2)
-        for number, (_, group) in enumerate(groupby(kinds(), key=lambda kind: kind.group)):
+        for number, (_, group) in enumerate(groupby(KINDS, key=lambda kind: kind.group)):
             column.addSpacing(6 if number else 0)
             for kind in group:
                 column.addWidget(self._make_button(kind))
 
     def _make_button(self, kind: Kind) -> QToolButton:
         action = make_action(
-            self._owner, f"measure.tool.{kind.name}", kind.label,
+            self._owner,
+            f"measure.tool.{kind.name}",
+            kind.label,
             lambda: self._on_chosen(kind.name if action.isChecked() else ""),
-            keys=(kind.key,), icon_name=f"tool-{kind.name}", checkable=True, inside=True,
-        )  # fmt: skip
+            keys=(kind.key,),
+            icon_name=f"tool-{kind.name}",
+            checkable=True,
+            inside=True,
+        )
         self.group.addAction(action)
         button = self.buttons[kind.name] = icon_button(action)
         button.setAutoRaise(True)

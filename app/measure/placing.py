@@ -45,51 +45,59 @@ class Kind:
     group: str
 
 
-def kinds() -> tuple[Kind, ...]:
-    """Return the palette: the tools in its order."""
-    on_it = tr("Click on the object")
-    groups = {
-        "lines": (
-            ("distance", "D", tr("Distance"),
-             tr("Click the first point"), tr("Click the second point")),
-            ("step-height", "S", tr("Step height"),
-             tr("Click the lower area"), tr("Click the area to compare with it")),
-            ("profile-width", "W", tr("Profile width"),
-             tr("Click the start of the section"), tr("Click the end of the section")),
-            ("angle", "A", tr("Angle"), tr("Click the end of one arm"), tr("Click the apex"),
-             tr("Click the end of the other arm")),
-        ),
-        "outlines": (
-            ("circle", "C", tr("Circle"), tr("Click a point on the edge"),
-             tr("Click a second point on the edge"), tr("Click a third point on the edge")),
-            ("rectangle", "R", tr("Rectangle"),
-             tr("Click one corner"), tr("Click the opposite corner")),
-        ),
-        "features": (
-            ("pit", "I", tr("Pit or bump"), tr("Click one corner, beside the pit or bump"),
-             tr("Click the opposite corner, on the other side")),
-            ("scratch", "X", tr("Scratch"),
-             tr("Click the surface on one side of the scratch"),
-             tr("Click the surface on the other side")),
-            ("edge-radius", "E", tr("Edge radius"), tr("Click where the rounding begins"),
-             tr("Click across the edge, where the rounding ends")),
-        ),
-        "objects": (
-            ("ball", "B", tr("Ball"), on_it),
-            ("cylinder", "Y", tr("Cylinder"), on_it),
-            ("cuboid", "U", tr("Cuboid"), on_it),
-        ),
-    }  # fmt: skip
-    return tuple(
-        Kind(name, label, key, tuple(asks), group)
-        for group, rows in groups.items()
-        for name, key, label, *asks in rows
+ASKS = {
+    "distance": (tr("Click the first point"), tr("Click the second point")),
+    "step-height": (tr("Click the lower area"), tr("Click the area to compare with it")),
+    "profile-width": (tr("Click the start of the section"), tr("Click the end of the section")),
+    "angle": (
+        tr("Click the end of one arm"),
+        tr("Click the apex"),
+        tr("Click the end of the other arm"),
+    ),
+    "circle": (
+        tr("Click a point on the edge"),
+        tr("Click a second point on the edge"),
+        tr("Click a third point on the edge"),
+    ),
+    "rectangle": (tr("Click one corner"), tr("Click the opposite corner")),
+    "pit": (
+        tr("Click one corner, beside the pit or bump"),
+        tr("Click the opposite corner, on the other side"),
+    ),
+    "scratch": (
+        tr("Click the surface on one side of the scratch"),
+        tr("Click the surface on the other side"),
+    ),
+    "edge-radius": (
+        tr("Click where the rounding begins"),
+        tr("Click across the edge, where the rounding ends"),
+    ),
+}
+"""Prompts of the tools that need more than one click on the object."""
+KINDS = tuple(
+    Kind(name, label, key, ASKS.get(name, (tr("Click on the object"),)), group)
+    for group, name, key, label in (
+        ("lines", "distance", "D", tr("Distance")),
+        ("lines", "step-height", "S", tr("Step height")),
+        ("lines", "profile-width", "W", tr("Profile width")),
+        ("lines", "angle", "A", tr("Angle")),
+        ("outlines", "circle", "C", tr("Circle")),
+        ("outlines", "rectangle", "R", tr("Rectangle")),
+        ("features", "pit", "I", tr("Pit or bump")),
+        ("features", "scratch", "X", tr("Scratch")),
+        ("features", "edge-radius", "E", tr("Edge radius")),
+        ("objects", "ball", "B", tr("Ball")),
+        ("objects", "cylinder", "Y", tr("Cylinder")),
+        ("objects", "cuboid", "U", tr("Cuboid")),
     )
+)
+"""The tools in the order of the palette."""
+BY_NAME = {kind.name: kind for kind in KINDS}
 
 
 def kind_label(name: str) -> str:
     """Return the name of a kind of tool for the user."""
-    return next((kind.label for kind in kinds() if kind.name == name), name)
+    return BY_NAME[name].label if name in BY_NAME else name
 
 
 def make_tool(name: str, points: Sequence[Point]) -> Tool:
@@ -118,7 +126,7 @@ def first_points(name: str, middle_mm: Point) -> tuple[Point, ...]:
     r = FIRST_REACH_MM
     if _types(name) == ["Rectangle"]:
         return (x - r, y - r), (x + r, y + r)
-    (clicks,) = (len(kind.asks) for kind in kinds() if kind.name == name)
+    clicks = len(BY_NAME[name].asks)
     if clicks == 1:
         return (middle_mm,)
     turns = np.linspace(-math.pi, 0.0, clicks)

@@ -35,7 +35,7 @@ from app.measure.work import Work
 from app.services.file_dialogs import ask_open
 from app.services.jobs import Jobs
 from app.theme.icons import icon
-from app.widgets.actions import action_button, icon_button, make_action
+from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
@@ -129,38 +129,25 @@ class PressView(QWidget):
         self._render()
 
     def _make_actions(self) -> None:
-        stack = self.work.undo
-        self.detect_action = make_action(
-            self, "measure.propose", tr("Detect"), self.propose, keys=("Q",),
-            icon_name="propose", tip=tr("Detect the pressed object"),
-        )  # fmt: skip
-        self.freeze_action = make_action(
-            self, "measure.hold", tr("Freeze"), self.toggle_freeze, keys=("Space",),
-            tip=tr("Freeze the image to measure on it, or continue"),
-        )  # fmt: skip
-        self.save_action = make_action(
-            self, "measure.keep", tr("Save to records"), self.keep, keys=("Ctrl+Return",),
-        )  # fmt: skip
-        self.remove_action = make_action(
-            self, "measure.remove", tr("Remove"), lambda: self.work.remove(self.work.chosen),
-            icon_name="remove", tip=tr("Remove the chosen tool (Del)"),
-        )  # fmt: skip
-        make_action(self, "measure.fit", tr("Whole map"), self.map.map.fit, keys=("F",))
-        open_action = make_action(
-            self, "measure.open", tr("Open image…"), self.choose_file, keys=("Ctrl+P",),
-            icon_name="folder", tip=tr("Measure on an image from a file"),
-        )  # fmt: skip
-        undo = make_action(
-            self, "measure.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",), icon_name="undo",
-        )  # fmt: skip
-        redo = make_action(
-            self, "measure.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"),
-            icon_name="redo",
-        )  # fmt: skip
-        for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
-            action.setEnabled(False)
-            can.connect(action.setEnabled)
-        for action in (undo, redo, open_action):
+        add, tip = partial(make_action, self), tr("Detect the pressed object")
+        self.detect_action = add(
+            "measure.propose", tr("Detect"), self.propose, keys=("Q",), icon_name="propose", tip=tip
+        )
+        tip = tr("Freeze the image to measure on it, or continue")
+        self.freeze_action = add(
+            "measure.hold", tr("Freeze"), self.toggle_freeze, keys=("Space",), tip=tip
+        )
+        self.save_action = add(
+            "measure.keep", tr("Save to records"), self.keep, keys=("Ctrl+Return",)
+        )
+        tip, remove = tr("Remove the chosen tool (Del)"), self.work.remove
+        self.remove_action = add(
+            "measure.remove", tr("Remove"), remove, icon_name="remove", tip=tip
+        )
+        add("measure.fit", tr("Whole map"), self.map.map.fit, keys=("F",))
+        name, text, tip = "measure.open", tr("Open image…"), tr("Measure on an image from a file")
+        file = add(name, text, self.choose_file, keys=("Ctrl+P",), icon_name="folder", tip=tip)
+        for action in (*undo_actions(self, "measure", self.work.undo), file):
             self.stage.bar.addWidget(icon_button(action))
 
     def _lay_out(self) -> None:
@@ -233,9 +220,7 @@ class PressView(QWidget):
             return
         if path.suffix.lower() not in IMAGES:
             raise InputError(
-                tr("The file is neither an image nor a recording"),
-                where=path,
-                advice=Remedy.CHOOSE_IMAGES,
+                tr("The file is neither an image nor a recording"), path, Remedy.CHOOSE_IMAGES
             )
         self.context.settings.keep_folder("press", path.parent)
         self._take(MeasuredImage(path.name, path=path))

@@ -26,6 +26,22 @@ WIDTH = 340
 LIVE_LINES = 3
 Measured = tuple[int, Press, Outcome]
 """Number of a press in the order of the run, and what was measured."""
+BUTTONS = {
+    "bare": tr("Capture &bare membrane"),
+    "capture": tr("&Capture now"),
+    "take_back": tr("&Repeat last press"),
+    "leave": tr("Lea&ve"),
+    "evaluate": tr("Show the &result"),
+}
+WORDS = {
+    "bare": tr("Capture the bare membrane and start"),
+    "evaluate": tr("Evaluate the presses so far"),
+}
+TIPS = {
+    "capture": tr("A steady press is captured automatically. A press that moves is refused"),
+    "take_back": tr('The old image is moved to the folder "discarded"'),
+    "leave": tr("Every press is saved. You can continue here later"),
+}
 
 
 class RunPanel(QWidget):
@@ -33,19 +49,11 @@ class RunPanel(QWidget):
 
     Parameters
     ----------
-    on_bare, on_capture, on_take_back, on_leave, on_evaluate : callable
-        Called by the buttons.
+    slots : mapping of str to callable
+        Called by the buttons: one for each of BUTTONS.
     """
 
-    def __init__(
-        self,
-        *,
-        on_bare: Slot,
-        on_capture: Slot,
-        on_take_back: Slot,
-        on_leave: Slot,
-        on_evaluate: Slot,
-    ) -> None:
+    def __init__(self, slots: Mapping[str, Slot]) -> None:
         super().__init__()
         named(self, "protocol.panel", tr("Next press"))
         self.setFixedWidth(WIDTH)
@@ -58,23 +66,15 @@ class RunPanel(QWidget):
         for label, lines in ((self.where, 2), (self.live, LIVE_LINES)):
             label.setMinimumHeight(lines * line + 2)
             label.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.bare = push_button(
-            "protocol.bare",
-            tr("Capture &bare membrane"),
-            on_bare,
-            accessible=tr("Capture the bare membrane and start"),
-        )
-        self.capture = push_button(
-            "protocol.capture",
-            tr("&Capture now"),
-            on_capture,
-            tip=tr("A steady press is captured automatically. A press that moves is refused"),
-        )
-        self.take_back = push_button(
-            "protocol.take_back",
-            tr("&Repeat last press"),
-            on_take_back,
-            tip=tr('The old image is moved to the folder "discarded"'),
+        self.bare, self.capture, self.take_back, self.leave, self.evaluate = (
+            push_button(
+                f"protocol.{name}",
+                text,
+                slots[name],
+                accessible=WORDS.get(name, ""),
+                tip=TIPS.get(name, ""),
+            )
+            for name, text in BUTTONS.items()
         )
         self.bench = named(
             QCheckBox(tr("&Use virtual bench")),
@@ -94,18 +94,6 @@ class RunPanel(QWidget):
             lambda measured: measured[0],
         )
         self.last.sortByColumn(0, Qt.SortOrder.DescendingOrder)
-        self.leave = push_button(
-            "protocol.leave",
-            tr("Lea&ve"),
-            on_leave,
-            tip=tr("Every press is saved. You can continue here later"),
-        )
-        self.evaluate = push_button(
-            "protocol.evaluate",
-            tr("Show the &result"),
-            on_evaluate,
-            accessible=tr("Evaluate the presses so far"),
-        )
         vbox(
             *(self.title, self.where, self.live, self.bare),
             hbox(self.capture, self.take_back),

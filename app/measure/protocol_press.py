@@ -105,13 +105,8 @@ class PressingView(QWidget):
         self.live = LiveSession(context=context, name="protocol", parent=self)
         self._detection = LiveDetection(self.live)
         self.image = LiveView()
-        self.panel = RunPanel(
-            on_bare=self.take_bare,
-            on_capture=self.capture,
-            on_take_back=self._take_back,
-            on_leave=on_leave,
-            on_evaluate=on_result,
-        )
+        own = {"bare": self.take_bare, "capture": self.capture, "take_back": self._take_back}
+        self.panel = RunPanel({**own, "leave": on_leave, "evaluate": on_result})
         hbox((self.image, 1), self.panel, of=self, margins=0, spacing=0)
         self._tick = QTimer(self, interval=HAND_MS)
         self._tick.timeout.connect(self._move_hand)
@@ -149,12 +144,12 @@ class PressingView(QWidget):
     def _keep_bare(self, frames: list[NDArray[Any]]) -> None:
         camera, seen = self._work.calibration.camera, frames[-1].shape
         if seen[:2] != (camera.height, camera.width):
-            self.panel.show_live(
-                tr(
-                    "The camera image is {u}x{v} pixels, but the calibration is for "
-                    "{w}x{h}. Choose the camera of this sensor in the bar above."
-                ).format(u=seen[1], v=seen[0], w=camera.width, h=camera.height)
+            text = tr(
+                "The camera image is {u}x{v} pixels, but the calibration is for {w}x{h}. Choose "
+                "the camera of this sensor in the bar above."
             )
+            sizes = {"u": seen[1], "v": seen[0], "w": camera.width, "h": camera.height}
+            self.panel.show_live(text.format(**sizes))
             self.panel.bench.setChecked(False)
             return
         problem = why_not_bare(frames[-1], self._work.calibration)
@@ -249,19 +244,15 @@ class PressingView(QWidget):
         # It remains visible: with a wrong first image, every press would be refused.
         self.panel.bare.setVisible(press is not None)
         self.panel.bare.setEnabled(there)
-        self.panel.bare.setText(
-            tr("Capture &bare membrane")
-            if self._bare is None
-            else tr("Capture &bare membrane again")
-        )
+        first, again = tr("Capture &bare membrane"), tr("Capture &bare membrane again")
+        self.panel.bare.setText(first if self._bare is None else again)
         if press is None:
             self.panel.show_live("")
         elif not there:
             self.panel.show_live(tr("No camera is selected. Choose one in the bar above."))
         elif self._bare is None:
-            self.panel.show_live(
-                tr('Lift everything off the sensor, then click "Capture bare membrane".')
-            )
+            text = tr('Lift everything off the sensor, then click "Capture bare membrane".')
+            self.panel.show_live(text)
 
     def _show_progress(self) -> None:
         self.panel.show_progress(self._work.run.progress, self._work.outcomes)
@@ -274,9 +265,7 @@ class PressingView(QWidget):
         self._bare = None
 
     def _follow_source(self) -> None:
-        source = self._context.source
-        virtual = source.info is not None and source.info.kind == "virtual"
-        bench = source.bench if virtual else None
+        bench = self._context.source.virtual
         self._hand = None if bench is None else BenchHand(bench)
         self.panel.bench.setVisible(bench is not None)
         if bench is None:

@@ -13,7 +13,7 @@ from app.context.context import AppContext
 from app.measure.protocol_work import REPORT, ProtocolWork
 from app.services.file_dialogs import ask_folder
 from app.widgets.buttons import Slot, push_button
-from app.widgets.cells_table import Cell, CellsTable
+from app.widgets.cells_table import CellsTable, text_table
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, keep_space, splitter, vbox
 from app.widgets.meaning import make_bold, show_meaning
@@ -199,17 +199,7 @@ class ResultView(QWidget):
 
 
 def listing_table(name: str, listing: Listing) -> CellsTable[tuple[str, ...]]:
-    """Return a table of the report as a widget."""
-
-    def cells(row: tuple[str, ...]) -> tuple[Cell, ...]:
-        return tuple(Cell(text, tip=text, right=_is_number(text)) for text in row)
-
-    table = CellsTable[tuple[str, ...]](name, listing.title, listing.heads, cells, lambda row: row)
-    table.setSortingEnabled(False)
-    table.sorted.sort(-1)  # in the order of the report
+    """Return a listing of the report as a table, in the order of the report."""
+    table = text_table(name, listing.title, listing.heads)
     table.show_items(listing.rows)
     return table
-
-
-def _is_number(cell: str) -> bool:
-    return cell[:1].isdigit() or cell[:1] in ("+", "-", "\N{EM DASH}")

@@ -141,8 +141,8 @@ class ProtocolView(QWidget):
         if entry is None:
             raise InputError(
                 tr("The calibration {id} of this run is not in the library").format(id=identity),
-                where=self.context.workspace.sensors_folder,
-                advice=Remedy.IMPORT_CALIBRATION,
+                self.context.workspace.sensors_folder,
+                Remedy.IMPORT_CALIBRATION,
             )
         return entry.path
 

@@ -70,8 +70,8 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
             tr("The run was started with calibration {old}, but this is {new}").format(
                 old=run.content.calibration, new=made.identity
             ),
-            where=run.folder,
-            advice=Remedy.START_NEW,
+            run.folder,
+            Remedy.START_NEW,
         )
     lock = RunLock(run.folder)
     try:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QUndoCommand, QUndoStack
+from PySide6.QtGui import QUndoStack
 
 from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
+from app.widgets.undo import Step
 from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once
@@ -105,29 +107,27 @@ class RecordBook(QObject):
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""
-
-        def each(change: Callable[[Records, int], None]) -> Change:
-            def run(records: Records) -> None:
-                for number in numbers:
-                    change(records, number)
-
-            return run
-
         if numbers:
             text = tr("remove {n} measurements").format(n=len(numbers))
-            self.undo.push(_Step(self, text, each(Records.remove), each(Records.restore)))
+            self._push(
+                text,
+                partial(_each, Records.remove, numbers),
+                partial(_each, Records.restore, numbers),
+            )
 
     def write_note(self, number: int, note: str) -> None:
         """Change the note of a measurement. This can be undone."""
         before = next((r.note for r in self.records if r.id == number), "")
         if note != before:
-            step = _Step(
-                self,
+            self._push(
                 tr("edit a note"),
                 lambda records: records.update_note(number, note),
                 lambda records: records.update_note(number, before),
             )
-            self.undo.push(step)
+
+    def _push(self, text: str, redo: Change, undo: Change) -> None:
+        change = partial(self.change, tr("Changing the records"))
+        self.undo.push(Step(text, partial(change, redo), partial(change, undo)))
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
         """Write a table of all measurements, or of those of one sensor."""
@@ -151,8 +151,8 @@ class RecordBook(QObject):
                     return None, (), ""  # another job reads those of the other workspace
                 raise InputError(
                     tr("{title}: another workspace was chosen meanwhile").format(title=title),
-                    where=folder,
-                    advice=tr("Choose the previous workspace and try again"),
+                    folder,
+                    tr("Choose the previous workspace and try again"),
                 )
             result = change(records)
             return result, records.measurements(), records.notice
@@ -179,17 +179,8 @@ def _nothing(_records: Records) -> None:
     """Change nothing. The records are read."""
 
 
-class _Step(QUndoCommand):
-    """A change of the records that can be undone."""
-
-    def __init__(self, book: RecordBook, text: str, change: Change, undo: Change) -> None:
-        super().__init__(text)
-        self._book, self._change, self._undo = book, change, undo
-
-    def redo(self) -> None:
-        """Change the records."""
-        self._book.change(tr("Changing the records"), self._change)
-
-    def undo(self) -> None:
-        """Undo the change."""
-        self._book.change(tr("Changing the records"), self._undo)
+def _each(
+    change: Callable[[Records, int], None], numbers: tuple[int, ...], records: Records
+) -> None:
+    for number in numbers:
+        change(records, number)

@@ -15,7 +15,7 @@ from app.measure.figures_text import unit_behind, unit_of
 from app.measure.record_book import RecordBook
 from app.measure.record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
 from app.services.file_dialogs import ask_save
-from app.widgets.actions import action_button, make_action
+from app.widgets.actions import action_button, make_action, undo_actions
 from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
@@ -61,10 +61,8 @@ class ResultsView(QWidget):
             icon_name="remove",
             tip=tr("Delete measurements"),
         )
-        undo = book.undo
-        make_action(self, "records.undo", tr("Undo in the records"), undo.undo, keys=("Ctrl+Z",))
-        redo_keys = "Ctrl+Shift+Z", "Ctrl+Y"
-        make_action(self, "records.redo", tr("Redo in the records"), undo.redo, keys=redo_keys)
+        titles = tr("Undo in the records"), tr("Redo in the records")
+        undo_actions(self, "records", book.undo, titles)
         self.count = named(PlainLabel(), "measure.results.count", tr("Number of records shown"))
         self.message = named(PlainLabel(wrap=True), "measure.results.message", tr("Last answer"))
         show_meaning(self.message, "muted")

@@ -9,13 +9,13 @@ from PySide6.QtGui import QKeyEvent
 
 from app.live.grips import Point, grips_of, outline_of
 from app.live.height_panel import HeightPanel
-from app.live.live_view import ARROWS
 from app.live.tool_layer import CHOSEN, MEASURED, DrawnTool
 from app.measure.figures_text import figure_text
 from app.measure.measuring import Answer
-from app.measure.placing import first_points, kinds, make_tool
+from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
 from app.view2d.map_point import Reading
+from app.widgets.keys import ARROWS
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
@@ -79,7 +79,7 @@ class ToolMap(HeightPanel):
             self._on_placed("")
 
     def _asks(self) -> tuple[str, ...]:
-        return next((kind.asks for kind in kinds() if kind.name == self._kind), ())
+        return BY_NAME[self._kind].asks if self._kind else ()
 
     def _report(self) -> None:
         asks = self._asks()
@@ -120,10 +120,12 @@ class ToolMap(HeightPanel):
 
     def show_reading(self, reading: Reading | None) -> None:
         """Show the values under the pointer. None: there is nothing under it."""
-        words = "" if reading is None else tr("x {x:.2f} mm  y {y:.2f} mm  depth {d}").format(
-            x=reading.x_mm, y=reading.y_mm, d=in_unit(reading.depth_mm)
-        )  # fmt: skip
-        self.readout.setText(words)
+        text = tr("x {x:.2f} mm  y {y:.2f} mm  depth {d}")
+        self.readout.setText(
+            ""
+            if reading is None
+            else text.format(x=reading.x_mm, y=reading.y_mm, d=in_unit(reading.depth_mm))
+        )
 
     # Keys
 
@@ -143,7 +145,7 @@ class ToolMap(HeightPanel):
                 middle = self.map.box.viewRect().center()
                 self._add_tool(first_points(self._kind, (middle.x(), middle.y())))
             case Qt.Key.Key_Delete | Qt.Key.Key_Backspace if self._work.chosen:
-                self._work.remove(self._work.chosen)
+                self._work.remove()
             case Qt.Key.Key_Escape if self._kind:
                 self._on_placed("")
             case Qt.Key.Key_Escape if self._work.chosen:

@@ -147,11 +147,10 @@ class Work(QObject):
         """Replace a tool. Successive key moves of one grip are one undo step."""
         self._edit(tr("move {tool}"), tool, {**self._sheet, key: tool}, key, nudge=nudge)
 
-    def remove(self, key: int) -> None:
-        """Remove a tool from the image."""
+    def remove(self) -> None:
+        """Remove the chosen tool from the image."""
         rest = dict(self._sheet)
-        tool = rest.pop(key, None)
-        if tool is not None:
+        if (tool := rest.pop(self.chosen, None)) is not None:
             self._edit(tr("remove {tool}"), tool, rest, 0)
 
     def _edit(self, text: str, tool: Tool, after: Sheet, key: int, *, nudge: bool = False) -> None:

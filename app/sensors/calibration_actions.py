@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtGui import QUndoCommand, QUndoStack
+from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QWidget
 
 from app.context.calibration_status import put_into_use
@@ -14,12 +14,11 @@ from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
 from app.widgets.dialog import Kinds
 from app.widgets.question import ask
+from app.widgets.undo import Change, Step
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from app.workspace.trash import Removal
 from gelpolight_core.translation import tr
-
-Change = Callable[[], object]
 
 
 class CalibrationActions:
@@ -148,43 +147,20 @@ class CalibrationActions:
             )
 
     def _push(self, text: str, redo: Change, undo: Change) -> bool:
-        command = LibraryCommand(text, redo, undo, context=self._context)
-        self.undo.push(command)
-        return command.worked
+        step = Step(text, partial(self._try, redo), partial(self._try, undo))
+        self.undo.push(step)
+        return step.worked
+
+    def _try(self, change: Change) -> bool:
+        worked = False
+        with self._context.toasts.errors():
+            change()
+            worked = True
+        self._context.requests.calibrations_changed.emit()
+        return worked
 
     def _on_changed(self) -> None:
         """Forget what was done in another workspace."""
         if self._context.workspace.folder != self._folder:
             self._folder = self._context.workspace.folder
             self.undo.clear()
-
-
-class LibraryCommand(QUndoCommand):
-    """A change of the library that can be undone. One that fails leaves the history.
-
-    Attributes
-    ----------
-    worked : bool
-        Whether the last change was made.
-    """
-
-    def __init__(self, text: str, redo: Change, undo: Change, *, context: AppContext) -> None:
-        super().__init__(text)
-        self._redo, self._undo, self._context = redo, undo, context
-        self.worked = False
-
-    def redo(self) -> None:
-        """Make the change."""
-        self._run(self._redo)
-
-    def undo(self) -> None:
-        """Take it back."""
-        self._run(self._undo)
-
-    def _run(self, change: Change) -> None:
-        self.worked = False
-        with self._context.toasts.errors():
-            change()
-            self.worked = True
-        self.setObsolete(not self.worked)
-        self._context.requests.calibrations_changed.emit()

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
-from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from app.context.context import AppContext
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
 from app.sensors.tables import SessionsBox, cells_of, library_titles
 from app.sensors.trash_dialog import TrashDialog
-from app.services.file_dialogs import ask_save
+from app.services.file_dialogs import ask_save, ask_several
 from app.services.jobs import Job, Jobs
-from app.widgets.actions import action_button, make_action
+from app.widgets.actions import action_button, make_action, undo_actions
 from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
@@ -29,6 +30,18 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.lab.trend import Sample, read_samples, sample_of_validation
 from gelpolight_core.translation import tr
+
+KEYS = {"use": ("Ctrl+U",), "remove": ("Del",)}
+TIPS = {
+    "new": tr("Calibrate a sensor from its camera"),
+    "session": tr("Calibrate from existing images"),
+    "import": tr("Copy calibration files into the library"),
+    "demo": tr("Use all functions without a camera"),
+    "trash": tr("Show removed calibrations, and restore them"),
+    "use": tr("Use this calibration for measuring"),
+    "report": tr("Write a report of this calibration as PDF"),
+    "remove": tr("Move this calibration to the trash. It can be restored from there."),
+}
 
 
 class SensorsPage(QWidget):
@@ -42,7 +55,8 @@ class SensorsPage(QWidget):
         self._library = CalibrationActions(self, context=context)
         self._trash: TrashDialog | None = None
         named(self, "sensors", tr("Sensors"))
-        self._make_actions()
+        self.offered = self._make_actions()
+        *first, use, report, reveal, remove = self.offered.values()
         self._table = CellsTable(
             "sensors.table",
             tr("Calibrations"),
@@ -52,11 +66,10 @@ class SensorsPage(QWidget):
         )
         self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
         self._table.selectionModel().selectionChanged.connect(self._show_chosen)
-        self._table.doubleClicked.connect(lambda _: self.use.trigger())
+        self._table.doubleClicked.connect(lambda _: self.offered["use"].trigger())
         self._sessions = SessionsBox(context.requests.session.emit)
         self._reports = Jobs("report", self)
-        actions = self.use, self.report, self.reveal, self.remove
-        self._details = Details(actions, self._on_elastomer)
+        self._details = Details((use, report, reveal, remove), self._on_elastomer)
         self._reports.refused.connect(self._details.say)
         lists = splitter(Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2))
         parts = (lists, 3), (self._details, 2)
@@ -73,98 +86,37 @@ class SensorsPage(QWidget):
         self._stack.addWidget(empty)
         self._stack.addWidget(split)
         bar = hbox(spacing=8)
-        for action in (self.new, self.session, self.import_, self.demo, self.trash):
+        for action in first:
             bar.addWidget(action_button(action))
         bar.addStretch(1)
         vbox(bar, (self._stack, 1), of=self, margins=(16, 12, 16, 12), spacing=8)
         context.requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 
-    def _action(
-        self,
-        name: str,
-        text: str,
-        slot: Callable[[], object],
-        icon_name: str,
-        tip: str = "",
-        *keys: str,
-    ) -> QAction:
-        name = f"sensors.{name}"
-        return make_action(self, name, text, slot, keys=keys, icon_name=icon_name, tip=tip)
-
-    def _make_actions(self) -> None:
-        requests, library = self._context.requests, self._library
-        self.new = self._action(
-            "new",
-            tr("&New sensor"),
-            requests.new_sensor.emit,
-            "add",
-            tr("Calibrate a sensor from its camera"),
-        )
-        self.session = self._action(
-            "session",
-            tr("Open &session folder"),
-            requests.choose_session.emit,
-            "folder",
-            tr("Calibrate from existing images"),
-        )
-        self.import_ = self._action(
-            "import",
-            tr("&Import calibration"),
-            self.choose_calibrations,
-            "import",
-            tr("Copy calibration files into the library"),
-        )
-        self.demo = self._action(
-            "demo",
-            tr("&Try the virtual sensor"),
-            requests.begin_demo.emit,
-            "demo",
-            tr("Use all functions without a camera"),
-        )
-        self.use = self._action(
-            "use",
-            tr("&Use"),
-            lambda: self._with_chosen(library.use),
-            "use",
-            tr("Use this calibration for measuring"),
-            "Ctrl+U",
-        )
-        self.report = self._action(
-            "report",
-            tr("Re&port…"),
-            self.choose_report,
-            "report",
-            tr("Write a report of this calibration as PDF"),
-        )
-        self.reveal = self._action(
-            "reveal",
-            tr("Show in fol&der"),
-            lambda: self._with_chosen(lambda entry: _open_folder(entry.path.parent)),
-            "folder",
-        )
-        self.remove = self._action(
-            "remove",
-            tr("&Remove"),
-            lambda: self._with_chosen(library.remove),
-            "remove",
-            tr("Move this calibration to the trash. It can be restored from there."),
-            "Del",
-        )
-        self.trash = self._action(
-            "trash",
-            tr("&Trash…"),
-            self.show_trash,
-            "remove",
-            tr("Show removed calibrations, and restore them"),
-        )
-        stack = self._library.undo
-        make_action(self, "sensors.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",))
-        make_action(self, "sensors.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"))
+    def _make_actions(self) -> dict[str, QAction]:
+        begin, chosen = self._context.requests.begin.emit, self._with_chosen
+        made = {}
+        for name, sign, text, slot in (
+            ("new", "add", tr("&New sensor"), partial(begin, "sensor")),
+            ("session", "folder", tr("Open &session folder"), partial(begin, "session")),
+            ("import", "import", tr("&Import calibration"), self.choose_calibrations),
+            ("demo", "demo", tr("&Try the virtual sensor"), partial(begin, "demo")),
+            ("trash", "remove", tr("&Trash…"), self.show_trash),
+            ("use", "use", tr("&Use"), partial(chosen, self._library.use)),
+            ("report", "report", tr("Re&port…"), self.choose_report),
+            ("reveal", "folder", tr("Show in fol&der"), partial(chosen, _open_folder)),
+            ("remove", "remove", tr("&Remove"), partial(chosen, self._library.remove)),
+        ):
+            keys, tip = KEYS.get(name, ()), TIPS.get(name, "")
+            made[name] = make_action(
+                self, f"sensors.{name}", text, slot, keys=keys, icon_name=sign, tip=tip
+            )
+        undo_actions(self, "sensors", self._library.undo)
+        return made
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
-        return (self.report,)
+        return (self.offered["report"],)
 
     def enter(self) -> None:
         """Read the folder again: files may have been added by other programs."""
@@ -172,8 +124,10 @@ class SensorsPage(QWidget):
 
     def open_path(self, path: Path) -> None:
         """Import a calibration file and select it."""
-        imported = self._library.import_files([path])
-        if imported is not None:
+        self._import((path,))
+
+    def _import(self, files: tuple[Path, ...]) -> None:
+        if (imported := self._library.import_files(files)) is not None:
             self._table.choose(imported)
 
     def show_trash(self) -> None:
@@ -186,18 +140,9 @@ class SensorsPage(QWidget):
 
     def choose_calibrations(self) -> None:
         """Let the user choose files to import."""
-        settings = self._context.settings
-        names, _ = QFileDialog.getOpenFileNames(
-            self,
-            tr("Import calibrations"),
-            str(settings.folder("calibration")),
-            tr("Calibrations ({pattern})").format(pattern=f"*{ENDING}"),
-        )
-        if names:
-            settings.keep_folder("calibration", Path(names[0]).parent)
-            imported = self._library.import_files(Path(name) for name in names)
-            if imported is not None:
-                self._table.choose(imported)
+        settings, title = self._context.settings, tr("Import calibrations")
+        patterns = tr("Calibrations ({pattern})").format(pattern=f"*{ENDING}")
+        self._import(ask_several(self, settings, "calibration", title, patterns))
 
     def choose_report(self) -> None:
         """Ask for a file, and write the report of the selected calibration to it."""
@@ -261,7 +206,7 @@ class SensorsPage(QWidget):
         sessions = self._library.sessions()
         self._sessions.set_entries(sessions)
         self._stack.setCurrentIndex(1 if entries or sessions else 0)
-        self.trash.setEnabled(bool(self._library.removals()))
+        self.offered["trash"].setEnabled(bool(self._library.removals()))
         if self._trash is not None:
             self._trash.refresh()
         if self.chosen() is None and entries:
@@ -275,10 +220,11 @@ class SensorsPage(QWidget):
         identity = "" if entry is None or entry.summary is None else entry.summary.identity
         limits = self._context.settings.limits.percent
         self._details.trend.show_trend(self._samples(entry), identity, limits)
-        self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
-        self.report.setEnabled(entry is not None and not entry.broken and not self._writing)
-        self.reveal.setEnabled(entry is not None)
-        self.remove.setEnabled(entry is not None)
+        good = entry is not None and not entry.broken
+        self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
+        self.offered["report"].setEnabled(good and not self._writing)
+        for name in ("reveal", "remove"):
+            self.offered[name].setEnabled(entry is not None)
 
     def _uses(self, entry: Entry | None) -> str:
         """Return how often a calibration was used, or why that is not known."""
@@ -324,6 +270,6 @@ class SensorsPage(QWidget):
             function(entry)
 
 
-def _open_folder(folder: Path) -> None:
-    make_folder(folder)
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
+def _open_folder(entry: Entry) -> None:
+    make_folder(entry.path.parent)
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(entry.path.parent)))

@@ -31,6 +31,14 @@ def ask_open(
     return _kept(settings, kind, chosen)
 
 
+def ask_several(
+    parent: QWidget, settings: Settings, kind: str, title: str, patterns: str
+) -> tuple[Path, ...]:
+    """Let the user choose files, as `ask_open` does one. Empty: none."""
+    chosen, _ = QFileDialog.getOpenFileNames(parent, title, str(settings.folder(kind)), patterns)
+    return tuple(path for path in (_kept(settings, kind, name) for name in chosen) if path)
+
+
 def ask_save(
     parent: QWidget, settings: Settings, kind: str, title: str, name: str, patterns: str
 ) -> Path | None:

@@ -8,6 +8,16 @@ from app.widgets.fields import choice, folder, number
 from gelpolight_core.reconstruction.modes import MODES, Mode
 from gelpolight_core.translation import LANGUAGES, tr
 
+SPEEDS = {f"{m.model}/{m.effort}": m.label for m in MODES}
+ABOUT_SPEED = tr(
+    "Accuracy or speed of live images, as on the Inspect page. Frozen images always have the full "
+    "accuracy of the model"
+)
+UNITS = {"mm": tr("mm"), "um": tr("um")}
+ABOUT_UNIT = tr(
+    "Depths and measured lengths are shown in this unit. Positions, inputs, records and files keep "
+    "mm"
+)
 THEMES = {"system": tr("Same as the desktop"), "light": tr("Light"), "dark": tr("Dark")}
 
 
@@ -27,16 +37,8 @@ class Preferences:
         {"": tr("Same as the system"), **LANGUAGES},
         tr("Applies at the next start of the program"),
     )
-    reconstruction: str = choice(
-        "full/fast", tr("&Live depth"), {f"{m.model}/{m.effort}": m.label for m in MODES},
-        tr("Accuracy or speed of live images, as on the Inspect page. Frozen images always "
-           "have the full accuracy of the model"),
-    )  # fmt: skip
-    length_unit: str = choice(
-        "mm", tr("&Unit of lengths"), {"mm": tr("mm"), "um": tr("um")},
-        tr("Depths and measured lengths are shown in this unit. Positions, inputs, records and "
-           "files keep mm"),
-    )  # fmt: skip
+    reconstruction: str = choice("full/fast", tr("&Live depth"), SPEEDS, ABOUT_SPEED)
+    length_unit: str = choice("mm", tr("&Unit of lengths"), UNITS, ABOUT_UNIT)
     workspace: str = folder(
         "", tr("&Workspace folder"), tr("Folder for sensors, calibrations and sessions")
     )

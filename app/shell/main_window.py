@@ -21,7 +21,6 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QApplication,
     QDialog,
-    QFileDialog,
     QMainWindow,
     QSizePolicy,
     QStackedWidget,
@@ -33,6 +32,7 @@ from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import PageEntry, all_pages
 from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
+from app.services.file_dialogs import ask_folder, ask_several
 from app.shell.about import AboutDialog
 from app.shell.documentation import find_documentation
 from app.shell.loader import Loader, LoadingView
@@ -103,14 +103,9 @@ class MainWindow(QMainWindow):
         context.toasts.attach(self, self.show_log, over=self._stack)
         requests = context.requests
         requests.page.connect(self.show_page)
-        requests.path.connect(self.open_path_in)
         requests.session.connect(self.open_session)
-        requests.choose_session.connect(self.choose_session)
-        requests.open_files.connect(self.choose_files)
         requests.guide.connect(self.show_guide)
-        requests.new_sensor.connect(self.begin_new_sensor)
-        requests.demo.connect(context.source.choose_virtual_sensor)
-        requests.begin_demo.connect(self.begin_demo)
+        requests.begin.connect(self.begin)
         requests.calibrations_changed.connect(self._show_in_use)
         context.source.changed.connect(self._remember_source)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
@@ -230,6 +225,16 @@ class MainWindow(QMainWindow):
 
         self._with_page(name, open_path)
 
+    def begin(self, what: str) -> None:
+        """Begin with a new sensor, the virtual one, a session or files."""
+        acts = {
+            "sensor": self.begin_new_sensor,
+            "demo": self.begin_demo,
+            "session": self.choose_session,
+            "files": self.choose_files,
+        }
+        acts[what]()
+
     def begin_new_sensor(self) -> None:
         """Start calibrating a sensor."""
         self._with_page("calibrate", lambda page: _call(page, "begin"))
@@ -268,26 +273,16 @@ class MainWindow(QMainWindow):
 
     def choose_session(self) -> None:
         """Let the user choose a session folder, and open it."""
-        settings = self.context.settings
-        chosen = QFileDialog.getExistingDirectory(
-            self, tr("Open a session folder"), str(settings.folder("session"))
-        )
-        if chosen:
-            self.open_session(Path(chosen))
+        title = tr("Open a session folder")
+        if chosen := ask_folder(self, self.context.settings, "session", title):
+            self.open_session(chosen)
 
     def choose_files(self) -> None:
         """Let the user choose calibrations, recordings or the description of a session."""
-        settings = self.context.settings
-        patterns = f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}"
-        names, _ = QFileDialog.getOpenFileNames(
-            self,
-            tr("Open"),
-            str(settings.folder("session")),
-            tr("Calibrations, recordings and sessions ({patterns})").format(patterns=patterns),
-        )
-        if names:
-            settings.keep_folder("session", Path(names[0]).parent)
-            self.open_dropped(tuple(map(Path, names)))
+        kinds = tr("Calibrations, recordings and sessions ({patterns})")
+        kinds = kinds.format(patterns=f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}")
+        if chosen := ask_several(self, self.context.settings, "session", tr("Open"), kinds):
+            self.open_dropped(chosen)
 
     def import_calibrations(self) -> None:
         """Let the user choose calibration files, and copy them into the library."""
@@ -299,8 +294,8 @@ class MainWindow(QMainWindow):
         if not is_session(folder):
             error = InputError(
                 tr("The folder is not a session folder: it contains no session.toml"),
-                where=folder,
-                advice=Remedy.CHOOSE_SESSION,
+                folder,
+                Remedy.CHOOSE_SESSION,
             )
             self.context.toasts.show(str(error), "fail")
             return

@@ -51,9 +51,7 @@ class FolderSource:
         files = tuple(sorted(path for path in found if path.suffix.lower() in SUFFIXES))
         if not files:
             raise InputError(
-                tr("there are no PNG or TIFF images"),
-                where=self.folder,
-                advice=Remedy.CHOOSE_IMAGES,
+                tr("there are no PNG or TIFF images"), self.folder, Remedy.CHOOSE_IMAGES
             )
         self.size = read_image(files[0]).size
         self._files = files
@@ -94,8 +92,8 @@ class FolderSource:
                 tr("the image has {a} pixels, but the first image of the folder has {b}").format(
                     a="x".join(map(str, image.size)), b="x".join(map(str, self.size))
                 ),
-                where=self._files[index],
-                advice=Remedy.SAME_CAMERA,
+                self._files[index],
+                Remedy.SAME_CAMERA,
             )
         full = 2**image.bit_depth - 1
         kind = np.uint8 if image.bit_depth == 8 else np.uint16

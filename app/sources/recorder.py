@@ -197,8 +197,8 @@ class Recorder:
             if (frame.rgb.shape, frame.rgb.dtype) != shape:
                 raise InputError(
                     tr("the size or bit depth of the images has changed"),
-                    where=self.path,
-                    advice=tr("The earlier images are kept; start a new recording"),
+                    self.path,
+                    tr("The earlier images are kept; start a new recording"),
                 )
             writer.append(frame.rgb, number, frame.time_s)
             with self._changed:

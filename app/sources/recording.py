@@ -7,7 +7,7 @@ import threading
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -107,9 +107,7 @@ class RecordingSource:
             if not len(recording):
                 recording.close()
                 raise InputError(
-                    tr("the recording contains no frames"),
-                    where=self.path,
-                    advice=Remedy.CHOOSE_FILE,
+                    tr("the recording contains no frames"), self.path, Remedy.CHOOSE_FILE
                 )
             self._recording, self.size = recording, recording.size
             self._pending, self._number, self._shown = 0, -1, None
@@ -139,10 +137,10 @@ class RecordingSource:
         """Return none."""
         return ()
 
-    def set(self, key: Literal["speed"], value: float) -> None:
+    def set_speed(self, speed: float) -> None:
         """Change the speed; 1 is the original one."""
         with self._changed:
-            self._change(speed=value)
+            self._change(speed=speed)
 
     def close(self) -> None:
         """Close the file."""

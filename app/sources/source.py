@@ -86,7 +86,7 @@ class SourceLost(InputError):
 
 def closed(where: str) -> SourceLost:
     """Return the refusal of a source that is not open."""
-    return SourceLost(tr("the source is closed"), where=where, advice=Remedy.OPEN_AGAIN)
+    return SourceLost(tr("the source is closed"), where, Remedy.OPEN_AGAIN)
 
 
 class SourceAway(Exception):

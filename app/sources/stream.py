@@ -145,8 +145,8 @@ class Stream(Worker):
                 tr("an internal error ({kind}) stopped the images; see the log").format(
                     kind=type(error).__name__
                 ),
-                where=self.source.name,
-                advice=Remedy.OPEN_AGAIN,
+                self.source.name,
+                Remedy.OPEN_AGAIN,
             )
             with self._lock:
                 self._lost = reason
@@ -170,13 +170,13 @@ class Stream(Worker):
             elif heard_s is not None and now - heard_s > self._silence_s:
                 raise SourceLost(
                     tr("no image has arrived for {s:.0f} seconds").format(s=self._silence_s),
-                    where=self.source.name,
-                    advice=Remedy.CHECK_CABLE,
+                    self.source.name,
+                    Remedy.CHECK_CABLE,
                 )
 
     def _wait_for_return(self, away: SourceAway) -> None:
         """Mark the source as away, and cancel captures whose frames may never arrive."""
-        reason = _Away(str(away), where=self.source.name, advice="")
+        reason = _Away(str(away), self.source.name, "")
         with self._lock:
             self._lost = reason
             captures, self._captures = self._captures, []
@@ -216,9 +216,7 @@ class Stream(Worker):
         _fail(captures, reason)
 
     def _stopped(self) -> SourceLost:
-        return SourceLost(
-            tr("the images were stopped"), where=self.source.name, advice=Remedy.OPEN_AGAIN
-        )
+        return SourceLost(tr("the images were stopped"), self.source.name, Remedy.OPEN_AGAIN)
 
 
 class _Away(SourceLost):

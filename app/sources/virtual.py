@@ -109,9 +109,7 @@ class VirtualSource:
 
     def _refuse_if_stopped(self, conditions: Conditions) -> None:
         if "camera_stops" in conditions.faults:
-            raise SourceLost(
-                tr("the camera has stopped"), where=self.name, advice=Remedy.CHECK_CABLE
-            )
+            raise SourceLost(tr("the camera has stopped"), self.name, Remedy.CHECK_CABLE)
 
     def _wait_until_due(self, limit_s: float) -> bool:
         now = time.monotonic()

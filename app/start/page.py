@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import datetime
 
-from PySide6.QtCore import QSize, Qt, SignalInstance
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QIcon, QImageReader, QPixmap
 from PySide6.QtWidgets import QCommandLinkButton, QWidget
 
@@ -42,20 +42,17 @@ class StartPage(QWidget):
         self._context = context
         self._session: SessionEntry | None = None
         self._calibration: Entry | None = None
-        requests = context.requests
         title = PlainLabel(tr("What do you want to do?"), self)
         make_bold(title, size=1.5)
         self.go_on = Card("home.continue", tr("&Continue the calibration"), "calibrate")
         self.go_on.clicked.connect(self._continue)
         self.use = Card("home.inspect", tr("&Inspect with the calibration"), "inspect")
         self.use.clicked.connect(self._inspect)
-        self.new = self._card("home.new", tr("Calibrate a &new sensor"), "add", requests.new_sensor)
+        self.new = self._card("home.new", tr("Calibrate a &new sensor"), "add", "sensor")
         self.new.say(tr("From its camera, step by step"))
-        self.open = self._card("home.open", tr("&Open files…"), "folder", requests.open_files)
+        self.open = self._card("home.open", tr("&Open files…"), "folder", "files")
         self.open.say(tr("A session, a calibration or a recording"))
-        self.demo = self._card(
-            "home.demo", tr("&Try the virtual sensor"), "demo", requests.begin_demo
-        )
+        self.demo = self._card("home.demo", tr("&Try the virtual sensor"), "demo", "demo")
         self.demo.say(tr("All functions, without a camera"))
         middle = QWidget(self, maximumWidth=620)
         cards = self.go_on, self.use, self.new, self.open, self.demo
@@ -63,7 +60,7 @@ class StartPage(QWidget):
         inner = QWidget()
         hbox(None, (middle, 6), None, of=inner)
         vbox(named(scroll_area(inner), "home.area", tr("Start")), of=self, margins=0)
-        requests.calibrations_changed.connect(self.refresh)
+        context.requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 
     def enter(self) -> None:
@@ -86,9 +83,9 @@ class StartPage(QWidget):
         if self._calibration is not None:
             self.use.say(calibration_text(self._calibration))
 
-    def _card(self, name: str, title: str, sign: str, wanted: SignalInstance) -> Card:
+    def _card(self, name: str, title: str, sign: str, begin: str) -> Card:
         card = Card(name, title, sign)
-        card.clicked.connect(lambda _=False: wanted.emit())
+        card.clicked.connect(lambda _=False: self._context.requests.begin.emit(begin))
         return card
 
     def _read(self) -> tuple[tuple[Entry, ...], tuple[SessionEntry, ...]]:

@@ -39,7 +39,7 @@ class DesignDialog(WorkDialog):
         self._design = design
         self.resize(980, 620)
         self.heads = (tr("Figure"), tr("Value"), tr("Limit"), tr("Result"), tr("Advice"))
-        self.table = self.result_table(self.heads, stretched=len(self.heads) - 1)
+        self.table = self.result_table(self.heads, len(self.heads) - 1)
         vbox(self.button_row(), (self.table, 1), self.foot_row(), of=self)
         self.say(tr("Checks the design of the virtual sensor."))
         self.allow()
@@ -51,7 +51,7 @@ class DesignDialog(WorkDialog):
 
     def show_result(self, result: DesignCheckResult) -> None:
         """Show the figures, and the verdict of the design."""
-        self.fill(self.table, _rows(result))
+        self.table.show_items(_rows(result))
         verdict = verdict_word(result.quality.verdict)
         self.say(tr("The design: {verdict}").format(verdict=verdict))
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QPixmap, QShowEvent
 from PySide6.QtWidgets import (
-    QFileDialog,
     QFormLayout,
-    QPushButton,
     QWidget,
 )
 
 from app.context.context import AppContext
+from app.services.file_dialogs import ask_folder
 from app.tools.work_dialog import WorkDialog
+from app.widgets.buttons import push_button
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
@@ -70,22 +70,21 @@ class PrecisionDialog(WorkDialog):
         self.calibrations.currentIndexChanged.connect(self._on_calibration)
         self.presses = named(PlainLabel(), "precision.presses", tr("Presses of known depth"))
         self.presses.setWordWrap(True)
-        self.folder = named(
-            QPushButton(tr("Session folder…")), "precision.folder", tr("Choose a session folder"),
-            tr("A session folder with presses/truth.csv and truth/*.npz, the true depth of "
-                "each press"),
-        )  # fmt: skip
-        self.folder.clicked.connect(self.choose_folder)
+        tip = tr(
+            "A session folder with presses/truth.csv and truth/*.npz, the true depth of each press"
+        )
+        words, text = tr("Choose a session folder"), tr("Session folder…")
+        self.folder = push_button(
+            "precision.folder", text, self.choose_folder, accessible=words, tip=tip
+        )
 
     def _make_result(self) -> None:
         self.figure = named(PlainLabel(), "precision.figure", tr("Error against time of a frame"))
         self.figure.setMinimumHeight(HEIGHT_PX)
         self.figure.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        heads = (
-            tr("Mode"), "ms", tr("p95 ms"), tr("RMS um"), tr("normals deg"), tr("height %"),
-            tr("size %"), tr("on front"),
-        )  # fmt: skip
-        self.table = self.result_table(heads, stretched=0)
+        times = tr("Mode"), "ms", tr("p95 ms")
+        errors = tr("RMS um"), tr("normals deg"), tr("height %"), tr("size %")
+        self.table = self.result_table((*times, *errors, tr("on front")), 0)
         self.table.setMaximumHeight(170)
         self.rate = self._wish("rate", tr("Frames per second that are needed"), tr(" frames/s"))
         self.limit = self._wish("limit", tr("Largest error of the depth"), tr(" um RMS"))
@@ -151,13 +150,10 @@ class PrecisionDialog(WorkDialog):
 
     def choose_folder(self) -> None:
         """Let the user choose a session folder with true depths."""
-        folder = str(self.context.settings.folder("session"))
-        chosen = QFileDialog.getExistingDirectory(
-            self, tr("Session folder with true depths"), folder
-        )
-        if chosen:
-            self.context.settings.keep_folder("session", Path(chosen).parent)
-            self.use_folder(Path(chosen))
+        settings, title = self.context.settings, tr("Session folder with true depths")
+        if chosen := ask_folder(self, settings, "session", title):
+            settings.keep_folder("session", chosen.parent)
+            self.use_folder(chosen)
 
     def use_folder(self, folder: Path) -> None:
         """Measure on the presses of a session folder."""
@@ -196,8 +192,8 @@ class PrecisionDialog(WorkDialog):
         for point in points:
             numbers = [getattr(point, name) for name in ("median_ms", "p95_ms", *ERRORS)]
             on_front = tr("yes") if point in front else ""
-            rows.append([point.label, *(_digits(number) for number in numbers), on_front])
-        self.fill(self.table, rows)
+            rows.append((point.label, *map(_digits, numbers), on_front))
+        self.table.show_items(rows)
         picture = QPixmap()
         picture.loadFromData(png)
         smooth = Qt.TransformationMode.SmoothTransformation

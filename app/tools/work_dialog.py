@@ -8,19 +8,18 @@ from typing import Any
 
 from PySide6.QtWidgets import (
     QDialog,
-    QFileDialog,
     QHBoxLayout,
     QHeaderView,
     QProgressBar,
-    QTableWidget,
-    QTableWidgetItem,
     QWidget,
 )
 
 from app.context.context import AppContext
+from app.services.file_dialogs import ask_folder
 from app.services.jobs import Job, Jobs
 from app.widgets.buttons import push_button
-from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.cells_table import CellsTable, text_table
+from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -100,26 +99,12 @@ class WorkDialog(QDialog):
         """Return a row of the notes and Save."""
         return hbox((self.words, 1), self.save)
 
-    def result_table(self, heads: Sequence[str], *, stretched: int) -> QTableWidget:
-        """Return an empty table with these columns, which cannot be edited; one is stretched."""
-        table = named(QTableWidget(0, len(heads)), f"{self.objectName()}.table", tr("Results"))
-        table.setHorizontalHeaderLabels(list(heads))
-        table.verticalHeader().hide()
-        table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        table.setSelectionMode(QTableWidget.SelectionMode.NoSelection)
-        table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    def result_table(self, heads: tuple[str, ...], stretched: int) -> CellsTable[tuple[str, ...]]:
+        """Return an empty table of texts, one of whose columns takes the space that is left."""
+        table = text_table(f"{self.objectName()}.table", tr("Results"), heads)
+        table.horizontalHeader().setStretchLastSection(False)
         table.horizontalHeader().setSectionResizeMode(stretched, QHeaderView.ResizeMode.Stretch)
         return table
-
-    @staticmethod
-    def fill(table: QTableWidget, rows: Sequence[Sequence[str]]) -> None:
-        """Show these rows of text."""
-        table.setRowCount(len(rows))
-        for number, row in enumerate(rows):
-            for column, text in enumerate(row):
-                item = QTableWidgetItem(text)
-                item.setToolTip(plain_tip(text))
-                table.setItem(number, column, item)
 
     def submit(self, title: str, work: Callable[[Callable[[float], None]], Any]) -> None:
         """Work in the background while live processing rests; then show the result."""
@@ -143,12 +128,9 @@ class WorkDialog(QDialog):
 
     def choose_report(self) -> None:
         """Let the user choose a folder, and write the report into it."""
-        chosen = QFileDialog.getExistingDirectory(
-            self, tr("Folder for the report"), str(self.context.settings.folder("report"))
-        )
-        if chosen:
-            self.context.settings.keep_folder("report", Path(chosen))
-            self.write_report(Path(chosen))
+        title = tr("Folder for the report")
+        if chosen := ask_folder(self, self.context.settings, "report", title):
+            self.write_report(chosen)
 
     def write_report(self, folder: Path) -> None:
         """Write the report in the background."""

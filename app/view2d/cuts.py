@@ -25,6 +25,11 @@ from gelpolight_core.translation import tr
 Point = tuple[float, float]
 # Those of ISO 21920-3 that fit on a sensor.
 CUTOFFS_MM = (0.25, 0.8, 2.5)
+CUTOFFS = {0.0: tr("none"), **{c: tr("at {c:g} mm").format(c=c) for c in CUTOFFS_MM}}
+ABOUT_CUTOFF = tr(
+    "Measure Ra, Rq and Rz along the line (ISO 21920). The cut-off separates roughness from "
+    "waviness"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +94,7 @@ class Section:
         none=tr("half height"),
         tip=tr("Depth at which the width is measured. 0: half of the height"),
     )
-    cutoff_mm: float = choice(
-        0.0, tr("Ra, Rq, Rz"),
-        {0.0: tr("none"), **{c: tr("at {c:g} mm").format(c=c) for c in CUTOFFS_MM}},
-        tr("Measure Ra, Rq and Rz along the line (ISO 21920). The cut-off separates roughness "
-           "from waviness"),
-    )  # fmt: skip
+    cutoff_mm: float = choice(0.0, tr("Ra, Rq, Rz"), CUTOFFS, ABOUT_CUTOFF)
     region: bool = switch(
         False, "", tr("Roughness"), tr("Measure Sa, Sq and Sz in a rectangle on the height map")
     )

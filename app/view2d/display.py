@@ -35,6 +35,7 @@ QUANTITIES = {
     "difference": tr("Difference from the reference"),
 }
 """Quantities that can colour the 3D surface."""
+KEEP_RANGE = tr("Keep the colour range. If unlocked, it follows the deepest press")
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +87,7 @@ class Display:
 
     colours: str = choice("viridis", tr("Colours"), COLOUR_MAPS)
     colour_by: str = choice("depth", tr("Colour by"), QUANTITIES)
-    locked: bool = switch(
-        False, tr("Range"), tr("Lock"),
-        tr("Keep the colour range. If unlocked, it follows the deepest press"), "K",
-    )  # fmt: skip
+    locked: bool = switch(False, tr("Range"), tr("Lock"), KEEP_RANGE, "K")
     low_mm: float = number(
         0.0, tr("From"), *LIMITS_MM, tr(" mm"), 2, step=0.1, when=lambda d: d.locked
     )

@@ -24,6 +24,29 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
+MASKS = {
+    "none": tr("none"),
+    "inside": tr("keep the rectangle"),
+    "outside": tr("leave out the rectangle"),
+    "deeper": tr("keep deeper points"),
+    "sure": tr("leave out flagged points"),
+}
+ABOUT_MASK = tr(
+    "Keep a part of the points only. The others have no depth, and are left out of levelling, "
+    "filter, histogram and export"
+)
+LEVELS = {
+    "none": tr("none"),
+    "plane": tr("plane"),
+    "rectangle": tr("plane of the rectangle"),
+    "points": tr("three points"),
+}
+ABOUT_LEVEL = tr(
+    "Subtract a plane: of the untouched surface (pressed objects are left out), of the rectangle "
+    "on the map, or through three points on the map"
+)
+FILTERS = {"none": tr("none"), "gaussian": tr("Gaussian"), "median": tr("median")}
+ABOUT_FILTER = tr("Smooth the height map. The uncertainty of a smoothed map is not known")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +76,7 @@ class Processing:
         Side of the median filter, odd.
     """
 
-    mask: str = choice(
-        "none", tr("Mask"), {
-            "none": tr("none"), "inside": tr("keep the rectangle"),
-            "outside": tr("leave out the rectangle"), "deeper": tr("keep deeper points"),
-            "sure": tr("leave out flagged points"),
-        },
-        tr("Keep a part of the points only. The others have no depth, and are left out of "
-           "levelling, filter, histogram and export"),
-    )  # fmt: skip
+    mask: str = choice("none", tr("Mask"), MASKS, ABOUT_MASK)
     deeper_mm: float = number(
         0.1,
         tr("Deeper than"),
@@ -72,19 +87,8 @@ class Processing:
         step=0.05,
         when=lambda p: p.mask == "deeper",
     )
-    level: str = choice(
-        "none", tr("Levelling"), {
-            "none": tr("none"), "plane": tr("plane"), "rectangle": tr("plane of the rectangle"),
-            "points": tr("three points"),
-        },
-        tr("Subtract a plane: of the untouched surface (pressed objects are left out), of the "
-           "rectangle on the map, or through three points on the map"),
-    )  # fmt: skip
-    filter: str = choice(
-        "none", tr("Filter"),
-        {"none": tr("none"), "gaussian": tr("Gaussian"), "median": tr("median")},
-        tr("Smooth the height map. The uncertainty of a smoothed map is not known"),
-    )  # fmt: skip
+    level: str = choice("none", tr("Levelling"), LEVELS, ABOUT_LEVEL)
+    filter: str = choice("none", tr("Filter"), FILTERS, ABOUT_FILTER)
     sigma_mm: float = number(
         0.1,
         tr("Sigma"),

@@ -8,9 +8,8 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Qt, Signal
 
-from app.theme import theme
 from app.widgets.naming import named
-from app.widgets.plots import without_menus
+from app.widgets.plots import apply_theme, without_menus
 from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.translation import tr
@@ -55,7 +54,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         for item in (self._level, self._ends):
             item.setVisible(False)
             self.addItem(item, ignoreBounds=True)
-        self._take_theme()
+        apply_theme(self)
         self._unit = ""
         self._take_unit()
 
@@ -110,12 +109,4 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_ends"):
-            self._take_theme()
-
-    def _take_theme(self) -> None:
-        self.setBackground(theme.colour("base"))
-        pen = theme.colour("text")
-        for side in ("left", "bottom"):
-            axis = self.getAxis(side)
-            axis.setPen(pen)
-            axis.setTextPen(pen)
+            apply_theme(self)

@@ -173,7 +173,5 @@ def _write_gif(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
 
 def _refusal(path: Path) -> InputError:
     return InputError(
-        tr("The movie cannot be written"),
-        where=path,
-        advice=tr("Choose another folder, or GIF instead of MP4"),
+        tr("The movie cannot be written"), path, tr("Choose another folder, or GIF instead of MP4")
     )

@@ -19,15 +19,19 @@ from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkPropCollection
 
 from app.theme import theme
+from app.view3d.overlays import CUT
 from app.view3d.picking import Point, hit
 from app.view3d.scene import Scene
 from app.view3d.style import Ink, Style
 from app.view3d.surface import Surface
+from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 KEY_DEG = 6.0
 KEY_ZOOM = 1.15
+TO_VIEWER = 0.0, -1.0, 0.0
+"""Normal of the clip plane at first."""
 SHADOW_MM = 1.5
 """Hollows of about this size are shaded in a frozen image: the size of a deep press."""
 
@@ -89,9 +93,8 @@ class Interactor(QtInteractor):  # type: ignore[misc]
             (self.iren.interactor, self.iren.interactor.AddObserver("RenderEvent", self._on_render))
         ]
         style = self.iren.interactor.GetInteractorStyle()
-        for event, slot in (
-            ("StartInteractionEvent", self._on_hand), ("EndInteractionEvent", self._on_hand_off),
-        ):  # fmt: skip
+        slots = {"StartInteractionEvent": self._on_hand, "EndInteractionEvent": self._on_hand_off}
+        for event, slot in slots.items():
             self._observed.append((style, style.AddObserver(event, slot)))
         self.scene = Scene(self)
         self._orientation = self._add_orientation()
@@ -141,11 +144,9 @@ class Interactor(QtInteractor):  # type: ignore[misc]
             left, right, low, high, under, over = self.scene.box
             middle = (0.5 * (left + right), 0.5 * (low + high), 0.5 * (under + over))
             tall = (left, right, low, high, min(under, 0.0), max(over, 0.15 * (right - left)))
-            self._plane = self.add_plane_widget(
-                self._on_plane, normal=(0.0, -1.0, 0.0), origin=middle, bounds=tall,
-                implicit=True, outline_translation=False, test_callback=False, color="#ff5ac8",
-            )  # fmt: skip
-            self._on_plane((0.0, -1.0, 0.0), middle)
+            how = {"origin": middle, "bounds": tall, "color": CUT, "test_callback": False}
+            self._plane = self.add_plane_widget(self._on_plane, normal=TO_VIEWER, **how)
+            self._on_plane(TO_VIEWER, middle)
         self.update()
 
     def finish(self) -> None:
@@ -286,21 +287,14 @@ class Interactor(QtInteractor):  # type: ignore[misc]
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Rotate with the arrow keys and zoom with plus and minus. Pass on all other keys."""
-        turns = {
-            Qt.Key.Key_Left: (KEY_DEG, 0.0), Qt.Key.Key_Right: (-KEY_DEG, 0.0),
-            Qt.Key.Key_Up: (0.0, -KEY_DEG), Qt.Key.Key_Down: (0.0, KEY_DEG),
-        }  # fmt: skip
-        zooms = {
-            Qt.Key.Key_Plus: KEY_ZOOM, Qt.Key.Key_Equal: KEY_ZOOM, Qt.Key.Key_Minus: 1 / KEY_ZOOM,
-        }  # fmt: skip
         key = Qt.Key(event.key())
-        if key in turns:
-            across, up = turns[key]
-            self.camera.Azimuth(across)
-            self.camera.Elevation(up)
+        if key in ARROWS:
+            right, down = ARROWS[key]
+            self.camera.Azimuth(-KEY_DEG * right)
+            self.camera.Elevation(KEY_DEG * down)
             self.camera.OrthogonalizeViewUp()
-        elif key in zooms:
-            self.scene.zoom(zooms[key])
+        elif key in ZOOMS:
+            self.scene.zoom(KEY_ZOOM ** ZOOMS[key])
         else:
             event.ignore()
             return

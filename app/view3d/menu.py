@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QInputDialog, QMenu
 
 from app.services.settings import Settings
 from app.view3d.style import Style, viewpoints_as_text, viewpoints_from_text
+from app.widgets.actions import add_item
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -74,16 +75,16 @@ class ViewMenu(QMenu):
         self, name: str, text: str, slot: Callable[[], object], menu: QMenu | None = None
     ) -> QAction:
         """Add an entry, to this menu or to one within it."""
-        action = QAction(text, menu or self)
-        (menu or self).addAction(action)
-        action.setObjectName(f"view3d.{name}")
-        action.triggered.connect(lambda _on=False: slot())
-        return action
+        return add_item(menu or self, f"view3d.{name}", text, slot)
 
     def add_choices(
-        self, title: str, name: str, choices: Mapping[str, str], slot: Callable[[str], object],
+        self,
+        title: str,
+        name: str,
+        choices: Mapping[str, str],
+        slot: Callable[[str], object],
         chosen: str = "",
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Add a menu whose entries call `slot` with their keys, with a mark if one is `chosen`."""
         menu = QMenu(title, self)
         self.insertMenu(self._of_pages, menu)
@@ -122,10 +123,8 @@ class ViewMenu(QMenu):
             self.add("viewpoint", name, partial(self.go_to, name), menu)
         if saved:
             menu.addSeparator()
-            self.add(
-                "viewpoint_clear", tr("Remove all viewpoints"),
-                partial(self._settings.keep_display, VIEWPOINTS, ""), menu,
-            )  # fmt: skip
+            clear = partial(self._settings.keep_display, VIEWPOINTS, "")
+            self.add("viewpoint_clear", tr("Remove all viewpoints"), clear, menu)
 
     def _ask_name(self) -> None:
         dialog = QInputDialog(self._panel)

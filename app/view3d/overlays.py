@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyvista as pv
@@ -23,6 +23,9 @@ CURSOR = "white"
 PIN = "#ffb02e"
 CUT = "#ff5ac8"
 SOLID = "#5fd0ff"
+QUIET: dict[str, Any] = {"reset_camera": False, "render": False}
+"""Added to the scene without moving the camera or drawing at once."""
+PLAIN = {**QUIET, "lighting": False}
 LIFT = 0.001
 """Lines lie above the surface by this share of its width, so that shadows do not cover them."""
 
@@ -60,11 +63,14 @@ class Overlay:
     """An actor on the surface whose mesh is replaced. Rounding errors do not hide it."""
 
     def __init__(self, plotter: Plotter, name: str, **how: object) -> None:
-        empty = pv.PolyData(np.zeros((1, 3), np.float32))
         self.actor = plotter.add_mesh(
-            empty, name=name, lighting=False, pickable=False, reset_camera=False, render=False,
-            show_scalar_bar=False, **how,
-        )  # fmt: skip
+            pv.PolyData(np.zeros((1, 3), np.float32)),
+            name=name,
+            pickable=False,
+            show_scalar_bar=False,
+            **PLAIN,
+            **how,
+        )
         self.actor.visibility = False
         mapper = self.actor.mapper
         mapper.SetResolveCoincidentTopologyToPolygonOffset()
@@ -86,37 +92,26 @@ class Overlay:
 
 def draw_pins(plotter: Plotter, points: Array, text: str, ink: Ink) -> None:
     """Draw points A and B of the scene with a line between them, and a text next to them."""
-    for name in ("pins", "pin-line", "pin-text"):
-        plotter.remove_actor(name, render=False)
+    _remove(plotter, "pins", "pin-line", "pin-text")
     if not len(points):
         return
-    plotter.add_point_labels(
-        points, list(PIN_NAMES[: len(points)]), name="pins", point_color=PIN, point_size=10,
-        shape_color=PIN, shape_opacity=1.0, render_points_as_spheres=True, always_visible=True,
-        font_size=ink.font + 1, text_color="black", margin=3, reset_camera=False, render=False,
-    )  # fmt: skip
-    plotter.add_text(
-        text, position="lower_right", font_size=ink.font - 2, color=ink.text, name="pin-text",
-        render=False,
-    )  # fmt: skip
+    names, dots = list(PIN_NAMES[: len(points)]), {"point_color": PIN, "point_size": 10}
+    plates = {"shape_color": PIN, "shape_opacity": 1.0, "margin": 3, "text_color": "black"}
+    how = {"render_points_as_spheres": True, "always_visible": True, "font_size": ink.font + 1}
+    plotter.add_point_labels(points, names, name="pins", **dots, **plates, **how, **QUIET)
+    _write(plotter, "pin-text", text, "lower_right", ink.font - 2, ink)
     if len(points) == len(PIN_NAMES):
-        plotter.add_mesh(
-            pv.Line(*points), color=PIN, line_width=3, lighting=False, name="pin-line",
-            reset_camera=False, render=False,
-        )  # fmt: skip
+        plotter.add_mesh(pv.Line(*points), name="pin-line", color=PIN, line_width=3, **PLAIN)
 
 
 def draw_solid(plotter: Plotter, solid: pv.PolyData | None, exaggeration: float) -> None:
     """Draw a translucent solid with its edges. None: none."""
-    for name in ("solid", "solid-edges"):
-        plotter.remove_actor(name, render=False)
+    _remove(plotter, "solid", "solid-edges")
     if solid is None:
         return
-    how = {"color": SOLID, "lighting": False, "reset_camera": False, "render": False}
-    body = plotter.add_mesh(solid, name="solid", opacity=0.3, **how)
-    edges = plotter.add_mesh(
-        solid.extract_feature_edges(40.0), name="solid-edges", line_width=2, **how
-    )
+    rims = solid.extract_feature_edges(40.0)
+    body = plotter.add_mesh(solid, name="solid", opacity=0.3, color=SOLID, **PLAIN)
+    edges = plotter.add_mesh(rims, name="solid-edges", line_width=2, color=SOLID, **PLAIN)
     for actor in (body, edges):
         actor.scale = (1.0, 1.0, exaggeration)
 
@@ -145,20 +140,14 @@ def draw_axes(plotter: Plotter, box: Box, style: Style, ink: Ink) -> None:
 
     Labels are upright, and one that would cover another one is left out.
     """
-    for name in ("axes", "axes-labels"):
-        plotter.remove_actor(name, render=False)
+    _remove(plotter, "axes", "axes-labels")
     if not style.axes:
         return
     ends, points, texts = axes_marks(box, style.exaggeration)
-    plotter.add_mesh(
-        pv.line_segments_from_points(ends), color=ink.text, lighting=False,
-        line_width=1, name="axes", reset_camera=False, render=False,
-    )  # fmt: skip
-    plotter.add_point_labels(
-        points, texts, name="axes-labels", shape=None, show_points=False,
-        font_size=ink.font + 1, text_color=ink.text, bold=False, justification_horizontal="center",
-        justification_vertical="center", reset_camera=False, render=False,
-    )  # fmt: skip
+    lines = pv.line_segments_from_points(ends)
+    plotter.add_mesh(lines, name="axes", color=ink.text, line_width=1, **PLAIN)
+    centred = {"justification_horizontal": "center", "justification_vertical": "center"}
+    _label(plotter, "axes-labels", points, texts, ink.font + 1, ink, bold=False, **centred)
 
 
 def axes_marks(box: Box, exaggeration: float) -> tuple[Array, Array, list[str]]:
@@ -166,14 +155,14 @@ def axes_marks(box: Box, exaggeration: float) -> tuple[Array, Array, list[str]]:
     left, right, near, far, low, high = box
     x, y = round_values(left, right, 6), round_values(near, far, 6)
     depth = round_values(low / exaggeration, high / exaggeration, 2)
+    z = exaggeration * depth
     tick = 0.015 * (right - left)
     # Start and end of each axis, direction of its ticks, places and values of these, title.
     axes = (
         ((left, near, 0.0), (right, near, 0.0), (0.0, -tick, 0.0), x, x, tr("x (mm)")),
         ((left, near, 0.0), (left, far, 0.0), (-tick, 0.0, 0.0), y, -y, tr("y (mm)")),
-        ((right, near, low), (right, near, high), (tick, 0.0, 0.0),
-         exaggeration * depth, depth, tr("depth (mm)")),
-    )  # fmt: skip
+        ((right, near, low), (right, near, high), (tick, 0.0, 0.0), z, depth, tr("depth (mm)")),
+    )
     ends, points, texts = list[Array](), list[Array](), list[str]()
     for number, (first, last, out, places, values, title) in enumerate(axes):
         start, end, away = np.array(first), np.array(last), np.array(out)
@@ -208,12 +197,11 @@ def draw_scale(
     }
     mapper.scalar_visibility = False  # the texture contains the colours
     title = scale.title.replace(" [", "\n[")  # the unit on a line of its own, for narrow views
-    bar = plotter.add_scalar_bar(
-        title, mapper=mapper, vertical=True, n_labels=0 if scale.names else 5,
-        fmt="{:.4g}", color=ink.text, position_x=0.015, position_y=0.55, width=0.14, height=0.42,
-        title_font_size=ink.font + 1, label_font_size=ink.font + 1, unconstrained_font_size=True,
-        render=False,
-    )  # fmt: skip
+    numbers = {"n_labels": 0 if scale.names else 5, "fmt": "{:.4g}"}
+    place = {"position_x": 0.015, "position_y": 0.55, "width": 0.14, "height": 0.42}
+    sizes = {"title_font_size": ink.font + 1, "label_font_size": ink.font + 1}
+    how = {"vertical": True, "color": ink.text, "unconstrained_font_size": True, "render": False}
+    bar = plotter.add_scalar_bar(title, mapper=mapper, **numbers, **place, **sizes, **how)
     bar.SetBarRatio(0.2)
     bar.SetDrawAnnotations(bool(scale.names))
     if scale.names:
@@ -224,30 +212,38 @@ def draw_scale(
 
 def draw_note(plotter: Plotter, style: Style, ink: Ink) -> None:
     """Show the exaggeration of the depth, unless it is 1."""
-    plotter.remove_actor("note", render=False)
+    _remove(plotter, "note")
     if style.exaggeration != 1.0:
-        plotter.add_text(
-            tr("Depth scaled {k:g} times").format(k=style.exaggeration), position="lower_left",
-            font_size=ink.font - 3, color=ink.text, name="note", render=False,
-        )  # fmt: skip
+        text = tr("Depth scaled {k:g} times").format(k=style.exaggeration)
+        _write(plotter, "note", text, "lower_left", ink.font - 3, ink)
 
 
 def draw_scale_bar(plotter: Plotter, box: Box, style: Style, ink: Ink) -> None:
     """Draw a bar of round length in the membrane's plane, below the surface's lower edge."""
-    for name in ("scale-bar", "scale-bar-length"):
-        plotter.remove_actor(name, render=False)
+    _remove(plotter, "scale-bar", "scale-bar-length")
     if not style.scale_bar:
         return
     length = round_length_mm(0.25 * (box[1] - box[0]))
     side = box[3] - box[2]
     y = box[2] - 0.22 * side
-    plotter.add_mesh(
-        pv.Line((box[0], y, 0.0), (box[0] + length, y, 0.0)), color=ink.text, line_width=4,
-        lighting=False, name="scale-bar", reset_camera=False, render=False,
-    )  # fmt: skip
-    plotter.add_point_labels(
-        [(box[0] + 0.5 * length, y - 0.07 * side, 0.0)], [length_text(length)],
-        shape=None,
-        name="scale-bar-length", font_size=ink.font + 4, text_color=ink.text, show_points=False,
-        always_visible=True, reset_camera=False, render=False,
-    )  # fmt: skip
+    line = pv.Line((box[0], y, 0.0), (box[0] + length, y, 0.0))
+    plotter.add_mesh(line, name="scale-bar", color=ink.text, line_width=4, **PLAIN)
+    at, text = [(box[0] + 0.5 * length, y - 0.07 * side, 0.0)], [length_text(length)]
+    _label(plotter, "scale-bar-length", at, text, ink.font + 4, ink, always_visible=True)
+
+
+def _remove(plotter: Plotter, *names: str) -> None:
+    for name in names:
+        plotter.remove_actor(name, render=False)
+
+
+def _write(plotter: Plotter, name: str, text: str, place: str, size: int, ink: Ink) -> None:
+    how = {"position": place, "font_size": size, "color": ink.text}
+    plotter.add_text(text, name=name, render=False, **how)
+
+
+def _label(
+    plotter: Plotter, name: str, points: Any, texts: list[str], size: int, ink: Ink, **how: Any
+) -> None:
+    shown = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
+    plotter.add_point_labels(points, texts, name=name, **shown, **how, **QUIET)

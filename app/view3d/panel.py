@@ -307,6 +307,6 @@ def _load() -> type[Interactor]:
     except ImportError as error:
         _LOG.exception("The 3D view cannot be loaded")
         raise InputError(
-            tr("The library pyvista cannot be loaded"), where=tr("3D view"), advice=Remedy.REINSTALL
+            tr("The library pyvista cannot be loaded"), tr("3D view"), Remedy.REINSTALL
         ) from error
     return kind

@@ -58,10 +58,10 @@ class SheetActor:
         self._lamp = pv.Light(light_type="scene light")
         plotter.remove_all_lights()
         plotter.add_light(self._lamp)
+        how = {"show_scalar_bar": False, "reset_camera": False, "render": False}
         self.actor = plotter.add_mesh(
-            pv.Plane(), texture=self._texture, color="white", name="surface",
-            show_scalar_bar=False, reset_camera=False, render=False,
-        )  # fmt: skip
+            pv.Plane(), texture=self._texture, color="white", name="surface", **how
+        )
         self.actor.visibility = False
         # The grid on the floor of the axes box is at depth 0, like the membrane.
         self.actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QPushButton, QToolButton, QWidget
+from PySide6.QtGui import QAction, QKeySequence, QUndoStack
+from PySide6.QtWidgets import QMenu, QPushButton, QToolButton, QWidget
 
 from app.theme.icons import icon
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+REDO = "Ctrl+Shift+Z", "Ctrl+Y"
 
 
 def make_action(
@@ -62,6 +65,32 @@ def make_action(
     action.triggered.connect(lambda _checked=False: slot())
     parent.addAction(action)
     return action
+
+
+def add_item(
+    menu: QMenu, name: str, text: str, slot: Callable[[], object], *, checkable: bool = False
+) -> QAction:
+    """Add an entry without a key to a menu."""
+    action = menu.addAction(text)
+    action.setObjectName(name)
+    action.setCheckable(checkable)
+    action.triggered.connect(lambda _checked=False: slot())
+    return action
+
+
+def undo_actions(
+    parent: QWidget, page: str, stack: QUndoStack, titles: tuple[str, str] | None = None
+) -> tuple[QAction, QAction]:
+    """Return the actions of a page for undo and redo, enabled while they can act."""
+    undo, redo = titles or (tr("Undo"), tr("Redo"))
+    made = (
+        make_action(parent, f"{page}.undo", undo, stack.undo, keys=("Ctrl+Z",), icon_name="undo"),
+        make_action(parent, f"{page}.redo", redo, stack.redo, keys=REDO, icon_name="redo"),
+    )
+    for action, can in zip(made, (stack.canUndoChanged, stack.canRedoChanged), strict=True):
+        action.setEnabled(False)
+        can.connect(action.setEnabled)
+    return made
 
 
 def icon_button(action: QAction) -> QToolButton:

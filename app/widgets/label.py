@@ -10,7 +10,7 @@ from __future__ import annotations
 import html
 import re
 
-from PySide6.QtCore import QEvent, QRect, QSize
+from PySide6.QtCore import QEvent
 from PySide6.QtGui import QKeySequence, Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
@@ -106,34 +106,3 @@ def plain_tip(text: str, key: str = "") -> str:
 def key_text(key: str | QKeySequence) -> str:
     """Return a shortcut with the names of keys in the language of the user."""
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
-
-
-class RoomyLabel(PlainLabel):
-    """Plain text, wrapped, with space for the longest of several texts.
-
-    Parameters
-    ----------
-    *texts : str
-        The texts that it may show. Default: space for one line.
-    """
-
-    def __init__(self, *texts: str) -> None:
-        super().__init__()
-        self._texts = texts or (" ",)
-        self.setWordWrap(True)
-        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
-
-    def hasHeightForWidth(self) -> bool:
-        """Whether the height depends on the width, also while there is no text."""
-        return True
-
-    def heightForWidth(self, width: int) -> int:
-        """Return the height of the longest text, or of the current one if that is higher."""
-        metrics, wrap = self.fontMetrics(), Qt.TextFlag.TextWordWrap
-        area = QRect(0, 0, width, 10_000)
-        texts = (*self._texts, self.text())
-        return max(metrics.boundingRect(area, wrap, text).height() for text in texts)
-
-    def minimumSizeHint(self) -> QSize:
-        """Return a size that leaves the width to other widgets."""
-        return QSize(0, self.fontMetrics().lineSpacing())

@@ -53,6 +53,6 @@ def move_file(source: Path, target: Path) -> None:
 def _refused(error: OSError, path: Path) -> InputError:
     return InputError(
         tr("The operating system refused it ({reason})").format(reason=error.strerror or error),
-        where=path,
-        advice=Remedy.CHECK_DISK,
+        path,
+        Remedy.CHECK_DISK,
     )

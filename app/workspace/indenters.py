@@ -52,19 +52,19 @@ class Indenter:
         """Check the values."""
         where = tr("indenter {name}").format(name=self.name or tr("without a name"))
         if not self.name.strip():
-            raise InputError(tr("An indenter has no name"), where=where, advice=Remedy.CHOOSE_NAME)
+            raise InputError(tr("An indenter has no name"), where, Remedy.CHOOSE_NAME)
         if self.shape not in SHAPES:
             raise InputError(
                 tr("Unknown shape '{shape}'").format(shape=self.shape),
-                where=where,
-                advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
+                where,
+                Remedy.ONE_OF.format(names=", ".join(SHAPES)),
             )
         for length in (self.size_mm, self.second_mm, self.height_mm):
             if length is not None and not (math.isfinite(length) and length > 0.0):
                 raise InputError(
                     tr("The length {value} mm is not greater than zero").format(value=length),
-                    where=where,
-                    advice=Remedy.CORRECT_VALUE,
+                    where,
+                    Remedy.CORRECT_VALUE,
                 )
 
     @property
@@ -138,8 +138,8 @@ def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
         if names.count(name) > 1:
             raise InputError(
                 tr("Two indenters have the name {name}").format(name=name),
-                where=tr("List of indenters"),
-                advice=Remedy.CHOOSE_NAME,
+                tr("List of indenters"),
+                Remedy.CHOOSE_NAME,
             )
     content = {"format": FORMAT, "version": VERSION, "indenters": [asdict(row) for row in rows]}
     make_folder(folder)

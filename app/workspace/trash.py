@@ -102,8 +102,8 @@ def take_from_trash(removal: Removal) -> None:
         if old_path.exists():
             raise InputError(
                 tr("A new file now has the same name"),
-                where=old_path,
-                advice=tr("Rename that file, then restore this one from the trash"),
+                old_path,
+                tr("Rename that file, then restore this one from the trash"),
             )
     make_folder(removal.old_path.parent)
     for trashed, old_path in pairs:

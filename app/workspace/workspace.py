@@ -246,8 +246,8 @@ class Workspace:
             if summary.fault and not summary.accepted:
                 raise InputError(
                     summary.fault.text,
-                    where=path,
-                    advice=tr("Calibrate again, or use it on the Sensors page with a reason"),
+                    path,
+                    tr("Calibrate again, or use it on the Sensors page with a reason"),
                 )
         make_folder(self.folder)
         in_use = path and path.relative_to(self.folder).as_posix()
@@ -333,16 +333,14 @@ class Workspace:
         except OSError as error:
             raise InputError(
                 tr("The workspace cannot be read ({reason})").format(reason=error.strerror),
-                where=self.folder,
-                advice=Remedy.CHECK_DISK,
+                self.folder,
+                Remedy.CHECK_DISK,
             ) from error
 
     def _refuse_outside(self, path: Path) -> None:
         if not path.is_relative_to(self.sensors_folder):
             raise InputError(
-                tr("The calibration is not in the library"),
-                where=path,
-                advice=Remedy.IMPORT_CALIBRATION,
+                tr("The calibration is not in the library"), path, Remedy.IMPORT_CALIBRATION
             )
 
 

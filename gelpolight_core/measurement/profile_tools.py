@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -102,9 +102,9 @@ class ProfileWidth(Section):
         """Measure."""
         profile = self.profile(heightmap)
         figure = width_at(profile, self.level_mm, between=self.between_mm)
-        left, right, level = width_ends(profile, self.level_mm, between=self.between_mm)
-        figures = (figure, Measured(level, None, "mm", "level"))
-        return _profile_result(self, profile, figures, ((left, right),))
+        ends = width_ends(profile, self.level_mm, between=self.between_mm)
+        figures = (figure, Measured(ends[2], None, "mm", "level"))
+        return replace(_profile_result(self, profile, figures, (ends[:2],)), width_ends=ends)
 
 
 def _profile_result(

@@ -53,6 +53,9 @@ class ToolResult:
         The whole fit, of a fitted indenter.
     profile : Profile or None
         The section that was read, where the tool reads one.
+    width_ends : (float, float, float) or None
+        Where a width begins and ends along the section, and its level in mm; of a tool that
+        measures one.
     """
 
     tool: Tool
@@ -61,6 +64,7 @@ class ToolResult:
     findings: tuple[Finding, ...] = ()
     measurement: Measurement | None = None
     profile: Profile | None = None
+    width_ends: tuple[float, float, float] | None = None
 
     @property
     def verdict(self) -> str:

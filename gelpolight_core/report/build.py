@@ -17,7 +17,7 @@ from gelpolight_core.causes import with_one_cause
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.report import drawings, tables
-from gelpolight_core.report.document import Listing, Parts, Report, Section, Validation
+from gelpolight_core.report.document import Listing, Parts, Report, Section, Validated
 from gelpolight_core.report.drawing import Map
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.sensor_calibration import Calibration, OpenSensor
@@ -29,14 +29,14 @@ MOST_NUMBERS = 100
 """Of an array in the attached data: more than of any array but maps and curves."""
 
 
-def calibration_report(calibration: Calibration, *, validation: Validation | None = None) -> Report:
+def calibration_report(calibration: Calibration, *, validation: Validated | None = None) -> Report:
     """Return the report of a calibration file, without the parts that need the images.
 
     Parameters
     ----------
     calibration : Calibration
         Read from its file.
-    validation : Validation, optional
+    validation : Validated, optional
         Results on objects of known size; by default those of its file.
     """
     return _assemble(calibration, None, validation)
@@ -45,7 +45,7 @@ def calibration_report(calibration: Calibration, *, validation: Validation | Non
 def run_report(
     run: Run,
     *,
-    validation: Validation | None = None,
+    validation: Validated | None = None,
 ) -> Report:
     """Return the report of a run: every stage with its images.
 
@@ -53,7 +53,7 @@ def run_report(
     ----------
     run : Run
         A calibration with the results of every stage.
-    validation : Validation, optional
+    validation : Validated, optional
         Results on objects of known size; by default those that the calibration holds.
 
     Raises
@@ -143,7 +143,7 @@ def _named(session: Session, stage: str) -> Mapping[str, Map]:
     return {image.name: image.rgb for image in session.images(stage)}
 
 
-def _assemble(c: Calibration, run: Run | None, validation: Validation | None) -> Report:
+def _assemble(c: Calibration, run: Run | None, validation: Validated | None) -> Report:
     recipe, facts = recipe_named(c.model), stage_facts(c)
     parts: dict[str, Parts] = {}
     for stage in recipe.stages:
@@ -187,12 +187,12 @@ def _numbers(c: Calibration) -> dict[str, Any]:
     return {key: value for key, value in manifest.items() if key != "quality"} | few
 
 
-def _stated(c: Calibration) -> Validation:
+def _stated(c: Calibration) -> Validated:
     if c.validation is not None:
         verdict = Verdict.PASS if c.validation.passed else Verdict.FAIL
-        return Validation("; ".join(c.validation.lines()), verdict, data=c.validation.as_json())
+        return Validated("; ".join(c.validation.lines()), verdict, data=c.validation.as_json())
     sentence = tr(
         "Not validated: no object of known size was measured with this calibration. A wrong ball "
         "diameter, square size or scale makes every result wrong, and no image can show this"
     )
-    return Validation(sentence, Verdict.WARN)
+    return Validated(sentence, Verdict.WARN)

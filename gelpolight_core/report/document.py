@@ -105,7 +105,7 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
-class Validation:
+class Validated:
     """What is known of the result on objects of known size.
 
     Attributes
@@ -142,7 +142,7 @@ class Report:
         The most likely cause of what is not within its limits, as a sentence without a full stop.
     facts : tuple of (label, value)
         Sensor and provenance.
-    validation : Validation or None
+    validation : Validated or None
         Results on objects of known size.
     listings : tuple of Listing
         Long tables at the end.
@@ -157,7 +157,7 @@ class Report:
     sections: tuple[Section, ...]
     cause: str = ""
     facts: Facts = ()
-    validation: Validation | None = None
+    validation: Validated | None = None
     listings: tuple[Listing, ...] = ()
     created: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)

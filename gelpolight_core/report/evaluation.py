@@ -27,7 +27,7 @@ from gelpolight_core.report.document import (
     Listing,
     Report,
     Section,
-    Validation,
+    Validated,
     listing,
     text_lines,
 )
@@ -91,14 +91,14 @@ def evaluation_document(
         title=tr("Evaluation on objects of known size"),
         verdict=errors.verdict,
         facts=facts,
-        validation=Validation(evaluation_sentence(evaluation), errors.verdict),
+        validation=Validated(evaluation_sentence(evaluation), errors.verdict),
         sections=tuple(sections),
         listings=(known_objects(evaluation, tr("Every press")),),
         data={"evaluation": evaluation_json(evaluation)},
     )
 
 
-def validation_of(evaluation: Evaluation) -> Validation:
+def validation_of(evaluation: Evaluation) -> Validated:
     """Return the validation of a calibration from an evaluation on presses of known size.
 
     Parameters
@@ -111,7 +111,7 @@ def validation_of(evaluation: Evaluation) -> Validation:
         verdict, word = Verdict.WARN, tr("Not validated")
     elif verdict is Verdict.FAIL:
         word = tr("Validation failed")
-    return Validation(
+    return Validated(
         f"{word}: {evaluation_sentence(evaluation)}",
         verdict,
         known_objects(evaluation, tr("Objects of known size")),

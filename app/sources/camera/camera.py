@@ -248,9 +248,7 @@ class Camera:
         wanted = self.wanted
         device = find_device(self._driver.devices(), self.device.identity, self._is_same)
         if device is None:
-            raise CameraGone(
-                tr("the camera is not plugged in"), where=self.device.name, advice=Remedy.PLUG_IN
-            )
+            raise CameraGone(tr("the camera is not plugged in"), self.device.name, Remedy.PLUG_IN)
         offered = self._driver.formats(device)
         asked = format_of(wanted) or best_format(offered)
         if end.is_set():
@@ -354,8 +352,8 @@ class Camera:
     def _silent(self, silent_s: float) -> CameraGone:
         return CameraGone(
             tr("no image has arrived for {s:.0f} seconds").format(s=silent_s),
-            where=self.device.name,
-            advice=Remedy.WAIT,
+            self.device.name,
+            Remedy.WAIT,
         )
 
     def _fault(self, error: Exception) -> CameraGone:
@@ -363,8 +361,8 @@ class Camera:
             tr("an internal error ({kind}) stopped the images; see the log").format(
                 kind=type(error).__name__
             ),
-            where=self.device.name,
-            advice=Remedy.WAIT,
+            self.device.name,
+            Remedy.WAIT,
         )
 
 
@@ -386,8 +384,8 @@ def camera_lock(device: Device) -> FileLock:
             tr("the camera is used by another window of this program ({holder})").format(
                 holder=holder
             ),
-            where=device.name,
-            advice=tr("Select another camera here, or another source in that window"),
+            device.name,
+            tr("Select another camera here, or another source in that window"),
         )
 
     return FileLock(folder / hashlib.sha256(place).hexdigest()[:16], refusal)

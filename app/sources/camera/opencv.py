@@ -82,9 +82,7 @@ class OpenCvDriver:
         if not capture.isOpened():
             if controls is not None:
                 controls.close()
-            raise CameraGone(
-                tr("the camera cannot be opened"), where=device.name, advice=Remedy.CLOSE_PROGRAM
-            )
+            raise CameraGone(tr("the camera cannot be opened"), device.name, Remedy.CLOSE_PROGRAM)
         if wanted is not None:
             _ask_for(capture, wanted)
         return OpenCvCamera(device, capture, controls or Properties(capture, self._interface))
@@ -133,9 +131,7 @@ class OpenCvCamera:
         good, bgr = self._capture.retrieve() if good else (False, None)
         if not good or bgr is None or not bgr.size:
             raise CameraGone(
-                tr("the camera delivers no more images"),
-                where=self._device.name,
-                advice=Remedy.CHECK_CABLE,
+                tr("the camera delivers no more images"), self._device.name, Remedy.CHECK_CABLE
             )
         return _rgb(bgr), came_s
 

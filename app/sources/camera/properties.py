@@ -103,6 +103,6 @@ class Properties:
             label = CONTROLS[key].label() if key in CONTROLS else key
             raise InputError(
                 tr("the camera does not accept {what} {value:g}").format(what=label, value=value),
-                where=tr("Camera"),
-                advice=Remedy.NO_SUCH_SETTING,
+                tr("Camera"),
+                Remedy.NO_SUCH_SETTING,
             )

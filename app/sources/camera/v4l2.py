@@ -24,11 +24,9 @@ from app.sources.camera.v4l2_structures import (
     VIDIOC_ENUM_FRAMEINTERVALS,
     VIDIOC_ENUM_FRAMESIZES,
     VIDIOC_G_CTRL,
-    VIDIOC_QUERYCAP,
     VIDIOC_QUERYCTRL,
     VIDIOC_QUERYMENU,
     VIDIOC_S_CTRL,
-    Capability,
     ControlValue,
     FormatDescription,
     FrameInterval,
@@ -113,12 +111,6 @@ class V4l2:
             os.close(self._file)
             self._file = -1
 
-    def name(self) -> str:
-        """Return the camera's own name."""
-        found = Capability()
-        self._ask(VIDIOC_QUERYCAP, found)
-        return bytes(found.card).decode("utf-8", "replace").strip()
-
     # Formats
 
     def formats(self) -> tuple[Format, ...]:
@@ -182,8 +174,8 @@ class V4l2:
         if query is None:
             raise InputError(
                 tr("the camera has no setting {what}").format(what=_label(key)),
-                where=self.path,
-                advice=Remedy.NO_SUCH_SETTING,
+                self.path,
+                Remedy.NO_SUCH_SETTING,
             )
         number = self._number_of(key, value, query)
         try:
@@ -193,8 +185,8 @@ class V4l2:
                 tr("the camera rejects {what} {value:g} ({why})").format(
                     what=_label(key), value=value, why=error.strerror
                 ),
-                where=self.path,
-                advice=tr("Switch off the camera's automatic settings, and lock again"),
+                self.path,
+                tr("Switch off the camera's automatic settings, and lock again"),
             ) from error
 
     def _control(self, key: str) -> Setting | None:
@@ -278,7 +270,7 @@ def gone(address: str, error: OSError) -> CameraGone:
     elif error.errno in (errno.EACCES, errno.EPERM):
         found = tr("this user has no permission to use the camera")
         advice = tr('Add the user to the group "video", and log in again')
-    return CameraGone(found, where=address, advice=advice)
+    return CameraGone(found, address, advice)
 
 
 def _letters(code: int) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 
-VIDIOC_QUERYCAP = 0x80685600
 VIDIOC_ENUM_FMT = 0xC0405602
 VIDIOC_G_CTRL = 0xC008561B
 VIDIOC_S_CTRL = 0xC008561C
@@ -20,18 +19,6 @@ DISABLED, GRABBED, READ_ONLY, INACTIVE = 0x1, 0x2, 0x4, 0x10
 
 def _words(*names: str) -> tuple[tuple[str, type], ...]:
     return tuple((name, ctypes.c_uint32) for name in names)
-
-
-class Capability(ctypes.Structure):
-    """``struct v4l2_capability``."""
-
-    _fields_ = (
-        ("driver", ctypes.c_char * 16),
-        ("card", ctypes.c_char * 32),
-        ("bus_info", ctypes.c_char * 32),
-        *_words("version", "capabilities", "device_caps"),
-        ("reserved", ctypes.c_uint32 * 3),
-    )
 
 
 class FormatDescription(ctypes.Structure):

@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from app.live.overlay import (
     LEAST_RADIUS_PX,
     Circle,
-    Grip,
-    Handle,
     Marker,
     Overlay,
     drag,
@@ -21,38 +19,38 @@ from app.live.overlay import (
 )
 
 SIZE = (640, 480)
-BALL = Handle("ball", 200.0, 100.0, 40.0)
+BALL = Circle(200.0, 100.0, 40.0, "good", handle="ball")
 OVERLAY = Overlay(
     markers=(
         Marker(10.0, 20.0, "plus", "led0", handle="mirror.0"),
         Marker(30.0, 40.0, "cross", "bad"),
     ),
-    circles=(Circle(200.0, 100.0, 40.0, "good", handle="ball"),),
+    circles=(BALL,),
 )
 
 pixels = st.floats(-2000.0, 2000.0)
 
 
 @pytest.mark.parametrize(
-    ("u", "v", "grip"),
+    ("u", "v", "resizes"),
     [
-        (203.0, 101.0, Grip.CENTRE),
-        (241.0, 100.0, Grip.RADIUS),
-        (200.0, 58.0, Grip.RADIUS),
-        (172.0, 128.0, Grip.RADIUS),
+        (203.0, 101.0, False),
+        (241.0, 100.0, True),
+        (200.0, 58.0, True),
+        (172.0, 128.0, True),
     ],
 )
 def test_a_circle_is_moved_by_its_centre_and_resized_all_along_its_rim(
-    u: float, v: float, grip: Grip
+    u: float, v: float, resizes: bool
 ) -> None:
-    assert find_grip(handles_of(OVERLAY), u, v, reach_px=6.0) == (BALL, grip)
+    assert find_grip(handles_of(OVERLAY), u, v, reach_px=6.0) == (BALL, resizes)
 
 
 @given(pixels, pixels, pixels, pixels)
 def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(
     u: float, v: float, to_u: float, to_v: float
 ) -> None:
-    moved = drag(BALL, Grip.CENTRE, (u, v), (to_u, to_v), SIZE)
+    moved = drag(BALL, False, (u, v), (to_u, to_v), SIZE)
     assert 0.0 <= moved.u <= SIZE[0] - 1
     assert 0.0 <= moved.v <= SIZE[1] - 1
     assert moved.radius_px == BALL.radius_px

@@ -223,7 +223,7 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     assert (first.name, first.value) == ("angle_deg", pytest.approx(45.0))
     assert first.sd is not None and first.sd > 0.0
     assert tool_from_dict(record.settings["tool"]) == work.tool
-    work.remove(work.chosen)
+    work.remove()
 
     # With the keyboard only: choose a tool, place it in the middle, cancel another one.
     page.press_view.palette_.buttons["rectangle"].click()

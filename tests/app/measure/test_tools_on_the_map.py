@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 
 from app.live.grips import Point, grips_of, moved
 from app.measure.figures_text import value_text
-from app.measure.placing import first_points, kinds, make_tool
+from app.measure.placing import KINDS, first_points, make_tool
 from app.measure.steady import SteadyPress
 from app.sources.source import Frame
 from gelpolight_core.measurement.tools import tool_as_dict, tool_from_dict
 from gelpolight_core.reconstruction.height_map import HeightMap
 
-KINDS = st.sampled_from([kind.name for kind in kinds()])
+NAMES = st.sampled_from([kind.name for kind in KINDS])
 PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 
 
-@given(kind=KINDS, middle=PLACES, to=PLACES, data=st.data())
+@given(kind=NAMES, middle=PLACES, to=PLACES, data=st.data())
 def test_a_grip_goes_where_it_is_dragged(
     kind: str, middle: Point, to: Point, data: st.DataObject
 ) -> None:
@@ -35,7 +35,7 @@ def test_a_grip_goes_where_it_is_dragged(
         assert after[grip.name] == pytest.approx(to)
 
 
-@given(kind=KINDS, middle=PLACES)
+@given(kind=NAMES, middle=PLACES)
 def test_every_tool_of_the_palette_is_written_and_read_as_the_command_line_does(
     kind: str, middle: Point
 ) -> None:
@@ -45,9 +45,9 @@ def test_every_tool_of_the_palette_is_written_and_read_as_the_command_line_does(
 
 
 def test_every_tool_has_its_own_key_and_asks_for_all_its_points() -> None:
-    keys = [kind.key for kind in kinds()]
+    keys = [kind.key for kind in KINDS]
     assert len(set(keys)) == len(keys)
-    for kind in kinds():
+    for kind in KINDS:
         assert len(first_points(kind.name, (0.0, 0.0))) == len(kind.asks)
 
 

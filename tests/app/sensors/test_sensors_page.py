@@ -73,8 +73,9 @@ def test_a_first_start_offers_the_first_actions(
     assert "No sensor yet" in words(page)
     buttons = [b.objectName() for b in page.findChildren(QPushButton) if b.isVisible()]
     assert {"sensors.new.button", "sensors.import.button", "sensors.demo.button"} <= set(buttons)
-    with qtbot.waitSignal(context.requests.new_sensor):
-        page.new.trigger()
+    with qtbot.waitSignal(context.requests.begin) as asked:
+        page.offered["new"].trigger()
+    assert asked.args == ["sensor"]
 
 
 def test_an_imported_calibration_is_shown_with_every_stage(
@@ -112,13 +113,13 @@ def test_using_one_that_is_not_validated_warns(
     page: SensorsPage, source: Path, context: AppContext
 ) -> None:
     page.open_path(source)
-    page.use.trigger()
+    page.offered["use"].trigger()
     chosen = page.chosen()
     assert chosen.in_use
     assert context.workspace.in_use == chosen.path
     assert not chosen.validated
     assert context.toasts.shown()[-1].finding.verdict == "warn"
-    assert not page.use.isEnabled()
+    assert not page.offered["use"].isEnabled()
 
 
 def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
@@ -126,7 +127,7 @@ def test_a_failed_calibration_asks_for_a_reason_that_its_report_shows(
 ) -> None:
     path = context.workspace.keep_calibration(scene.failed(scene.calibration()), "made")
     page.refresh()
-    page.use.trigger()
+    page.offered["use"].trigger()
     (question,) = page.findChildren(Question)
     answer = question.findChild(QPushButton, "question.answer0")
     reason = question.findChild(QLineEdit, "question.line")
@@ -161,7 +162,7 @@ def test_a_validated_calibration_is_marked(
     assert "Validated: cylinder 5 mm" in words(page)
     assert "+2.0 %" in words(page)
     count = len(context.toasts.shown())
-    page.use.trigger()
+    page.offered["use"].trigger()
     again = page.chosen()
     assert again.in_use and again.validated
     assert len(context.toasts.shown()) == count
@@ -177,14 +178,14 @@ def test_removing_the_calibration_in_use_asks_first(
     page: SensorsPage, source: Path, context: AppContext
 ) -> None:
     page.open_path(source)
-    page.use.trigger()
-    page.remove.trigger()
+    page.offered["use"].trigger()
+    page.offered["remove"].trigger()
     (question,) = page.findChildren(Question)
     default = [button for button in question.findChildren(QPushButton) if button.isDefault()]
     assert [button.objectName() for button in default] == ["question.cancel"]
     answer(page, "cancel")
     assert page.chosen() is not None
-    page.remove.trigger()
+    page.offered["remove"].trigger()
     answer(page, "answer0")
     assert "No sensor yet" in words(page)
     assert context.workspace.in_use is None
@@ -204,11 +205,11 @@ def test_the_trash_restores_what_was_removed_in_an_earlier_run(
     page: SensorsPage, source: Path, context: AppContext, qtbot: QtBot
 ) -> None:
     page.open_path(source)
-    page.use.trigger()
+    page.offered["use"].trigger()
     path = page.chosen().path
     context.workspace.remove(path)
     page.refresh()
-    page.trash.trigger()
+    page.offered["trash"].trigger()
     trash = page.findChild(TrashDialog)
     row = [trash.table.sorted.index(0, column).data() for column in (0, 1)]
     assert row == [scene.calibration().data.sensor.serial, "made"]
@@ -217,7 +218,7 @@ def test_the_trash_restores_what_was_removed_in_an_earlier_run(
     assert page.chosen().in_use
     assert not context.workspace.removals()
     assert not trash.restore_button.isEnabled()
-    assert not page.trash.isEnabled()
+    assert not page.offered["trash"].isEnabled()
     trash.close()
 
 
@@ -231,8 +232,8 @@ def test_a_broken_file_is_shown_with_its_reason(
     chosen = page.chosen()
     assert chosen.broken
     assert "cannot be read" in words(page)
-    assert not page.use.isEnabled()
-    assert page.remove.isEnabled()
+    assert not page.offered["use"].isEnabled()
+    assert page.offered["remove"].isEnabled()
 
 
 def test_an_old_calibration_is_marked(source: Path) -> None:
@@ -277,10 +278,10 @@ def test_a_report_is_written_in_the_background(
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(place), ""))
     page.open_path(source)
     bar = page.findChild(QProgressBar, "sensors.busy")
-    page.report.trigger()
+    page.offered["report"].trigger()
     assert bar.isVisible()
-    assert not page.report.isEnabled()
-    qtbot.waitUntil(lambda: page.report.isEnabled(), timeout=20000)
+    assert not page.offered["report"].isEnabled()
+    qtbot.waitUntil(lambda: page.offered["report"].isEnabled(), timeout=20000)
     assert not bar.isVisible()
     assert place.stat().st_size > 1000
     assert str(place) in page.findChild(QLabel, "sensors.message").text()
@@ -293,8 +294,8 @@ def test_a_failed_report_is_shown_to_the_user(
     place = tmp_path / "nowhere" / "report.pdf"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(place), ""))
     page.open_path(source)
-    page.report.trigger()
-    qtbot.waitUntil(lambda: page.report.isEnabled(), timeout=20000)
+    page.offered["report"].trigger()
+    qtbot.waitUntil(lambda: page.offered["report"].isEnabled(), timeout=20000)
     assert str(place.parent) in page.findChild(QLabel, "sensors.message").text()
 
 

@@ -481,7 +481,7 @@ def test_the_demo_selects_the_virtual_sensor_once(window: MainWindow) -> None:
     source.changed.connect(lambda: chosen.append(source.info))
     window.begin_demo()
     bench = source.bench
-    window.context.requests.demo.emit()
+    window.context.source.choose_virtual_sensor()
     assert source.bench is bench
     assert [info.kind for info in chosen] == ["virtual"]
     assert chosen[0].open().bench is bench
@@ -492,7 +492,7 @@ def test_the_demo_selects_the_virtual_sensor_once(window: MainWindow) -> None:
 def test_a_new_sensor_is_started_while_the_page_shows_another(window: MainWindow) -> None:
     window.show_page("calibrate")
     window.show_page("sensors")
-    window.context.requests.new_sensor.emit()
+    window.context.requests.begin.emit("sensor")
     assert window.page_name == "calibrate"
     assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
 

@@ -1,0 +1,42 @@
+"""Steps that can be undone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtGui import QUndoCommand
+
+Change = Callable[[], object]
+
+
+class Step(QUndoCommand):
+    """A step of two functions. One that returns False failed, and the step leaves the history.
+
+    Parameters
+    ----------
+    text : str
+        What is done, for the menu.
+    redo, undo : callable
+        Do it, and undo it.
+
+    Attributes
+    ----------
+    worked : bool
+        Whether the last change succeeded.
+    """
+
+    def __init__(self, text: str, redo: Change, undo: Change) -> None:
+        super().__init__(text)
+        self._redo, self._undo, self.worked = redo, undo, True
+
+    def redo(self) -> None:
+        """Do it."""
+        self._run(self._redo)
+
+    def undo(self) -> None:
+        """Undo it."""
+        self._run(self._undo)
+
+    def _run(self, change: Change) -> None:
+        self.worked = change() is not False
+        self.setObsolete(not self.worked)
