@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from datetime import datetime
 from itertools import count
@@ -19,7 +19,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.report.document import MARKS, Report
-from gelpolight_core.report.drawing import FONTS
+from gelpolight_core.report.drawing import FONTS, printable
 from gelpolight_core.translation import current_language, tr
 
 ENDING = ".pdf"
@@ -63,14 +63,18 @@ def write_report(report: Report, path: Path) -> None:
 
 
 def report_pdf(report: Report) -> bytes:
-    """Return the report as a PDF file; the same report gives the same file."""
+    """Return the report as a PDF/A-3b file; the same report gives the same file."""
+    data = report_json(report)
     drawings = [drawing.svg for section in report.sections for drawing in section.drawings]
     pdf: bytes = typst.compile(
         TEMPLATE,
         font_paths=[FONTS],
         ignore_system_fonts=True,
+        pdf_standards="a-3b",
         sys_inputs={
-            "report": json.dumps(report_json(report), indent=1, allow_nan=False),
+            "data": json.dumps(data, indent=1, allow_nan=False),
+            # Such a file must not show a character that its fonts lack.
+            "report": json.dumps(_plain(data, printable)),
             **{f"drawing-{number}": svg for number, svg in enumerate(drawings)},
         },
     )
@@ -139,15 +143,19 @@ def _date(created: str) -> tuple[int, ...] | None:
         return None
 
 
-def _plain(value: Any) -> Any:
-    """Return nested values as those of JSON."""
+def _encodable(text: str) -> str:
+    # Names of files may contain bytes that are not text.
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def _plain(value: Any, text: Callable[[str], str] = _encodable) -> Any:
+    """Return nested values as those of JSON, with all texts changed by a function."""
     if isinstance(value, Mapping):
-        return {_plain(key): _plain(part) for key, part in value.items()}
+        return {_plain(key, text): _plain(part, text) for key, part in value.items()}
     if isinstance(value, tuple | list):
-        return [_plain(part) for part in value]
+        return [_plain(part, text) for part in value]
     if isinstance(value, str):
-        # Names of files may contain bytes that are not text.
-        return value.encode("utf-8", "replace").decode("utf-8")
+        return text(value)
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value

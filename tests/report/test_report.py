@@ -116,6 +116,14 @@ def test_the_pages_are_a4(whole_file: Path) -> None:
     assert "Calibration of sensor" in output
 
 
+def test_a_report_is_an_archive_file_with_its_data(whole_file: Path) -> None:
+    content = whole_file.read_bytes()
+    # ISO 19005-3, its colours and the attached file are declared; typst refuses what breaks them.
+    for mark in (b"pdfaid:part>3<", b"pdfaid:conformance>B<", b"/GTS_PDFA1", b"/AFRelationship"):
+        assert mark in content
+    assert len(content) < 5e6
+
+
 def test_a_german_report_has_the_same_numbers(
     whole_file: Path, virtual_run: Run, tmp_path: Path, german: None
 ) -> None:
