@@ -62,7 +62,7 @@ class HealthWatch:
 
     @property
     def is_free(self) -> bool:
-        """Whether nothing has been pressed for a while, and nothing of a press is left."""
+        """Whether the last frame without a fault shows nothing of a press, for a while."""
         return self._recovery.is_free
 
 

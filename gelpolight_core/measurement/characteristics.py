@@ -35,6 +35,8 @@ LEAST_FLAT, LEAST_OBJECTS, LEAST_EDGES, LEAST_POSITIONS = 3, 3, 3, 4
 """One more than what the value itself needs, so that its scatter is known, too."""
 HALF_RESPONSE = math.pi * math.sqrt(2.0 / math.log(2.0))
 """Period over standard deviation of a Gaussian blur that halves the height of a sine."""
+OTHER_FORM = math.sqrt(12.0) / 0.60336
+"""The same of the mean over a width. The blur of a map has a form between the two."""
 SAME_AS_TWO = float(ndtr(2.0))
 """Share of the values below two standard deviations, which Student's factor keeps."""
 UM = "\N{MICRO SIGN}m"
@@ -99,7 +101,7 @@ def characteristics(
     flat_um : sequence of (rows, columns) float64, optional
         From :func:`flat_maps`.
     """
-    alpha = tr("Amplification coefficient \N{GREEK SMALL LETTER ALPHA}")
+    alpha = tr("Deviation from 1 of the amplification coefficient \N{GREEK SMALL LETTER ALPHA}")
     linearity = tr("Linearity deviation l")
     return (
         *_of_flat(flat_um),
@@ -175,12 +177,12 @@ def _levelled(surface: Array) -> Array:
 def _of_lengths(
     results: Sequence[Press], direction: str, names: tuple[str, str]
 ) -> tuple[Characteristic, Characteristic]:
-    """Return slope and largest deviation of the straight line of measured over true lengths.
+    """Return slope less 1 and largest deviation of the line of measured over true lengths.
 
     One object is one point: its presses share the error of its reference.
     """
     key = {"depth": "z", "planar": "xy"}[direction]
-    slope = partial(Characteristic, f"amplification_{key}", names[0], "")
+    slope = partial(Characteristic, f"amplification_{key}_percent", names[0], "%")
     deviation = partial(Characteristic, f"linearity_deviation_{key}_um", names[1], UM)
     found: dict[Truth, list[float]] = defaultdict(list)
     for press in results:
@@ -202,7 +204,9 @@ def _of_lengths(
     worst = int(np.argmax(np.abs(away_um)))
     k = float(stdtrit(true.size - 2, SAME_AS_TWO))
     return (
-        slope(float(solved[1]), k * 1e-3 * sd_um * math.sqrt(float(covariance[1, 1]))),
+        slope(
+            100.0 * (float(solved[1]) - 1.0), k * 0.1 * sd_um * math.sqrt(float(covariance[1, 1]))
+        ),
         deviation(abs(float(away_um[worst])), k * sd_um * float(free[worst])),
     )
 
@@ -246,5 +250,7 @@ def _period_limit(results: Sequence[Press]) -> Characteristic:
     missing = LEAST_EDGES - len(periods)
     if missing > 0:
         return named(needed=tr("{n} more presses of a cylinder or cuboid").format(n=missing))
-    sd = float(np.std(periods, ddof=1)) / math.sqrt(len(periods))
-    return named(float(np.mean(periods)), 2.0 * sd)
+    period_mm = float(np.mean(periods))
+    scatter_mm = float(np.std(periods, ddof=1)) / math.sqrt(len(periods))
+    form_mm = (OTHER_FORM / HALF_RESPONSE - 1.0) * period_mm / math.sqrt(3.0)
+    return named(period_mm, 2.0 * math.hypot(scatter_mm, form_mm))

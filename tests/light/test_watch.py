@@ -90,3 +90,17 @@ def test_a_flicker_and_a_press_that_was_there_before_are_not_counted() -> None:
     pressed = [1.0] * 10
     assert watched(pressed).presses == 0
     assert watched([0.0, *pressed, 0.2, *pressed]).presses == 1
+
+
+def test_the_membrane_is_free_only_when_nothing_is_pressed_or_left_of_a_press() -> None:
+    rng = np.random.default_rng(1)
+    press = np.zeros((300, 3))
+    press[100:140] = rng.uniform(-0.3, 0.3, (40, 3))
+    watch, free = HealthWatch(), []
+    shares = [0.0] * 30 + [1.0] * 20 + [0.08 * 0.5 ** (n / 15) for n in range(120)]
+    for n, share in enumerate(shares):
+        cells = share * press + rng.normal(0.0, 2e-3, press.shape)
+        watch.update(Health(cells=cells), 0.1 * n)
+        free.append(watch.is_free)
+    assert free[29] and free[-1]
+    assert not any(free[30:52])
