@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGroupBox, QProgressBar, QSizePolicy, QWidget
 
 from app.cameras.control_rows import ControlRows
@@ -21,6 +21,7 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
+from app.widgets.timers import timer
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
@@ -46,8 +47,7 @@ class CameraPanel(QWidget):
         self._test: SteadinessTest | None = None
         self._broken_off = False
         self._result, self._result_of = QualityTable(), tuple[Setting, ...]()
-        self._tick = QTimer(self, interval=200)
-        self._tick.timeout.connect(self._update)
+        self._tick = timer(self, 200, self._update)
         self.formats, self.controls = FormatRows(), ControlRows()
         hbox((self._build_settings(), 1), (self._build_verdicts(), 1), of=self)
         self.formats.chosen.connect(lambda chosen: manager.choose_format(camera, chosen))

@@ -56,9 +56,7 @@ class Calibrate(Command):
         report_failure(run.calibration, self.output)
         say(
             tr("Calibration {id} saved to {path}: {verdict}").format(
-                id=run.calibration.identity,
-                path=self.output,
-                verdict=run.calibration.verdict.value,
+                id=run.calibration.identity, path=self.output, verdict=run.calibration.verdict.value
             )
         )
 

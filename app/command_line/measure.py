@@ -73,11 +73,7 @@ class Measure(ToolArguments):
         return MENDABLE if refused else 0
 
     def _measured(
-        self,
-        image: Path,
-        reconstructor: Reconstructor,
-        tools: Sequence[Tool],
-        truth: Truth | None,
+        self, image: Path, reconstructor: Reconstructor, tools: Sequence[Tool], truth: Truth | None
     ) -> tuple[dict[str, Any], list[str]]:
         """Reconstruct an image, fit the object or apply the tools. Return JSON values and text."""
         heightmap = measurable_depth(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
@@ -29,6 +29,7 @@ from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from app.widgets.units import in_unit
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
@@ -117,8 +118,7 @@ class InspectPage(QWidget):
         self.live_depth.changed.connect(self._advise)
         self.context.requests.preferences_changed.connect(self._show_again)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
-        self._texts = QTimer(self, interval=250)
-        self._texts.timeout.connect(self._show_texts)
+        self._texts = timer(self, 250, self._show_texts)
 
     # Called by the main window
 

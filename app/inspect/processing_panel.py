@@ -129,10 +129,7 @@ class ProcessedLine(QWidget):
         self._text = named(PlainLabel(), "inspect.processed.steps", tr("Steps of the processing"))
         self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         reset = push_button(
-            "inspect.processed.reset",
-            tr("Reset"),
-            on_reset,
-            accessible=tr("Reset the processing"),
+            "inspect.processed.reset", tr("Reset"), on_reset, accessible=tr("Reset the processing")
         )
         hbox((self._text, 1), reset, of=self, margins=(10, 2, 10, 2))
         self.hide()

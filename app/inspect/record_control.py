@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.live.depth import LiveDepth
 from app.sources.recorder import Recorder, RecorderFigures, Room, free_bytes, header_for, room_for
 from app.widgets.actions import make_action
+from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -49,8 +50,7 @@ class RecordControl(QObject):
             owner, "inspect.record", text, self.toggle, keys=("R",), icon_name="record", tip=tip
         )
         self.action.setCheckable(True)
-        self._timer = QTimer(self, interval=300)
-        self._timer.timeout.connect(self._poll)
+        self._timer = timer(self, 300, self._poll)
         depth.live.switched.connect(self._on_switched)
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
@@ -19,6 +19,7 @@ from app.live.zero import ZeroControl
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
 from app.sources.source import SourceInfo
+from app.widgets.timers import timer
 from app.workspace.gel_care import presses_text, read_presses, write_presses
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding
@@ -353,8 +354,7 @@ class PressCounter(QObject):
         self._context = context
         self._seen = 0
         self._new, self._kept = Counter[str](), Counter[str]()
-        self._keep = QTimer(self, singleShot=True, interval=KEEP_MS)
-        self._keep.timeout.connect(self.flush)
+        self._keep = timer(self, KEEP_MS, self.flush, once=True)
         self._reported = False
         context.requests.calibrations_changed.connect(self._read)
         self._read()

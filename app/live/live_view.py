@@ -9,7 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from PySide6.QtCore import QSize, QStandardPaths, Qt, QTimer, Signal
+from PySide6.QtCore import QSize, QStandardPaths, Qt, Signal
 from PySide6.QtGui import QAction, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
@@ -34,6 +34,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_ground
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.translation import tr
@@ -121,10 +122,8 @@ class LiveView(QWidget):
         self.image.zoomed.connect(self._show_zoom)
         self.image.resized.connect(self._place)
         self.image.overlay.handle_moved.connect(self._on_handle_moved)
-        self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=16)
-        self._tick.timeout.connect(self._show_newest_frame)
-        self._nudge_end = QTimer(self, singleShot=True, interval=NUDGE_END_MS)
-        self._nudge_end.timeout.connect(self._end_nudge)
+        self._tick = timer(self, 16, self._show_newest_frame, precise=True)
+        self._nudge_end = timer(self, NUDGE_END_MS, self._end_nudge, once=True)
 
     def _make_tools(self) -> None:
         slots: dict[str, Slot] = {

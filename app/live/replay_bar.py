@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt, QTimer
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QWidget,
-)
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from app.sources.recording import Playback, RecordingSource
 from app.widgets.actions import icon_button, make_action
@@ -15,6 +12,7 @@ from app.widgets.inputs import ComboBox, Slider
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from gelpolight_core.translation import tr
 
 
@@ -68,8 +66,7 @@ class ReplayBar(QWidget):
         self._speed.activated.connect(self._set_speed)
         row.addWidget(self._loop)
         row.addWidget(self._speed)
-        self._timer = QTimer(self, interval=100)
-        self._timer.timeout.connect(self._poll)
+        self._timer = timer(self, 100, self._poll)
         self.hide()
 
     def follow(self, source: object) -> None:

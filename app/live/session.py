@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from app.context.context import AppContext
 from app.sources.mailbox import Mailbox
@@ -15,6 +15,7 @@ from app.sources.processor import Failure, Outcome, Processor
 from app.sources.recording import RecordingSource
 from app.sources.source import Frame, Source
 from app.sources.stream import Stream
+from app.widgets.timers import timer
 from gelpolight_core.translation import tr
 
 
@@ -79,10 +80,8 @@ class LiveSession(QObject):
         self._processor: Processor[Any] = Processor(
             self._inbox, self._function, self._outbox, name=name
         )
-        self._tick = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=8)
-        self._tick.timeout.connect(self._poll)
-        self._status = QTimer(self, interval=500)
-        self._status.timeout.connect(self._update_status)
+        self._tick = timer(self, 8, self._poll, precise=True)
+        self._status = timer(self, 500, self._update_status)
         self._following = (
             context.source.changed.connect(self._on_source),
             context.requests.rest.connect(self.rest),
@@ -259,10 +258,7 @@ class LiveSession(QObject):
         if self.stream is None:
             return
         figures = self.stream.figures()
-        self._context.status.update(
-            rate_hz=figures.rate_hz,
-            lost=figures.dropped,
-        )
+        self._context.status.update(rate_hz=figures.rate_hz, lost=figures.dropped)
         self._set_lost(figures.lost or "")
 
     def _set_lost(self, why: str) -> None:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
@@ -14,13 +13,7 @@ from app.live.live_detection import LiveDetection
 from app.live.live_view import LiveView
 from app.live.overlay import Overlay
 from app.live.session import LiveSession
-from app.measure.press_check import (
-    TOLERANCE_MM,
-    PressCheck,
-    Target,
-    make_target,
-    why_not_bare,
-)
+from app.measure.press_check import TOLERANCE_MM, PressCheck, Target, make_target, why_not_bare
 from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_work import ProtocolWork
 from app.sources.bench import Bench
@@ -28,6 +21,7 @@ from app.sources.processor import Failure
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from gelpolight_core.measurement.characteristics import LEAST_FLAT
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.steadiness import judge_press
@@ -108,8 +102,7 @@ class PressingView(QWidget):
         own = {"bare": self.take_bare, "capture": self.capture, "take_back": self._take_back}
         self.panel = RunPanel({**own, "leave": on_leave, "evaluate": on_result})
         hbox((self.image, 1), self.panel, of=self, margins=0, spacing=0)
-        self._tick = QTimer(self, interval=HAND_MS)
-        self._tick.timeout.connect(self._move_hand)
+        self._tick = timer(self, HAND_MS, self._move_hand)
         self.panel.bench.toggled.connect(lambda on: self._tick.start() if on else self._tick.stop())
         self.live.processed.connect(self._on_detected)
         self.live.switched.connect(self._on_switched)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.live.grips import grips_of, moved
 from app.measure.measuring import Answer, ImageResults, MeasuredImage, MeasureRequest, Measuring
 from app.measure.placing import kind_label
 from app.services.newest_wins import Finished, NewestWins
+from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools import Ball, Cuboid, Cylinder, Tool, ToolResult
@@ -69,8 +70,7 @@ class Work(QObject):
         self._detected = 0
         self.busy = False
         self._worker: NewestWins[MeasureRequest | None, ImageResults | None] | None = None
-        self._timer = QTimer(self, interval=POLL_MS)
-        self._timer.timeout.connect(self._poll)
+        self._timer = timer(self, POLL_MS, self._poll)
 
     # State
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from app.sources.stopping import join
+from app.widgets.timers import timer
 from gelpolight_core.calibration.project import Cancelled
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -93,8 +94,7 @@ class Jobs(QObject):
         self._thread: threading.Thread | None = None
         self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._waiting: deque[Job] = deque()
-        self._timer = QTimer(self, interval=50)
-        self._timer.timeout.connect(self._poll)
+        self._timer = timer(self, 50, self._poll)
         self._progress = ("", 0.0)
 
     @property

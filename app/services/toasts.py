@@ -9,13 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import (
-    QSizePolicy,
-    QToolButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
 
 from app.theme import theme
 from app.theme.icons import icon
@@ -24,6 +20,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.native import give_own_window, native_windows
+from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
@@ -40,11 +37,7 @@ ICONS = {
     Verdict.WARN: ("warn", "warn"),
     Verdict.FAIL: ("fail", "fail"),
 }
-LEVELS = {
-    Verdict.PASS: logging.INFO,
-    Verdict.WARN: logging.WARNING,
-    Verdict.FAIL: logging.ERROR,
-}
+LEVELS = {Verdict.PASS: logging.INFO, Verdict.WARN: logging.WARNING, Verdict.FAIL: logging.ERROR}
 WORDS = {Verdict.PASS: tr("Note"), Verdict.WARN: tr("Warning"), Verdict.FAIL: tr("Error")}
 
 
@@ -93,8 +86,7 @@ class Toast(QWidget):
                 button.clicked.connect(self.dismiss)
                 row.addWidget(button)
             self._column.addLayout(row)
-        self._timer = QTimer(self, singleShot=True)
-        self._timer.timeout.connect(self.dismiss)
+        self._timer = timer(self, 0, self.dismiss, once=True)
         self._restart()
 
     def height_for(self, width: int) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from PySide6.QtCore import QTimer, QUrl
+from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices, QFontDatabase, QGuiApplication, QHideEvent, QShowEvent
 from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
@@ -15,6 +15,7 @@ from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from gelpolight_core.translation import tr
 
 
@@ -53,8 +54,7 @@ class LogWindow(Dialog):
             tip=str(log.folder),
         )
         self.fill(hbox(PlainLabel(tr("Show")), self._levels, None, copy, folder), (self._text, 1))
-        self._timer = QTimer(self, interval=250)
-        self._timer.timeout.connect(self._show_new)
+        self._timer = timer(self, 250, self._show_new)
 
     def copy(self) -> None:
         """Copy the shown records to the clipboard."""

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QSize, Qt, QTimer, QUrl
+from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -47,6 +47,7 @@ from app.theme import theme
 from app.widgets.actions import make_action
 from app.widgets.layout import vbox
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from app.widgets.units import use_length_unit
 from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError, Remedy
@@ -109,8 +110,7 @@ class MainWindow(QMainWindow):
         requests.calibrations_changed.connect(self._show_in_use)
         context.source.changed.connect(self._remember_source)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
-        self._tidy = QTimer(self, singleShot=True)
-        self._tidy.timeout.connect(self._give_back)
+        self._tidy = timer(self, 0, self._give_back, once=True)
         self._restore_layout()
 
     def _build_navigation(self) -> dict[str, QAction]:

@@ -36,10 +36,7 @@ ITEMS = {
 """The label of each object that can be on the sensor."""
 
 FAULTS = {
-    "camera_stops": (
-        tr("Camera failure"),
-        tr("No more images arrive, as with an unplugged cable"),
-    ),
+    "camera_stops": (tr("Camera failure"), tr("No more images arrive, as with an unplugged cable")),
     "room_light": (tr("Room light on"), tr("Light from outside falls into the sensor")),
     "membrane_on": (tr("Membrane mounted"), tr("The membrane hides the mirror")),
     "too_bright": (tr("Overexposed"), tr("Three times too much light")),

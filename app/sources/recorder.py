@@ -90,12 +90,7 @@ class Recorder:
     """
 
     def __init__(
-        self,
-        stream: Stream,
-        path: Path,
-        header: RecordingHeader,
-        *,
-        queue_bytes: int = QUEUE_BYTES,
+        self, stream: Stream, path: Path, header: RecordingHeader, *, queue_bytes: int = QUEUE_BYTES
     ) -> None:
         self.path = path
         self.stream, self._header, self._queue_bytes = stream, header, queue_bytes

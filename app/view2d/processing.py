@@ -90,23 +90,10 @@ class Processing:
     level: str = choice("none", tr("Levelling"), LEVELS, ABOUT_LEVEL)
     filter: str = choice("none", tr("Filter"), FILTERS, ABOUT_FILTER)
     sigma_mm: float = number(
-        0.1,
-        tr("Sigma"),
-        0.01,
-        2.0,
-        tr(" mm"),
-        2,
-        step=0.05,
-        when=lambda p: p.filter == "gaussian",
+        0.1, tr("Sigma"), 0.01, 2.0, tr(" mm"), 2, step=0.05, when=lambda p: p.filter == "gaussian"
     )
     nodes: int = number(
-        3,
-        tr("Size"),
-        3,
-        LARGEST_MEDIAN,
-        tr(" points"),
-        step=2,
-        when=lambda p: p.filter == "median",
+        3, tr("Size"), 3, LARGEST_MEDIAN, tr(" points"), step=2, when=lambda p: p.filter == "median"
     )
     reference: Reference | None = None
     rectangle: Rectangle | None = None

@@ -54,10 +54,7 @@ def uncertainty_scale(sd_um: Map) -> ColourScale:
     """Return the scale of standard deviations in um. One pixel in a hundred is above it."""
     top = float(np.percentile(sd_um, 99.0)) if sd_um.size else LEAST_SD_UM
     return ColourScale(
-        tr("1 sd [um]"),
-        colour_table("inferno"),
-        0.0,
-        round_up(max(round(top, 4), LEAST_SD_UM)),
+        tr("1 sd [um]"), colour_table("inferno"), 0.0, round_up(max(round(top, 4), LEAST_SD_UM))
     )
 
 

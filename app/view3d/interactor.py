@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, QLoggingCategory, QPoint, QPointF, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QLoggingCategory, QPoint, QPointF, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import QGestureEvent, QPinchGesture, QWidget
 from pyvistaqt import QtInteractor
@@ -26,6 +26,7 @@ from app.view3d.style import Ink, Style
 from app.view3d.surface import Surface
 from app.widgets.keys import ARROWS, ZOOMS
 from app.widgets.naming import named
+from app.widgets.timers import timer
 from gelpolight_core.translation import tr
 
 KEY_DEG = 6.0
@@ -99,8 +100,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self.scene = Scene(self)
         self._orientation = self._add_orientation()
         self._plane: object | None = None
-        self._settle = QTimer(self, singleShot=True, interval=250)
-        self._settle.timeout.connect(self._refine)
+        self._settle = timer(self, 250, self._refine, once=True)
         self._follow_theme()
 
     # Called by the panel

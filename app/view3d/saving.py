@@ -192,12 +192,7 @@ class MovieChoice:
     height_px: int = number(600, tr("Height"), 64, LARGEST_MOVIE_PX, tr(" px"))
     rate_hz: float = number(15.0, tr("Frames per second"), 1.0, 60.0)
     seconds: float = number(
-        8.0,
-        tr("Duration of one turn"),
-        1.0,
-        120.0,
-        tr(" s"),
-        when=lambda c: c.what == "turntable",
+        8.0, tr("Duration of one turn"), 1.0, 120.0, tr(" s"), when=lambda c: c.what == "turntable"
     )
 
 

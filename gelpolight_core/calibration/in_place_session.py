@@ -293,8 +293,12 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     fail=60.0,
                     remedy=tr("Check the background and the images that are named"),
                 ),
-                judge("steepest_slope_deg", tr("Steepest slope of the balls"),
-                      float(np.degrees(np.arctan(result.model.steepest))), "deg"),
+                judge(
+                    "steepest_slope_deg",
+                    tr("Steepest slope of the balls"),
+                    float(np.degrees(np.arctan(result.model.steepest))),
+                    "deg",
+                ),
             )
         ),
         "in_place": QualityTable(
@@ -329,7 +333,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                 *_learning_figures(result, more),
             )
         ),
-    }  # fmt: skip
+    }
 
 
 def _learning_figures(result: InPlaceResult, more: str) -> tuple[Finding, ...]:

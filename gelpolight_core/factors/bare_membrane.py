@@ -85,13 +85,15 @@ def check_bare_membrane(
                 advice=Remedy.WITH_MEMBRANE,
             )
         pressed = _find_pressed(small, white, area)
+    full, touched = saturated_percent(image, area), 100.0 * _share(pressed, area)
+    shorter = tr("Shorten the exposure so that nothing is saturated")
+    clean = tr("Remove anything that touches the membrane, and wipe it clean")
+    words = tr("Area that seems to be pressed")
     figures = (
         brightness_figure(small, area),
-        judge("saturated", tr("Saturated share"), saturated_percent(image, area), "%",
-              warn=1.0, fail=20.0, remedy=tr("Shorten the exposure so that nothing is saturated")),
-        judge("pressed", tr("Area that seems to be pressed"), 100.0 * _share(pressed, area), "%",
-              fail=0.0, remedy=tr("Remove anything that touches the membrane, and wipe it clean")),
-    )  # fmt: skip
+        judge("saturated", tr("Saturated share"), full, "%", warn=1.0, fail=20.0, remedy=shorter),
+        judge("pressed", words, touched, "%", fail=0.0, remedy=clean),
+    )
     return BareMembrane(pressed, QualityTable(figures))
 
 

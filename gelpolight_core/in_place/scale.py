@@ -250,13 +250,13 @@ def _pins(image: Map, background: Map, blur: float) -> Array:
     rows, columns = rows[strong], columns[strong]
     return np.stack(
         [
-            columns + _offset(smooth[rows, columns - 1], smooth[rows, columns],
-                              smooth[rows, columns + 1]),
-            rows + _offset(smooth[rows - 1, columns], smooth[rows, columns],
-                           smooth[rows + 1, columns]),
+            columns
+            + _offset(smooth[rows, columns - 1], smooth[rows, columns], smooth[rows, columns + 1]),
+            rows
+            + _offset(smooth[rows - 1, columns], smooth[rows, columns], smooth[rows + 1, columns]),
         ],
         axis=1,
-    )  # fmt: skip
+    )
 
 
 def _offset(before: Map, at: Map, after: Map) -> Array:

@@ -288,10 +288,9 @@ class HealthCheck:
 
     def _common(self, raw: NDArray[Any], light: Map) -> CommonChange:
         s = self.samples
-        compare_samples(
-            raw, light, np.float32(SATURATED), s.corner, s.part, s.run_cell, s.expected,
-            s.effects, s.weight, self._change, self._square, self._full, self._run_change,
-        )  # fmt: skip
+        known = s.corner, s.part, s.run_cell, s.expected, s.effects, s.weight
+        sums = self._change, self._square, self._full, self._run_change
+        compare_samples(raw, light, np.float32(SATURATED), *known, *sums)
         return common_change(s, self._change, self._square, self._full)
 
     def _bad_pixels(self, raw: NDArray[Any], light: Map, whole: bool) -> list[Finding]:

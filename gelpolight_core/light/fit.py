@@ -102,17 +102,13 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
         kept = usable & (worst < max(FIRST, float(np.quantile(worst[usable], LEAST_START))))
     sd, left = np.full(PARAMETERS, np.inf), np.zeros((usable.size, 3))
     alone, alone_sd = np.zeros(WITHOUT_OFFSETS.size), np.full(WITHOUT_OFFSETS.size, np.inf)
-    _rounds(
-        samples.normal, samples.count, samples.beside, change, square, usable,
-        TOLERANCES, PRECISION, bool(small), values, sd, alone, alone_sd, kept, left,
-    )  # fmt: skip
+    given = samples.normal, samples.count, samples.beside, change, square, usable
+    found = values, sd, alone, alone_sd
+    _rounds(*given, TOLERANCES, PRECISION, bool(small), *found, kept, left)
     before = _as_before(samples, light, light - left) if small else None
     if before is not None:
         kept = before
-        _rounds(
-            samples.normal, samples.count, samples.beside, change, square, usable,
-            TOLERANCES[-1:], PRECISION, True, values, sd, alone, alone_sd, kept, left,
-        )  # fmt: skip
+        _rounds(*given, TOLERANCES[-1:], PRECISION, True, *found, kept, left)
     elif not small and kept.mean() < LEAST_START:
         kept[:] = False
     return CommonChange(values, sd, kept, left, alone[:3], alone_sd[:3])

@@ -48,16 +48,14 @@ def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float,
     """
     cells, runs = samples.count.size, samples.run_cell.size
     change, square, full = np.zeros((cells, PARAMETERS)), np.zeros(cells), np.zeros(cells)
-    run_change = np.zeros((3, runs))
+    known = samples.part, samples.run_cell, samples.expected, samples.effects, samples.weight
+    sums = change, square, full, np.zeros((3, runs))
     most = np.array(raw.shape[:2], np.int32) - 2
 
     def off(u: int, v: int) -> float:
         """Return the difference between image and background after a shift."""
         corner = np.clip(samples.corner + np.array([v, u], np.int32), 0, most)
-        compare_samples(
-            raw, light, np.float32(SATURATED), corner, samples.part, samples.run_cell,
-            samples.expected, samples.effects, samples.weight, change, square, full, run_change,
-        )  # fmt: skip
+        compare_samples(raw, light, np.float32(SATURATED), corner, *known, *sums)
         # Independent of pressed objects: the majority of cells decides.
         return float(np.median(square / samples.count))
 

@@ -134,10 +134,8 @@ def samples_of(calibration: SensorModel) -> Samples:
     used, lattice = np.unique(cell, return_inverse=True)
     u, v = table.u_px[rows, columns], table.v_px[rows, columns]
     camera = calibration.camera
-    corner = np.stack(
-        [np.clip(v.astype(np.int32), 0, camera.height - 2),
-         np.clip(u.astype(np.int32), 0, camera.width - 2)], axis=-1
-    )  # fmt: skip
+    down = np.clip(v.astype(np.int32), 0, camera.height - 2)
+    corner = np.stack([down, np.clip(u.astype(np.int32), 0, camera.width - 2)], axis=-1)
     of_sample = np.repeat(lattice.astype(np.int32), RUN)
     across = core.shape[1] // _cell_nodes(table) + 1
     count = np.bincount(of_sample, minlength=used.size).astype(np.float64)
@@ -277,9 +275,20 @@ def _normal(plain: Array, weight: Map, cell: Index, cells: int) -> Array:
 
 @numba.njit(nogil=True, fastmath=True, cache=True)
 def compare_samples(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    raw, light, limit, corner, part, run_cell, expected, effects, weight,
-    change, square, full, run_change,
-):  # fmt: skip
+    raw,
+    light,
+    limit,
+    corner,
+    part,
+    run_cell,
+    expected,
+    effects,
+    weight,
+    change,
+    square,
+    full,
+    run_change,
+):
     """Sum up a frame less what is expected, in one pass.
 
     Parameters

@@ -66,11 +66,9 @@ class Pit:
         few = nodes.thinned(ERROR_NODES)
         margin = _margin(few, self.rectangle)
         x, y, depth = (
-            np.concatenate([part[margin], whole[core]])
-            for part, whole in (
-                (few.x_mm, nodes.x_mm), (few.y_mm, nodes.y_mm), (few.depth_mm, nodes.depth_mm)
-            )
-        )  # fmt: skip
+            np.concatenate([getattr(few, name)[margin], getattr(nodes, name)[core]])
+            for name in ("x_mm", "y_mm", "depth_mm")
+        )
         count = int(margin.sum())
         beside = np.arange(x.size) < count
 

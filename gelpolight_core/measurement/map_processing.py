@@ -255,10 +255,9 @@ def _on_grid(
         return np.asarray(values, np.float32)
     column, row = (((own - float(its[0])) / other.pitch_mm).astype(np.float32) for own, its in axes)
     columns, rows = np.meshgrid(column, row)
-    found = cv2.remap(
-        values.astype(np.float32), columns, rows, cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"),
-    )  # fmt: skip
+    linear, edge, beyond = cv2.INTER_LINEAR, cv2.BORDER_CONSTANT, float("nan")
+    given = values.astype(np.float32)
+    found = cv2.remap(given, columns, rows, linear, borderMode=edge, borderValue=beyond)
     return np.asarray(found, np.float32)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,17 +107,24 @@ def fit_figures(
     focal = max(100.0 * sd[0] / camera.fx, 100.0 * sd[1] / camera.fy)
     centre = float(np.hypot(sd[2], sd[3]))
     steady = tr("Use a flat board, hold it still, and focus; check the views with large errors")
+    again, width = more_views_advice(), camera.width
+    middle, length = tr("Uncertainty of the principal point"), tr("Uncertainty of the focal length")
+    px, other = partial(judge, unit="px"), tr("Error on held-out views")
+    most = 100.0 * MAX_FOCAL_SD
     return (
         # A good print is accurate to 0.1 px; half a pixel at the edge is 0.05 mm on the membrane.
-        judge("reprojection_rms", tr("Reprojection error"), fit.rms_px, "px",
-              warn=0.3, fail=1.0, remedy=steady),
-        judge("held_out_rms", tr("Error on held-out views"), held_out_rms, "px",
-              warn=0.4, fail=1.5, remedy=more_views_advice()),
-        judge("focal_sd", tr("Uncertainty of the focal length"), float(focal), "%",
-              warn=0.1, fail=100.0 * MAX_FOCAL_SD, remedy=more_views_advice()),
-        judge("centre_sd", tr("Uncertainty of the principal point"), centre, "px",
-              warn=camera.width / 500.0, fail=camera.width / 50.0, remedy=more_views_advice()),
-    )  # fmt: skip
+        px(
+            "reprojection_rms",
+            tr("Reprojection error"),
+            fit.rms_px,
+            warn=0.3,
+            fail=1.0,
+            remedy=steady,
+        ),
+        px("held_out_rms", other, held_out_rms, warn=0.4, fail=1.5, remedy=again),
+        judge("focal_sd", length, float(focal), "%", warn=0.1, fail=most, remedy=again),
+        px("centre_sd", middle, centre, warn=width / 500.0, fail=width / 50.0, remedy=again),
+    )
 
 
 def view_figures(
@@ -140,16 +148,16 @@ def view_figures(
         if not view.used
     ]
     edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
+    more, tilt = partial(judge, higher_is_better=True), MIN_NORMAL_SPREAD_DEG
+    tilted = tr("Tilt the board more and in different directions")
+    corners = tr("Also show the board in the corners of the image")
+    words, covered = tr("Variation of the board tilt"), tr("Image area covered by corners")
+    again = more_views_advice()
     return (
-        judge("views_used", tr("Views used"), used,
-              warn=8, fail=MIN_VIEWS, higher_is_better=True, remedy=more_views_advice()),
+        more("views_used", tr("Views used"), used, warn=8, fail=MIN_VIEWS, remedy=again),
         judge_left_out("views_left_out", tr("Views left out"), refused),
-        judge("normal_spread", tr("Variation of the board tilt"), spread_deg, "deg",
-              warn=10.0, fail=MIN_NORMAL_SPREAD_DEG, higher_is_better=True,
-              remedy=tr("Tilt the board more and in different directions")),
+        more("normal_spread", words, spread_deg, "deg", warn=10.0, fail=tilt, remedy=tilted),
         # Without corners, the distortion is a guess.
-        judge("coverage", tr("Image area covered by corners"), 100.0 * coverage, "%",
-              warn=60.0, fail=25.0, higher_is_better=True,
-              remedy=tr("Also show the board in the corners of the image")),
+        more("coverage", covered, 100.0 * coverage, "%", warn=60.0, fail=25.0, remedy=corners),
         judge("edge_width", tr("Edge width of the squares"), float(np.median(edges)), "px"),
-    )  # fmt: skip
+    )

@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 
@@ -319,16 +320,16 @@ def _plane_figures(
     plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
 ) -> tuple[Finding, ...]:
     more = tr("Capture several sharp views of a flat board that fills the top surface")
+    unsure, flat = partial(judge, warn=0.1, fail=1.0, remedy=more), tr("Tilt of the top surface")
+    press = tr("Press the board flat onto the surface; check how the camera is mounted")
+    sd_percent = 100.0 * distance_sd_mm / plane.distance_mm
     return (
         judge("distance", tr("Distance of the top surface"), plane.distance_mm, "mm"),
-        judge("distance_sd", tr("Uncertainty of the distance"),
-              100.0 * distance_sd_mm / plane.distance_mm, "%", warn=0.1, fail=1.0, remedy=more),
+        unsure("distance_sd", tr("Uncertainty of the distance"), sd_percent, "%"),
         # A tilt error of one degree moves a mirrored LED by 1 mm (see "lights from mirror spots").
-        judge("normal_sd", tr("Uncertainty of the normal"), normal_sd_deg, "deg",
-              warn=0.1, fail=1.0, remedy=more),
-        judge("tilt", tr("Tilt of the top surface"), tilt_deg, "deg", warn=5.0, fail=20.0,
-              remedy=tr("Press the board flat onto the surface; check how the camera is mounted")),
-    )  # fmt: skip
+        unsure("normal_sd", tr("Uncertainty of the normal"), normal_sd_deg, "deg"),
+        judge("tilt", flat, tilt_deg, "deg", warn=5.0, fail=20.0, remedy=press),
+    )
 
 
 def _view_figures(
@@ -361,11 +362,11 @@ def _view_figures(
         judge_left_out("views_left_out", tr("Views left out"), refused),
     ]
     if decision is not Decision.SINGLE:
-        figures.append(
-            judge("mirrored_margin", tr("Certainty against the mirrored pose"),
-                  math.sqrt(max(margin, 0.0)), "sd", warn=math.sqrt(SURE_MARGIN),
-                  higher_is_better=True,
-                  remedy=tr("Two mirrored poses fit the views equally well; the one with the "
-                            "smaller tilt was chosen. To be sure, use a larger or sharper board"))
-        )  # fmt: skip
+        remedy = tr(
+            "Two mirrored poses fit the views equally well; the one with the smaller tilt was "
+            "chosen. To be sure, use a larger or sharper board"
+        )
+        words, sure = tr("Certainty against the mirrored pose"), math.sqrt(max(margin, 0.0))
+        least, more = math.sqrt(SURE_MARGIN), partial(judge, higher_is_better=True)
+        figures.append(more("mirrored_margin", words, sure, "sd", warn=least, remedy=remedy))
     return tuple(figures)

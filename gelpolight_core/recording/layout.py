@@ -171,9 +171,13 @@ def pack_frame(
     for strip in strips:
         offsets.append(offsets[-1] + padded(len(strip)))
     mark = FrameMark(
-        number, time_s, offsets[-1] - offset, *shape, bits,
+        number,
+        time_s,
+        offsets[-1] - offset,
+        *shape,
+        bits,
         tuple(Strip(p, len(s), zlib.crc32(s)) for p, s in zip(offsets, strips, strict=False)),
-    )  # fmt: skip
+    )
     directory = _directory(mark, offset, (len(text), text_at))
     blocks = (mark.pack(), directory, text, *strips)
     data = b"".join(block.ljust(padded(len(block)), b"\0") for block in blocks)

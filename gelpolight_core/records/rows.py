@@ -90,26 +90,25 @@ def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRe
     )
 
 
-COLUMNS = (
-    "id", "time_utc", "sensor", "calibration", "shape", "quantity", "value", "sd", "truth",
-    "error", "error_percent", "limit_percent", "verdict", "reason", "operator", "picture", "note",
-    "settings",
-)  # fmt: skip
+_WHICH = "id", "time_utc", "sensor", "calibration", "shape", "quantity"
+_NUMBERS = "value", "sd", "truth", "error", "error_percent", "limit_percent"
+_REMARKS = "verdict", "reason", "operator", "picture", "note", "settings"
+COLUMNS = (*_WHICH, *_NUMBERS, *_REMARKS)
 
 
 def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
     """Return the lines of the table, under :data:`COLUMNS`; None for unknown values."""
-    return [
-        (
-            r.id, r.time.strftime("%Y-%m-%d %H:%M:%S"), _safe(r.serial), _safe(r.calibration_id),
-            _safe(r.shape), _safe(q.name),
-            q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent,
-            _safe(r.verdict), _safe(r.reason), _safe(r.operator), _safe(r.picture), _safe(r.note),
-            json.dumps(dict(r.settings), ensure_ascii=False) if r.settings else "",
-        )
-        for r in records
-        for q in r.quantities
-    ]  # fmt: skip
+    rows = list[tuple[object, ...]]()
+    for r in records:
+        time = r.time.strftime("%Y-%m-%d %H:%M:%S")
+        settings = json.dumps(dict(r.settings), ensure_ascii=False) if r.settings else ""
+        remarks = map(_safe, (r.verdict, r.reason, r.operator, r.picture, r.note))
+        last = (*remarks, settings)
+        for q in r.quantities:
+            which = map(_safe, (r.serial, r.calibration_id, r.shape, q.name))
+            numbers = (getattr(q, name) for name in _NUMBERS)
+            rows.append((r.id, time, *which, *numbers, *last))
+    return rows
 
 
 def _safe(text: str) -> str:

@@ -135,9 +135,13 @@ def solve_drape(
         coarse_x = np.arange(x_mm[0], x_mm[-1] + 2.0 * pitch, 2.0 * pitch)
         coarse_y = np.arange(y_mm[0], y_mm[-1] + 2.0 * pitch, 2.0 * pitch)
         coarse, _ = solve_drape(
-            obstacle, coarse_x, coarse_y,
-            decay_mm=decay_mm, tolerance_mm=4.0 * tolerance_mm, interrupt=interrupt,
-        )  # fmt: skip
+            obstacle,
+            coarse_x,
+            coarse_y,
+            decay_mm=decay_mm,
+            tolerance_mm=4.0 * tolerance_mm,
+            interrupt=interrupt,
+        )
         depth = _between(coarse, y_mm.size, x_mm.size)
     else:
         depth = np.zeros((y_mm.size, x_mm.size))

@@ -262,8 +262,10 @@ def gather(
         d = sample(surface[0], (x - grid[0]) / grid[2], (y - grid[1]) / grid[2])
         length = math.sqrt(1.0 + sx * sx + sy * sy)
         start = (
-            (x, y, d), _normal(surface, grid, x, y), (-sx / length, -sy / length, -1.0 / length)
-        )  # fmt: skip
+            (x, y, d),
+            _normal(surface, grid, x, y),
+            (-sx / length, -sy / length, -1.0 / length),
+        )
         r1, r2, r3 = random_number(state), random_number(state), random_number(state)
         value[:] = 0.0
         for path in range(samples):

@@ -153,9 +153,17 @@ def _blend(table: Any, row: float, column: float) -> float:  # pragma: no cover 
 
 @compiled
 def _pressed(
-    out: Any, chosen: Any, rays: Any, surface: Any, grid: Any, factor: Any, lamps: Any,
-    material: Any, indirect: Any, samples: int,
-) -> None:  # fmt: skip  # pragma: no cover - compiled
+    out: Any,
+    chosen: Any,
+    rays: Any,
+    surface: Any,
+    grid: Any,
+    factor: Any,
+    lamps: Any,
+    material: Any,
+    indirect: Any,
+    samples: int,
+) -> None:  # pragma: no cover - compiled
     depth, slope_x, slope_y, tile_max, tile_min = surface
     x0, y0, pitch, deepest = grid
     factors, factor_x0, factor_pitch, rim = factor
@@ -182,17 +190,22 @@ def _pressed(
             normal = (-gx / length, -gy / length, -1.0 / length)
             length = math.sqrt(1.0 + sx * sx + sy * sy)
             view = (-sx / length, -sy / length, -1.0 / length)
-            rho = sample(factors, (px - factor_x0) / factor_pitch,
-                         (py - factor_x0) / factor_pitch)  # fmt: skip
+            rho = sample(factors, (px - factor_x0) / factor_pitch, (py - factor_x0) / factor_pitch)
             for k in range(lamps.shape[0]):
                 bright = point_brightness((px, py, d), normal, view, lamps[k], material)
                 if bright > 0.0:
                     bright *= lamp_share(depth, tile_max, grid, (px, py, d), lamps[k])
                 value[k] += share * rho * bright
             for k in range(gathered.shape[0]):
-                value[k] += share * rho * sample(
-                    gathered[k], (px - gathered_first) / gathered_pitch,
-                    (py - gathered_first) / gathered_pitch)  # fmt: skip
+                value[k] += (
+                    share
+                    * rho
+                    * sample(
+                        gathered[k],
+                        (px - gathered_first) / gathered_pitch,
+                        (py - gathered_first) / gathered_pitch,
+                    )
+                )
         through = rays[4][i, j]
         for k in range(lamps.shape[0]):
             out[i, j, k] = value[k] * through

@@ -169,9 +169,16 @@ class VirtualSensor:
                 if self.design.membrane.bounces > 0:
                     light = self._flat_membrane(indirect)
                 shade_pressed(
-                    light, self.rays, state.surface, self.factors, self._table, self.material,
-                    indirect, samples=samples, interrupt=interrupt,
-                )  # fmt: skip
+                    light,
+                    self.rays,
+                    state.surface,
+                    self.factors,
+                    self._table,
+                    self.material,
+                    indirect,
+                    samples=samples,
+                    interrupt=interrupt,
+                )
             interrupt()
             light *= self.exposure
         return blurred(mixed(light, photometry.crosstalk), camera.blur_sigma_px)

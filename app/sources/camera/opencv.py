@@ -13,14 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sources.camera.driver import (
-    COMPRESSED,
-    PORT,
-    UNCOMPRESSED,
-    CameraGone,
-    Device,
-    Format,
-)
+from app.sources.camera.driver import COMPRESSED, PORT, UNCOMPRESSED, CameraGone, Device, Format
 from app.sources.camera.properties import Properties
 from app.sources.camera.v4l2 import V4l2
 from app.sources.source import Setting

@@ -9,12 +9,7 @@ from numpy.typing import NDArray
 
 from app.sources.source import Frame
 from gelpolight_core.finding import QualityTable
-from gelpolight_core.session.camera_steadiness import (
-    FRAMES,
-    SPAN_S,
-    band_levels,
-    judge_steadiness,
-)
+from gelpolight_core.session.camera_steadiness import FRAMES, SPAN_S, band_levels, judge_steadiness
 
 
 class SteadinessTest:

@@ -72,11 +72,7 @@ class QueryMenu(ctypes.Structure):
 
     _pack_ = 1
     _layout_ = "ms"
-    _fields_ = (
-        *_words("id", "index"),
-        ("name", ctypes.c_char * 32),
-        *_words("reserved"),
-    )
+    _fields_ = (*_words("id", "index"), ("name", ctypes.c_char * 32), *_words("reserved"))
 
 
 class ControlValue(ctypes.Structure):

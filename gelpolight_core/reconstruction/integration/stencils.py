@@ -56,9 +56,12 @@ def add_along_row(slope, start, weights, left, target):  # type: ignore[no-untyp
         middle = target[left + 2 : left + 2 + inner]
         for k in range(inner):
             middle[k] += (
-                a * slope[k] + b * slope[k + 1] + c * slope[k + 2]
-                + d * slope[k + 3] + e * slope[k + 4]
-            )  # fmt: skip
+                a * slope[k]
+                + b * slope[k + 1]
+                + c * slope[k + 2]
+                + d * slope[k + 3]
+                + e * slope[k + 4]
+            )
 
 
 @_part
