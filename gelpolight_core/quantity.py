@@ -1,9 +1,33 @@
-"""A measured value beside its true value, without the numerical libraries."""
+"""A measured value beside its true value: deviation, uncertainty budget, En and decision.
+
+Every comparison with a reference asks this module: the Measure page, ``gelpolight measure`` and
+``evaluate``, validations, records and reports. It does without the numerical libraries.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gelpolight_core.finding import Finding, Verdict, judge
+from gelpolight_core.labels import label
+from gelpolight_core.translation import tr
+
+COVERAGE = 2.0
+"""Coverage factor k of expanded uncertainties: about 95 % of a normal distribution."""
+PAPER_PERCENT = {"planar": 5.0, "depth": 8.0}
+"""Mean errors that the paper reports for random regions: the default tolerances."""
+TOLERANCE_PERCENT = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"])
+"""Default tolerances of size and height."""
+REST, REFERENCE = "fit", "reference"
+"""Rows of a budget: what the parts leave of the standard deviation, and the reference."""
+DECISIONS = {
+    Verdict.PASS: "conforms",
+    Verdict.WARN: "not decidable",
+    Verdict.FAIL: "does not conform",
+}
+"""The decisions of ISO 14253-1 in files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,11 +41,15 @@ class Quantity:
     value : float
         The measured value.
     sd : float or None
-        Its standard deviation, if known.
+        Its standard uncertainty, if known.
     truth : float or None
         The true value, if known.
     limit_percent : float or None
-        Largest error that passes, in percent of the truth.
+        Tolerance: largest deviation that conforms, in percent of the truth.
+    truth_sd : float or None
+        Standard uncertainty of the true value; None if it is not stated, which counts as 0.
+    parts : tuple of (str, float)
+        Sources of `sd` and their standard uncertainties, as far as they are known.
     """
 
     name: str
@@ -29,10 +57,12 @@ class Quantity:
     sd: float | None = None
     truth: float | None = None
     limit_percent: float | None = None
+    truth_sd: float | None = None
+    parts: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse invalid numbers, and a true value of 0."""
-        given = (self.value, self.sd, self.truth, self.limit_percent)
+        given = (self.value, self.sd, self.truth, self.limit_percent, self.truth_sd)
         if not all(number is None or math.isfinite(number) for number in given):
             raise ValueError(f"{self.name} holds a number that is not finite: {given}")
         if self.truth == 0.0:
@@ -45,20 +75,124 @@ class Quantity:
 
     @property
     def error(self) -> float | None:
-        """Measured minus true, in the quantity's unit."""
+        """The deviation: measured minus true, in the quantity's unit."""
         return None if self.truth is None else self.value - self.truth
 
     @property
     def error_percent(self) -> float | None:
-        """The error in percent of the truth."""
+        """The deviation in percent of the truth."""
         return None if self.truth is None else percent_error(self.value, self.truth)
 
     @property
-    def passed(self) -> bool | None:
-        """Whether the error is within the limit; None without truth or limit."""
-        if self.error_percent is None or self.limit_percent is None:
+    def expanded(self) -> float | None:
+        """Expanded uncertainty of the measured value (k = 2)."""
+        return None if self.sd is None else COVERAGE * self.sd
+
+    @property
+    def truth_expanded(self) -> float | None:
+        """Expanded uncertainty of the true value (k = 2)."""
+        return None if self.truth_sd is None else COVERAGE * self.truth_sd
+
+    @property
+    def budget(self) -> tuple[tuple[str, float], ...]:
+        """The standard uncertainty of the deviation by sources, whose squares add up (GUM 5.1)."""
+        rows = self.parts
+        if self.sd is not None:
+            rest = self.sd**2 - sum(sd**2 for _, sd in rows)
+            rows = (*rows, (REST, math.sqrt(max(rest, 0.0))))
+        return rows if self.truth_sd is None else (*rows, (REFERENCE, self.truth_sd))
+
+    @property
+    def deviation_expanded(self) -> float:
+        """Expanded uncertainty of the deviation: sqrt(U² + Uref²)."""
+        return math.hypot(self.expanded or 0.0, self.truth_expanded or 0.0)
+
+    @property
+    def en(self) -> float | None:
+        """The deviation over its expanded uncertainty, without sign (ISO/IEC 17043, B.3.1)."""
+        if self.error is None or not self.sd:
             return None
-        return abs(self.error_percent) <= self.limit_percent
+        return abs(self.error) / self.deviation_expanded
+
+    @property
+    def finding(self) -> Finding | None:
+        """The decision by the tolerance; None without truth or tolerance."""
+        if self.truth is None or self.error_percent is None or self.limit_percent is None:
+            return None
+        expanded = abs(100.0 * self.deviation_expanded / self.truth)
+        text = tr("Deviation of {name}").format(name=self.name.removesuffix(f"_{self.unit}"))
+        return guarded("deviation", text, abs(self.error_percent), self.limit_percent, expanded)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Conforms ("pass"), not decidable ("warn"), or does not ("fail"); None: not judged."""
+        return None if self.finding is None else self.finding.verdict
+
+    @property
+    def sentence(self) -> str:
+        """The comparison of a length in mm, as one line; empty without truth or tolerance."""
+        if self.verdict is None or self.truth is None:
+            return ""
+        text = tr(
+            "{what}: measured {m:.3f} mm, true {t:.3f} mm, deviation {e:+.2f} % ± {u:.2f} %, "
+            "tolerance {l:g} %: {word}"
+        ).format(
+            what=self.name,
+            m=self.value,
+            t=self.truth,
+            e=self.error_percent,
+            u=100.0 * self.deviation_expanded / self.truth,
+            l=self.limit_percent,
+            word=decision_word(self.verdict),
+        )
+        return text if self.en is None else f"{text}, En {self.en:.2f}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the comparison as plain values; the unit is in the quantity's name."""
+        return {
+            "quantity": self.name,
+            "measured": self.value,
+            "true": self.truth,
+            "deviation": self.error,
+            "deviation_percent": self.error_percent,
+            "expanded": self.expanded,
+            "true_expanded": self.truth_expanded,
+            "deviation_expanded": self.deviation_expanded,
+            "en": self.en,
+            "tolerance_percent": self.limit_percent,
+            "decision": None if self.verdict is None else DECISIONS[self.verdict],
+            "budget": [{"source": source, "sd": sd} for source, sd in self.budget],
+        }
+
+
+def guarded(
+    key: str, text: str, deviation: float, limit: float, expanded: float, *, remedy: str = ""
+) -> Finding:
+    """Judge a deviation in percent by ISO 14253-1.
+
+    Within the tolerance less the uncertainty it conforms ("pass"), beyond the tolerance plus the
+    uncertainty it does not ("fail"), and between the two nothing can be decided ("warn").
+
+    Parameters
+    ----------
+    key, text, remedy : str
+        As in :class:`~gelpolight_core.finding.Finding`.
+    deviation, limit : float
+        The deviation without sign, and the tolerance.
+    expanded : float
+        Expanded uncertainty of the deviation (k = 2).
+    """
+    found = judge(
+        key, text, deviation, "%", warn=limit - expanded, fail=limit + expanded, remedy=remedy
+    )
+    if found.verdict is not Verdict.WARN:
+        return found
+    return replace(found, remedy=tr("The uncertainty is too large to decide"))
+
+
+def decision_word(verdict: Verdict) -> str:
+    """Return the label of a decision."""
+    return label(DECISIONS[verdict])
 
 
 def percent_error(measured: float, true: float) -> float:

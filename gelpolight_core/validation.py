@@ -7,13 +7,14 @@ none.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.reading import brief, parse_time, plain_text, read_own
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.translation import tr
@@ -38,7 +39,7 @@ class Validation:
     indenter : str
         Description of the object for the user.
     comparisons : tuple of Quantity
-        At least one, with its true value and limit; its name, such as ``height``, has no unit.
+        At least one, with its true value and tolerance; its name, such as ``height``, has no unit.
     """
 
     identity: str
@@ -48,9 +49,14 @@ class Validation:
     comparisons: tuple[Quantity, ...]
 
     @property
+    def verdict(self) -> Verdict:
+        """The worst decision on a length."""
+        return decided(self.comparisons)
+
+    @property
     def passed(self) -> bool:
-        """Whether there is at least one length and all are within their limits."""
-        return bool(self.comparisons) and all(c.passed for c in self.comparisons)
+        """Whether all lengths conform."""
+        return self.verdict is Verdict.PASS
 
     @property
     def largest_percent(self) -> float:
@@ -59,25 +65,41 @@ class Validation:
 
     def lines(self) -> list[str]:
         """Return it in words: its verdict, object and origin, then each length."""
-        word = tr("Validated") if self.passed else tr("Validation failed")
+        word = {
+            Verdict.PASS: tr("Validated"),
+            Verdict.WARN: tr("Not validated, the uncertainty is too large"),
+            Verdict.FAIL: tr("Validation failed"),
+        }[self.verdict]
         time = parse_time(self.when)
         day = self.when if time is None else f"{time.astimezone():%Y-%m-%d %H:%M}"
         by = tr("by {name}").format(name=self.who) if self.who else ""
-        line = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
-        return [
-            f"{word}: {self.indenter}, {day} {by}".rstrip(),
-            *(
-                line.format(what=c.name, a=c.value, b=c.truth, e=c.error_percent, l=c.limit_percent)
-                for c in self.comparisons
-            ),
-        ]
+        head = f"{word}: {self.indenter}, {day} {by}".rstrip()
+        return [head, *(quantity.sentence for quantity in self.comparisons)]
 
     def as_json(self) -> dict[str, Any]:
         """Return the validation as plain values."""
-        keys = ("quantity", "measured_mm", "true_mm", "limit_percent")
-        lengths = [(c.name, c.value, c.truth, c.limit_percent) for c in self.comparisons]
-        rows = [dict(zip(keys, length, strict=True)) for length in lengths]
+        rows = [
+            {
+                "quantity": c.name,
+                "measured_mm": c.value,
+                "true_mm": c.truth,
+                "limit_percent": c.limit_percent,
+                "sd_mm": c.sd,
+                "true_sd_mm": c.truth_sd,
+                "parts_mm": dict(c.parts),
+                "en": c.en,
+            }
+            for c in self.comparisons
+        ]
         return {**asdict(self), "comparisons": rows, "passed": self.passed}
+
+
+def decided(comparisons: Sequence[Quantity]) -> Verdict:
+    """Return the worst decision on lengths; it fails where there is none, or one is not judged."""
+    findings = [quantity.finding for quantity in comparisons]
+    known = tuple(finding for finding in findings if finding is not None)
+    whole = bool(known) and len(known) == len(findings)
+    return QualityTable(known).verdict if whole else Verdict.FAIL
 
 
 def validation_path(calibration: Path) -> Path:
@@ -120,8 +142,11 @@ def _parse(content: Any) -> Validation:
             Quantity(
                 plain_text(c["quantity"]),
                 _positive(c["measured_mm"]),
-                truth=_positive(c["true_mm"]),
-                limit_percent=_positive(c["limit_percent"]),
+                _sd(c.get("sd_mm")),
+                _positive(c["true_mm"]),
+                _positive(c["limit_percent"]),
+                _sd(c.get("true_sd_mm")),
+                tuple((plain_text(n), _sd(sd) or 0.0) for n, sd in c.get("parts_mm", {}).items()),
             )
             for c in content["comparisons"]
         ),
@@ -129,6 +154,10 @@ def _parse(content: Any) -> Validation:
     if content["passed"] is not validation.passed:
         raise ValueError("its verdict does not match its lengths")
     return validation
+
+
+def _sd(value: Any) -> float | None:
+    return None if value is None else 0.0 if value == 0 else _positive(value)
 
 
 def _positive(value: Any) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -31,10 +30,11 @@ from app.widgets.layout import vbox
 from app.widgets.meaning import set_property, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import read_entry
+from app.workspace.reference import MM, Reference, optional_length
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Finding
+from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.io.user import user_name
 from gelpolight_core.lab.trend import keep_sample, sample_of_validation
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -42,12 +42,12 @@ from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.trust import judged
-from gelpolight_core.quantity import Quantity
+from gelpolight_core.quantity import COVERAGE, Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
-from gelpolight_core.validation import Validation
+from gelpolight_core.validation import Validation, decided
 
 FRAMES = 4
 TRUTH = "truth.csv"
@@ -56,23 +56,18 @@ SHAPES = {
     "cuboid": tr("Cuboid, flat end"),
     "ball": tr("Ball"),
 }
-MM = tr(" mm")
 
 
-@dataclass(frozen=True)
-class Asked:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked(Reference):
     """The pressed object; a height of 0 is not known."""
 
     shape: str = choice("cylinder", tr("Shape"), SHAPES)
     size_mm: float = number(5.0, tr("True diameter or side"), 0.01, 500.0, MM, 3, step=0.1)
-    height_mm: float = number(
-        0.0, tr("True depth of the press"), 0.0, 500.0, MM, 3, step=0.1, none=tr("not known")
+    height_mm: float = optional_length(tr("True depth of the press"), tr("not known"))
+    edge_radius_mm: float = optional_length(
+        tr("Edge radius"), tr("fitted"), when=lambda asked: asked.shape != "ball"
     )
-
-    @property
-    def known(self) -> Truth:
-        """The object."""
-        return Truth(self.shape, self.size_mm, self.height_mm or math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,29 +92,22 @@ class Trial:
     heightmap: HeightMap
 
     @property
-    def passed(self) -> bool:
-        """Whether all lengths are within their limits."""
-        return all(c.passed for c in self.comparisons)
+    def verdict(self) -> Verdict:
+        """The worst decision on a length."""
+        return decided(self.comparisons)
 
     @property
     def recordable(self) -> bool:
         """Whether it says something: a failed trial does, but nothing doubtful validates."""
-        return self.measurement.verdict == "ok" or not self.passed
+        return self.measurement.verdict == "ok" or self.verdict is Verdict.FAIL
 
     def shown(self) -> tuple[str, str]:
         """Return the result as text, and its role."""
-        text = tr(
-            "{what}: measured {m:.3f} mm, true {t:.3f} mm, error {e:+.2f} %, {word} ±{limit:g} %"
-        )
-        rows = [
-            text.format(
-                what=c.name.capitalize(), m=c.value, t=c.truth, e=c.error_percent,
-                word=tr("within") if c.passed else tr("beyond"), limit=c.limit_percent,
-            )
-            for c in self.comparisons
-        ]  # fmt: skip
+        lines = [quantity.sentence for quantity in self.comparisons]
+        rows = [line[:1].upper() + line[1:] for line in lines]
+        rows += [finding.line for finding in self.known.findings()]
         if self.measurement.verdict == "ok":
-            return "\n".join(rows), "pass" if self.passed else "fail"
+            return "\n".join(rows), self.verdict.value
         rows.append(tr("Low confidence: {reason}").format(reason=self.measurement.reason))
         if not self.recordable:
             rows.append(tr("It cannot be recorded. Correct this, then press again."))
@@ -140,7 +128,12 @@ def run_trial(
         If no object is found.
     """
     heightmap = measurable_depth(reconstructor, average_frames(frames), name=tr("press"))
-    measured = measure_heightmap(heightmap, shape=known.shape)
+    measured = measure_heightmap(
+        heightmap,
+        shape=known.shape,
+        edge_radius_mm=known.edge_radius_mm,
+        edge_radius_sd_mm=known.edge_radius_sd_mm,
+    )
     names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
     comparisons = tuple(
         replace(quantity, name=name)
@@ -162,7 +155,7 @@ class ValidationStep(StepPresenter):
         (),
         tr(
             "Press an indenter of known size into the membrane. The calibration is validated "
-            "only if the measured size is within the limits."
+            "only if the measured size conforms to the tolerance."
         ),
         "indenter",
         frames=FRAMES,
@@ -204,6 +197,8 @@ class ValidationStep(StepPresenter):
             return "stale", tr("The captures or corrections have changed since the validation")
         if found.passed:
             return "pass", tr("Validated")
+        if found.verdict is Verdict.WARN:
+            return "warn", tr("The uncertainty is too large to decide")
         return "fail", tr("The last validation failed")
 
     def number(self) -> Finding | None:
@@ -257,8 +252,18 @@ class ValidationStep(StepPresenter):
     def show_known(self, known: Truth) -> None:
         """Fill in an object."""
         shape = known.shape if known.shape in SHAPES else next(iter(SHAPES))
-        height_mm = known.height_mm if known.is_whole else 0.0
-        self.form.change(shape=shape, size_mm=known.size_mm, height_mm=height_mm)
+        self.form.change(
+            shape=shape,
+            size_mm=known.size_mm,
+            size_expanded_mm=COVERAGE * (known.size_sd_mm or 0.0),
+            height_mm=known.height_mm if known.is_whole else 0.0,
+            height_expanded_mm=COVERAGE * (known.height_sd_mm or 0.0),
+            edge_radius_mm=known.edge_radius_mm or 0.0,
+            edge_radius_expanded_mm=COVERAGE * (known.edge_radius_sd_mm or 0.0),
+            certificate=known.certificate,
+            due=known.due,
+            serial=known.serial,
+        )
 
     # The calibration
 
@@ -339,7 +344,7 @@ class ValidationStep(StepPresenter):
 
     def _measure(self, frames: list[NDArray[Any]]) -> None:
         self._drop_trial()
-        known, asked = self.form.value.known, self._asked
+        known, asked = self.form.value.truth(self.form.value.shape), self._asked
         path, present = self._path, self._reconstructor
         if path is None:
             self._refuse(self.calibration.text())

@@ -15,6 +15,7 @@ from app.command_line.terminal import say
 from app.command_line.tool_arguments import ToolArguments
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_json
+from gelpolight_core.labels import label as words
 from gelpolight_core.light.finding import as_dict
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
@@ -97,11 +98,19 @@ class Measure(ToolArguments):
             }
             return content, [*(x for result in results for x in tool_lines(result)), *corrected]
         assert self.shape is not None  # it or a tool is required
+        edge_mm, edge_sd_mm = self.edge_radius, None
+        if truth is not None and edge_mm is None:
+            edge_mm, edge_sd_mm = truth.edge_radius_mm, truth.edge_radius_sd_mm
         found = measure_heightmap(
-            heightmap, shape=self.shape, seed_mm=self.seed(), edge_radius_mm=self.edge_radius
+            heightmap,
+            shape=self.shape,
+            seed_mm=self.seed(),
+            edge_radius_mm=edge_mm,
+            edge_radius_sd_mm=edge_sd_mm,
         )
         measurement = judged(found, heightmap)
         values = measurement.as_json(truth)
+        corrected += [] if truth is None else [finding.line for finding in truth.findings()]
         shape = [f"{tr('shape'):<12} {measurement.shape}"] if self.shape == AUTO else []
         return values | faults, [*shape, *measurement_lines(values), *corrected]
 
@@ -136,7 +145,7 @@ def tool_lines(result: ToolResult) -> list[str]:
 
 def measurement_lines(values: Mapping[str, Any]) -> list[str]:
     """Return a measurement's JSON values as lines of text, each with its standard deviation."""
-    errors = values["error_percent"] or {}
+    compared = {row["quantity"]: row for row in values["comparisons"]}
     rows = (
         ("diameter_mm", tr("diameter"), "mm"),
         ("side_mm", tr("sides"), "mm"),
@@ -156,8 +165,10 @@ def measurement_lines(values: Mapping[str, Any]) -> list[str]:
             for part, name in (("noise_sd", tr("noise")), ("calibration_sd", tr("calibration"))):
                 if values[part] is not None:
                     line = f"{line[:-1]}, {name} {_numbers(values[part][key])})"
-        if key in errors:
-            line += tr("  error {e:+.2f} %").format(e=errors[key])
+        if (row := compared.get(key)) is not None:
+            line += tr("  error {e:+.2f} %").format(e=row["deviation_percent"])
+            line += tr(", En {en:.2f}").format(en=row["en"]) if row["en"] is not None else ""
+            line += f", {words(row['decision'])}"
         lines.append(line)
     verdict = ": ".join(filter(None, (values["verdict"], values["reason"])))
     return [*lines, f"{tr('verdict'):<12} {verdict}"]

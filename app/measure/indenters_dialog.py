@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QListWidget, QWidget
@@ -16,40 +16,35 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
-from app.workspace.indenters import Indenter
+from app.workspace.indenters import OPTIONAL, Indenter
+from app.workspace.reference import LARGEST_MM, MM, Reference, optional_length
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
-MM, LARGEST_MM = tr(" mm"), 500.0
+NOT_OF_A_BALL = ("second_mm", "edge_radius_mm")
 
 
-@dataclass(frozen=True, slots=True)
-class Typed:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Typed(Reference):
     """A known object as it is typed. 0: not stated."""
 
     name: str = text("", tr("Name"))
     shape: str = choice("cylinder", tr("Shape"), {name: kind_label(name) for name in INDENTERS})
     size_mm: float = number(5.0, tr("Diameter or side"), 0.0, LARGEST_MM, MM, 3)
-    second_mm: float = number(
-        0.0,
-        tr("Other side"),
-        0.0,
-        LARGEST_MM,
-        MM,
-        3,
-        none=tr("the same"),
-        when=lambda typed: typed.shape == "cuboid",
+    second_mm: float = optional_length(
+        tr("Other side"), tr("the same"), when=lambda typed: typed.shape == "cuboid"
     )
-    height_mm: float = number(
-        0.0,
+    height_mm: float = optional_length(
         tr("Depth"),
-        0.0,
-        LARGEST_MM,
-        MM,
-        3,
-        none=tr("not known"),
+        tr("not known"),
         tip=tr("Height of the object from its face to its base, if it has one"),
     )
+    edge_radius_mm: float = optional_length(
+        tr("Edge radius"), tr("not known"), when=lambda typed: typed.shape != "ball"
+    )
+    certificate: str = text("", tr("Certificate"), tr("Number of its calibration certificate"))
+    due: str = text("", tr("Due on"), tr("End of its calibration, such as 2027-03-31"))
+    serial: str = text("", tr("Serial number"))
 
     def indenter(self) -> Indenter:
         """Return the object.
@@ -57,11 +52,13 @@ class Typed:
         Raises
         ------
         InputError
-            If it has no name or no size.
+            If it has no name or no size, or a day that is none.
         """
-        second = self.second_mm if self.shape == "cuboid" else 0.0
-        sides = second or None, self.height_mm or None
-        return Indenter(self.name.strip(), self.shape, self.size_mm, *sides)
+        values = asdict(self) | {"name": self.name.strip()}
+        stated = {name: values[name] or None for name in OPTIONAL}
+        for name in {"cuboid": (), "cylinder": ("second_mm",)}.get(self.shape, NOT_OF_A_BALL):
+            stated[name] = None
+        return Indenter(**values | stated)
 
 
 class IndentersDialog(Dialog):
@@ -79,7 +76,7 @@ class IndentersDialog(Dialog):
         self.resize(560, 360)
         self.indenters = indenters
         self._typed = [
-            Typed(i.name, i.shape, i.size_mm, i.second_mm or 0.0, i.height_mm or 0.0)
+            Typed(**{name: value for name, value in asdict(i).items() if value is not None})
             for i in indenters
         ]
         self.names = named(QListWidget(), "measure.indenters.names", tr("Known objects"))
@@ -104,7 +101,7 @@ class IndentersDialog(Dialog):
 
     def add(self) -> None:
         """Add an object at the end."""
-        self._typed.append(Typed(tr("New cylinder")))
+        self._typed.append(Typed(name=tr("New cylinder")))
         self.names.addItem(self._typed[-1].name)
         self.names.setCurrentRow(len(self._typed) - 1)
 

@@ -152,9 +152,11 @@ def _row(row: Row) -> str:
         return f"<tr>{label}{_cell(row.measured)}{sd}</tr>"
     first = "".join(map(_cell, (row.measured, row.reference, row.deviation)))
     second = _cell(row.sd, "muted") + _cell("") + _cell(row.percent, row.role)
-    return f"<tr>{label}{first}</tr><tr><td></td>{second}</tr>"
+    third = f"<tr><td></td>{_cell(row.decision, row.role, 3)}</tr>" if row.decision else ""
+    return f"<tr>{label}{first}</tr><tr><td></td>{second}</tr>{third}"
 
 
-def _cell(text: str, role: str = "") -> str:
+def _cell(text: str, role: str = "", columns: int = 1) -> str:
     colour = f"color:@{role}" if role else ""
-    return f"<td align='right' style='white-space:nowrap;{colour}'>{text}</td>"
+    cell = f"<td align='right' colspan='{columns}' style='white-space:nowrap;{colour}'>"
+    return f"{cell}{text}</td>"

@@ -2,47 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from app.services.preferences import Limits
-from app.widgets.fields import number
-from gelpolight_core.measurement.result import Truth, compare
+from app.workspace.reference import Reference
+from gelpolight_core.measurement.result import compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
-from gelpolight_core.quantity import Quantity
+from gelpolight_core.quantity import COVERAGE, Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, verdict_of
-from gelpolight_core.translation import tr
 
 DEPTH_FIGURES = frozenset({"step_height", "height", "depth_difference", "mean_depth", "deepest"})
-LARGEST = 500.0
-
-
-@dataclass(frozen=True, slots=True)
-class Reference:
-    """The true values of an object, as the user states them. 0: not known.
-
-    Attributes
-    ----------
-    size_mm : float
-        The diameter, the mean side, or the tool's first figure in its own unit.
-    height_mm : float
-        Indentation depth.
-    name : str
-        Name of the known object. Empty if the numbers were typed.
-    """
-
-    size_mm: float = number(
-        0.0, tr("Size"), 0.0, LARGEST, tr(" mm"), 3, step=0.1, none=tr("not known")
-    )
-    height_mm: float = number(
-        0.0, tr("Depth"), 0.0, LARGEST, tr(" mm"), 3, step=0.1, none=tr("not known")
-    )
-    name: str = ""
-
-    def truth(self, shape: str) -> Truth:
-        """Return it as the true size of a shape."""
-        return Truth(shape, self.size_mm or math.nan, self.height_mm or math.nan)
 
 
 def quantities_of(result: ToolResult, reference: Reference, limits: Limits) -> tuple[Quantity, ...]:
@@ -57,7 +27,14 @@ def quantities_of(result: ToolResult, reference: Reference, limits: Limits) -> t
     in_depth = result.figures[0].name in DEPTH_FIGURES
     value = abs(first.value) if in_depth else first.value
     limit = limits.percent[in_depth]
-    return (replace(first, value=value, truth=reference.size_mm, limit_percent=limit), *others)
+    stated = replace(
+        first,
+        value=value,
+        truth=reference.size_mm,
+        limit_percent=limit,
+        truth_sd=reference.size_expanded_mm / COVERAGE or None,
+    )
+    return (stated, *others)
 
 
 def record_of(
@@ -91,7 +68,7 @@ def record_of(
     if fit is None:
         shape, details = result.tool.name.replace("-", "_"), result_as_dict(result)
     else:
-        shape, details = fit.shape, fit.as_json(reference.truth(fit.shape))
+        shape, details = fit.shape, fit.as_json(reference.truth(fit.shape), limits.percent)
     settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
     if reference.name:
         settings["indenter"] = reference.name

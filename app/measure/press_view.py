@@ -41,6 +41,7 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.tools import Cuboid, Cylinder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
@@ -370,7 +371,10 @@ class PressView(QWidget):
         )
 
     def _render(self) -> None:
-        """Show the present state."""
+        """Show the present state, of an object with the edge that is stated."""
+        tool, stated = self.work.tool, self.inspector.reference.stated_for
+        if isinstance(tool, Cylinder | Cuboid):
+            self.work.state_edge(*stated(tool.name).edge_mm)
         state = self.state = self._resolved()
         self._want()
         self._show_work()

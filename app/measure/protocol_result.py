@@ -62,7 +62,6 @@ class ResultView(QWidget):
         named(self, "protocol.result", tr("Result of the evaluation"))
         self._work, self._context = work, context
         self._evaluation: Evaluation | None = None
-        self._limits_percent = (0.0, 0.0)
         self._folder = work.run.folder / REPORT
         self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
         make_bold(self.verdict, size=1.45)
@@ -120,8 +119,7 @@ class ResultView(QWidget):
     def show_evaluation(self, evaluation: Evaluation) -> None:
         """Show the results."""
         self._evaluation = evaluation
-        self._limits_percent = self._context.settings.limits.percent
-        document = evaluation_document(evaluation, limits_percent=self._limits_percent)
+        document = evaluation_document(evaluation)
         progress = self._work.run.progress
         word = verdict_word(document.verdict)
         state = (
@@ -151,7 +149,7 @@ class ResultView(QWidget):
         groups = listing_table("protocol.groups", first.listings[0])
         self._add_tab(tr("By size and height"), groups)
         for gauge in more:
-            text = "      ".join(f"{label}: {value}" for label, value in gauge.facts)
+            text = "      ".join(figure.sentence for figure in gauge.quality.figures)
             words = tr("Repeatability over all objects")
             pooled = named(PlainLabel(text, wrap=True), "protocol.pooled", words)
             table = listing_table("protocol.gauge", gauge.listings[0])
@@ -189,7 +187,7 @@ class ResultView(QWidget):
                 f"<span style='color:@pass'>{escaped(text)}</span> <a href='#'>{link}</a>"
             )
 
-        self._work.write_report(self._evaluation, folder, done, limits_percent=self._limits_percent)
+        self._work.write_report(self._evaluation, folder, done)
 
     def _save_as(self) -> None:
         settings = self._context.settings

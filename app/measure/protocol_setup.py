@@ -30,6 +30,7 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from gelpolight_core.measurement.protocol import SHAPES, Protocol
+from gelpolight_core.measurement.statistics import too_few
 from gelpolight_core.translation import tr
 
 WIDTH = 480
@@ -205,6 +206,8 @@ class ProtocolSetup(QScrollArea):
             text = tr("Objects: {objects}. Presses: {n}, about {time} by hand.").format(
                 objects=len(protocol.objects), n=count, time=_duration(count * SECONDS_A_PRESS)
             )
+            if few := too_few(protocol.missing_repeats):
+                text += "\n" + tr("Repeatability: {few}").format(few=few)
         self.summary.setText(text)
         self.begin.setEnabled(bool(count and self.calibration.count()))
 

@@ -188,6 +188,7 @@ class ProtocolView(QWidget):
     def _on_evaluated(self, shown: OpenRun, evaluation: Evaluation) -> None:
         if shown is not self.run:
             return
+        evaluation = replace(evaluation, limits_percent=self.context.settings.limits.percent)
         shown.result.show_evaluation(evaluation)
         run = shown.work.run
         if run.next() is None:
@@ -195,7 +196,6 @@ class ProtocolView(QWidget):
                 evaluation,
                 serial=run.content.serial,
                 calibration_id=run.content.calibration,
-                limits_percent=self.context.settings.limits.percent,
                 operator=user_name(),
                 folder=str(run.folder),
             )

@@ -169,8 +169,6 @@ class ProtocolWork(QObject):
         evaluation: Evaluation,
         folder: Path,
         done: Callable[[tuple[Path, ...]], None],
-        *,
-        limits_percent: tuple[float, float],
     ) -> None:
         """Write every file of the report into a folder, then call `done` with their paths.
 
@@ -182,15 +180,11 @@ class ProtocolWork(QObject):
             Created if it is missing.
         done : callable
             Called with the paths of the written files.
-        limits_percent : (float, float)
-            Maximum mean absolute errors, planar and in depth, for a pass.
         """
 
         def write() -> tuple[Path, ...]:
             make_folder(folder)
-            return write_evaluation_files(
-                evaluation, folder, calibration=self.calibration, limits_percent=limits_percent
-            )
+            return write_evaluation_files(evaluation, folder, calibration=self.calibration)
 
         self._do(tr("Writing the report"), write, done)
 
@@ -209,7 +203,7 @@ class ProtocolWork(QObject):
         self.jobs.close()
 
     def _measure(self, press: Press) -> None:
-        image, shape = self.run.image(press), press.truth.shape
+        image = self.run.image(press)
 
         def done(outcome: Outcome) -> None:
             # It may have been discarded meanwhile.
@@ -217,7 +211,7 @@ class ProtocolWork(QObject):
                 self.outcomes[press] = outcome
                 self.changed.emit()
 
-        self._do(tr("Measuring"), lambda: self._outcome_of(image, shape), done)
+        self._do(tr("Measuring"), lambda: self._outcome_of(image, press.truth), done)
 
     def _change(self, change: Callable[[], object]) -> bool:
         """Change the run. Return whether it was written to disk."""

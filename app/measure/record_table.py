@@ -7,20 +7,27 @@ from dataclasses import replace
 from app.measure.figures_text import unit_behind, unit_of, value_text
 from app.measure.placing import kind_label
 from app.widgets.cells_table import Cell
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord
+from gelpolight_core.quantity import Quantity, decision_word
+from gelpolight_core.records.entry import (
+    DOUBTFUL,
+    FAILED,
+    OF_VERDICT,
+    PASSED,
+    UNDECIDED,
+    MeasurementRecord,
+)
 from gelpolight_core.records.evaluation_entry import SHAPE as EVALUATION
 from gelpolight_core.translation import tr
 
 NOTE, IMAGE = 9, 10
 """Columns."""
-VERDICTS = {PASSED: "pass", FAILED: "fail", DOUBTFUL: "warn"}
+VERDICTS = {PASSED: "pass", FAILED: "fail", UNDECIDED: "warn", DOUBTFUL: "warn"}
 
 
 def verdict_word(verdict: str) -> str:
     """Return the text of a verdict."""
-    words = {PASSED: tr("within limit"), FAILED: tr("outside limit"), DOUBTFUL: tr("doubtful")}
-    return words.get(verdict, tr("no true value"))
+    words = {known: decision_word(decision) for decision, known in OF_VERDICT.items()}
+    return {**words, DOUBTFUL: tr("doubtful")}.get(verdict, tr("no true value"))
 
 
 def shape_label(shape: str) -> str:
@@ -83,7 +90,7 @@ def _figure_cells(quantity: Quantity | None) -> tuple[Cell, Cell]:
     """Return a value and its error."""
     if quantity is None:
         return Cell("", key=-1e9), Cell("", key=-1e9)
-    role = {None: "", True: "pass", False: "fail"}[quantity.passed]
+    role = "" if quantity.verdict is None else quantity.verdict.value
     error = -1e9 if quantity.error_percent is None else quantity.error_percent
     return (
         Cell(quantity_text(quantity), key=quantity.value, right=True),

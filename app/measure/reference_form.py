@@ -8,7 +8,6 @@ from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app.measure.figures_text import UNITS
-from app.measure.judging import Reference
 from app.measure.state import PressState
 from app.widgets.buttons import Slot, tool_button
 from app.widgets.forms import Form
@@ -16,6 +15,7 @@ from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
+from app.workspace.reference import Reference
 from gelpolight_core.translation import tr
 
 AGAIN = "\0again"
@@ -89,11 +89,13 @@ class ReferenceForm(QWidget):
             self._offer()
         self.setEnabled(bool(state.kind))
         self.form.show_row("height_mm", state.has_height)
-        size = self.form.inputs["size_mm"]
-        label = self.form.rows.labelForField(size)
-        if isinstance(label, QLabel) and isinstance(size, DoubleSpinBox):
+        self.form.show_row("edge_radius_mm", state.has_edge)
+        label = self.form.rows.labelForField(self.form.inputs["size_mm"])
+        if isinstance(label, QLabel):
             label.setText(state.asked or tr("Size"))
-            size.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
+        for name in ("size_mm", "size_expanded_mm"):
+            if isinstance(made := self.form.inputs[name], DoubleSpinBox):
+                made.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
 
     def state(self, stated: Reference) -> None:
         """Enter values from code, as if the user had chosen them."""
@@ -117,7 +119,18 @@ class ReferenceForm(QWidget):
         """Return the listed values of an object, or None if it is not in the list."""
         for known in self._objects:
             if (known.shape, known.name) == (kind, name):
-                return Reference(known.mean_size_mm, known.height_mm or 0.0, name)
+                return Reference(
+                    size_mm=known.mean_size_mm,
+                    size_expanded_mm=known.size_expanded_mm or 0.0,
+                    height_mm=known.height_mm or 0.0,
+                    height_expanded_mm=known.height_expanded_mm or 0.0,
+                    edge_radius_mm=known.edge_radius_mm or 0.0,
+                    edge_radius_expanded_mm=known.edge_radius_expanded_mm or 0.0,
+                    name=name,
+                    certificate=known.certificate,
+                    due=known.due,
+                    serial=known.serial,
+                )
         return None
 
     def _on_known(self) -> None:
@@ -129,7 +142,7 @@ class ReferenceForm(QWidget):
 
     def _on_typed(self) -> None:
         """Forget the known object: its values are no longer those."""
-        self.form.value = replace(self.form.value, name="")
+        self.form.value = replace(self.form.value, name="", certificate="", due="", serial="")
         with QSignalBlocker(self.known):
             self.known.setCurrentIndex(0)
         self._on_changed()

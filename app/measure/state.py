@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 
 from app.live.advice import PREPARING, LiveState, advise
 from app.measure.figures_text import decimals_for, unit_behind, unit_of
-from app.measure.judging import Reference, quantities_of
+from app.measure.judging import quantities_of
 from app.measure.placing import INDENTERS, kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
 from app.widgets.units import length_unit, per_mm
+from app.workspace.reference import Reference
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
-from gelpolight_core.quantity import Quantity
+from gelpolight_core.quantity import Quantity, decision_word
 from gelpolight_core.records.entry import verdict_of
 from gelpolight_core.translation import tr
 
@@ -34,6 +35,7 @@ class Row:
     deviation: str = ""
     percent: str = ""
     role: str = ""
+    decision: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +92,11 @@ class PressState:
         """Whether the reference has a height, too."""
         return self.kind in INDENTERS
 
+    @property
+    def has_edge(self) -> bool:
+        """Whether the reference has an edge, too."""
+        return self.has_height and self.kind != "ball"
+
 
 def resolve(
     work: Work, reference: Reference, limits: Limits, *, freezable: bool, earlier: bool
@@ -124,22 +131,24 @@ def resolve(
         asked = tr("mean side") if found.tool.name == "cuboid" else first.label
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
         if found.tool == tool:
-            return _with_result(state, found, quantities_of(found, reference, limits))
+            return _with_result(state, found, reference, quantities_of(found, reference, limits))
     if answer.refused:
         return replace(state, reason=answer.refused, role="fail")
     return replace(state, reason=tr("Measuring…") if tool and state.measurable else "")
 
 
 def _with_result(
-    state: PressState, result: ToolResult, quantities: tuple[Quantity, ...]
+    state: PressState, result: ToolResult, reference: Reference, quantities: tuple[Quantity, ...]
 ) -> PressState:
     doubtful = result.verdict != "ok"
+    reasons = [tr("Doubtful: {reason}").format(reason=result.reason)] if doubtful else []
+    reasons += [finding.line for finding in reference.truth(state.kind).findings()]
     return replace(
         state,
         verdict=verdict_of(quantities, doubtful=doubtful),
         rows=tuple(_aligned([_row(*named) for named in _named(result, quantities)])),
-        reason=tr("Doubtful: {reason}").format(reason=result.reason) if doubtful else "",
-        role="warn" if doubtful else "muted",
+        reason="\n".join(reasons),
+        role="warn" if reasons else "muted",
     )
 
 
@@ -174,8 +183,19 @@ def _row(label: str, quantity: Quantity) -> Row:
         reference=f"{factor * quantity.truth:.{digits}f}",
         deviation=f"{factor * quantity.error:+.{digits}f}",
         percent=f"{quantity.error_percent:+.2f} %",
-        role={True: "pass", False: "fail", None: ""}[quantity.passed],
+        role="" if quantity.verdict is None else quantity.verdict.value,
+        decision=_decision(quantity),
     )
+
+
+def _decision(quantity: Quantity) -> str:
+    """Return the decision by the tolerance, with the En value."""
+    if quantity.verdict is None:
+        return ""
+    words = tr("{decision}, tolerance {limit:g} %").format(
+        decision=decision_word(quantity.verdict), limit=quantity.limit_percent
+    )
+    return words if quantity.en is None else f"En {quantity.en:.2f}; {words}"
 
 
 def _aligned(rows: list[Row]) -> Iterator[Row]:

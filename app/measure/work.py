@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
@@ -146,6 +148,13 @@ class Work(QObject):
     def change(self, key: int, tool: Tool, *, nudge: bool = False) -> None:
         """Replace a tool. Successive key moves of one grip are one undo step."""
         self._edit(tr("move {tool}"), tool, {**self._sheet, key: tool}, key, nudge=nudge)
+
+    def state_edge(self, radius_mm: float | None, sd_mm: float | None) -> None:
+        """State the edge of the chosen cylinder or cuboid. It follows the reference, not undo."""
+        tool: Any = self._sheet[self.chosen]
+        edged = replace(tool, edge_radius_mm=radius_mm, edge_radius_sd_mm=sd_mm)
+        if edged != tool:
+            self.set_sheet({**self._sheet, self.chosen: edged}, self.chosen)
 
     def remove(self) -> None:
         """Remove the chosen tool from the image."""

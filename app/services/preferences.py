@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.widgets.fields import choice, folder, number
+from gelpolight_core.quantity import PAPER_PERCENT
 from gelpolight_core.reconstruction.modes import MODES, Mode
 from gelpolight_core.translation import LANGUAGES, tr
 
@@ -17,6 +18,10 @@ UNITS = {"mm": tr("mm"), "um": tr("um")}
 ABOUT_UNIT = tr(
     "Depths and measured lengths are shown in this unit. Positions, inputs, records and files keep "
     "mm"
+)
+ABOUT_TOLERANCE = tr(
+    "Largest deviation from a reference. Within it less the uncertainty an object conforms, beyond "
+    "it plus the uncertainty it does not"
 )
 THEMES = {"system": tr("Same as the desktop"), "light": tr("Light"), "dark": tr("Dark")}
 
@@ -70,13 +75,17 @@ class Limits:
     age_days : float
         An older calibration is marked: gel yellows and hardens within months.
     height_percent, size_percent : float
-        Maximum error of an object of known size to pass validation. The defaults are the errors
-        that the paper reports for its own sensor: 8 % in depth and 5 % in the plane.
+        Tolerances of measurements of known objects. The defaults are the errors that the paper
+        reports for its own sensor: 8 % in depth and 5 % in the plane.
     """
 
     age_days: float = number(90.0, tr("Mark calibrations older than"), 1.0, 3650.0, " d")
-    height_percent: float = number(8.0, tr("Validation: maximum height error"), 0.1, 100.0, " %", 1)
-    size_percent: float = number(5.0, tr("Validation: maximum width error"), 0.1, 100.0, " %", 1)
+    height_percent: float = number(
+        PAPER_PERCENT["depth"], tr("Tolerance of heights"), 0.1, 100.0, " %", 1, tip=ABOUT_TOLERANCE
+    )
+    size_percent: float = number(
+        PAPER_PERCENT["planar"], tr("Tolerance of sizes"), 0.1, 100.0, " %", 1, tip=ABOUT_TOLERANCE
+    )
 
     @property
     def percent(self) -> tuple[float, float]:

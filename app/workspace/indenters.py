@@ -12,11 +12,22 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.io.reading import NAME_LIMIT, brief, plain_text, read_own
 from gelpolight_core.measurement.measure import SHAPES
+from gelpolight_core.measurement.result import checked_day
 from gelpolight_core.translation import tr
 
 FILE = "indenters.json"
 FORMAT = "gelpolight-indenters"
 VERSION = 1
+OPTIONAL = (
+    "second_mm",
+    "height_mm",
+    "edge_radius_mm",
+    "size_expanded_mm",
+    "height_expanded_mm",
+    "edge_radius_expanded_mm",
+)
+TEXTS = ("certificate", "due", "serial")
+"""What need not be stated of an indenter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +46,19 @@ class Indenter:
         The other side of a cuboid that is not square.
     height_mm : float or None
         Indentation depth when its base touches. None if it has no such base.
+    edge_radius_mm : float or None
+        Fillet of its edge. None if it is not known.
+    size_expanded_mm, height_expanded_mm, edge_radius_expanded_mm : float or None
+        Expanded uncertainties (k = 2). None if they are not stated.
+    certificate, due, serial : str
+        Number of its certificate, the day on which its calibration ends, such as ``2027-03-31``,
+        and its own number. Empty if not stated.
 
     Raises
     ------
     InputError
-        If it has no name, the shape is unknown, or a length is not greater than zero.
+        If it has no name, the shape is unknown, a length is not greater than zero, or `due` is no
+        day.
     """
 
     name: str
@@ -47,6 +66,13 @@ class Indenter:
     size_mm: float
     second_mm: float | None = None
     height_mm: float | None = None
+    edge_radius_mm: float | None = None
+    size_expanded_mm: float | None = None
+    height_expanded_mm: float | None = None
+    edge_radius_expanded_mm: float | None = None
+    certificate: str = ""
+    due: str = ""
+    serial: str = ""
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -59,7 +85,8 @@ class Indenter:
                 where,
                 Remedy.ONE_OF.format(names=", ".join(SHAPES)),
             )
-        for length in (self.size_mm, self.second_mm, self.height_mm):
+        checked_day(self.due, where)
+        for length in (self.size_mm, *(getattr(self, name) for name in OPTIONAL)):
             if length is not None and not (math.isfinite(length) and length > 0.0):
                 raise InputError(
                     tr("The length {value} mm is not greater than zero").format(value=length),
@@ -117,11 +144,15 @@ def _parse(content: Any) -> tuple[Indenter, ...]:
             plain_text(row["name"], NAME_LIMIT),
             plain_text(row["shape"], NAME_LIMIT),
             _length(row["size_mm"]),
-            None if row.get("second_mm") is None else _length(row["second_mm"]),
-            None if row.get("height_mm") is None else _length(row["height_mm"]),
+            **_stated(row),
         )
         for row in content["indenters"]
     )
+
+
+def _stated(row: dict[str, Any]) -> dict[str, Any]:
+    lengths = {name: _length(row[name]) for name in OPTIONAL if row.get(name) is not None}
+    return lengths | {name: plain_text(row[name], NAME_LIMIT) for name in TEXTS if name in row}
 
 
 def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:

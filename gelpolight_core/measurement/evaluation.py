@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.finding import Finding, QualityTable, Verdict, judge
+from gelpolight_core.labels import label
 from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.result import Measurement, Truth
-from gelpolight_core.measurement.statistics import Statistics, statistics_of
+from gelpolight_core.measurement.statistics import (
+    Statistics,
+    missing_repeats,
+    statistics_of,
+    too_few,
+)
+from gelpolight_core.quantity import COVERAGE, REST, TOLERANCE_PERCENT, guarded
 from gelpolight_core.translation import tr
 
-PAPER_PERCENT = {"planar": 5.0, "depth": 8.0}
-"""Mean errors that the paper reports for random regions."""
 DIRECTIONS = tuple(LENGTHS)
 SAME, RANDOM, ALL = "same region", "random regions", "all"
 
@@ -80,25 +87,6 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Repeatability:
-    """Gauge repeatability in one direction, pooled over all objects.
-
-    Attributes
-    ----------
-    direction : str
-        ``planar`` or ``depth``.
-    within_region_mm : float
-        Standard deviation of repeats at one place; NaN without repeats.
-    between_regions_mm : float
-        Standard deviation that moving to another place adds; NaN with one place only.
-    """
-
-    direction: str
-    within_region_mm: float
-    between_regions_mm: float
-
-
-@dataclass(frozen=True, slots=True)
 class Evaluation:
     """The paper's protocol on one folder of presses.
 
@@ -108,8 +96,6 @@ class Evaluation:
         Every press that has a true size, measured or not.
     groups : tuple of Group
         Statistics by direction, shape, dimension and regions.
-    repeatability : tuple of Repeatability
-        Empty where nothing was repeated.
     skipped : tuple of str
         Files of shapes without a size.
     crossing : Crossing or None
@@ -117,14 +103,21 @@ class Evaluation:
     flat_um : tuple of (rows, columns) float64
         Heights of the untouched membrane, from
         :func:`~gelpolight_core.measurement.characteristics.flat_maps`.
+    limits_percent : (float, float)
+        Tolerances, planar and in depth.
     """
 
     results: tuple[Press, ...]
     groups: tuple[Group, ...]
-    repeatability: tuple[Repeatability, ...]
     skipped: tuple[str, ...] = ()
     crossing: Crossing | None = None
     flat_um: tuple[NDArray[np.float64], ...] = field(default=(), repr=False, compare=False)
+    limits_percent: tuple[float, float] = TOLERANCE_PERCENT
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The lines of the table of presses."""
+        return [press.as_row(self.limits_percent) for press in self.results]
 
     @property
     def failed(self) -> tuple[Press, ...]:
@@ -179,7 +172,7 @@ def evaluate(
     """
     results = tuple(replace(row, outcome=o) for row, o in zip(rows, outcomes, strict=True))
     groups = _groups(results, crossing)
-    return Evaluation(results, groups, _repeatability(results), tuple(skipped), crossing)
+    return Evaluation(results, groups, tuple(skipped), crossing)
 
 
 def region_kinds(results: Sequence[Press]) -> dict[str, list[Press]]:
@@ -237,6 +230,61 @@ def _groups(results: Sequence[Press], crossing: Crossing | None) -> tuple[Group,
     return tuple(groups)
 
 
+def evaluation_errors(evaluation: Evaluation) -> QualityTable:
+    """Return the mean errors, judged by the tolerances of the planar and the depth direction."""
+    title = tr("Mean absolute error, {direction}")
+    title_in = tr("Mean absolute error, {direction}, {regions}")
+    figures = []
+    for direction, limit in zip(DIRECTIONS, evaluation.limits_percent, strict=True):
+        if not evaluation.series(direction):
+            continue  # there is no press for this direction yet
+        name = label(direction)
+        figures.append(_mean_error(evaluation, direction, title.format(direction=name), limit))
+        for group in evaluation.groups:
+            overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
+            mean = group.statistic.mean_absolute
+            if group.direction == direction and overall and math.isfinite(mean):
+                regions = group.regions.replace(" ", "_")
+                text = title_in.format(direction=name, regions=label(group.regions))
+                figures.append(judge(f"{direction}_{regions}", text, mean, "%"))
+    references = (found for truth in by_object(evaluation.results) for found in truth.findings())
+    return QualityTable((*figures, *dict.fromkeys(references)))
+
+
+def _mean_error(evaluation: Evaluation, direction: str, text: str, limit: float) -> Finding:
+    """Judge a mean absolute error: within the tolerance only where enough presses say so."""
+    mean = evaluation.overall(direction)
+    found = guarded(
+        f"{direction}_mean",
+        text,
+        mean.mean_absolute,
+        limit,
+        _mean_expanded(evaluation, direction),
+        remedy=tr("Calibrate again, or check the worst presses"),
+    )
+    lacking = too_few(missing_repeats(mean.count - 1))
+    if found.verdict is Verdict.FAIL or not lacking:
+        return found
+    return replace(found, verdict=Verdict.WARN, remedy=lacking)
+
+
+def _mean_expanded(evaluation: Evaluation, direction: str) -> float:
+    """Return the expanded uncertainty of a mean error in percent.
+
+    Calibration, model and reference err alike in all presses; only the rest averages out.
+    """
+    found = [press.quantity(direction) for press in evaluation.series(direction)]
+    common, own = [], []
+    for quantity in filter(None, found):
+        rows = dict(quantity.budget)
+        scale = 100.0 * COVERAGE / abs(quantity.truth or math.nan)
+        alike = [sd for source, sd in rows.items() if source not in (REST, "noise")]
+        common.append(scale * math.hypot(*alike))
+        own.append(scale * math.hypot(rows.get(REST, 0.0), rows.get("noise", 0.0)))
+    count = max(len(own), 1)
+    return math.hypot(sum(common) / count, math.hypot(*own) / count)
+
+
 def errors_by_dimension(
     results: Sequence[Press], direction: str
 ) -> tuple[list[float], dict[tuple[str, int], NDArray[np.float64]]]:
@@ -271,75 +319,3 @@ def by_object(results: Sequence[Press]) -> dict[Truth, list[Press]]:
     for result in results:
         objects[result.truth].append(result)
     return objects
-
-
-def _repeatability(results: Sequence[Press]) -> tuple[Repeatability, ...]:
-    """Return one-way analysis of variance with regions as groups, pooled over the objects."""
-    found = []
-    for direction in DIRECTIONS:
-        within, between = _variances(results, direction)
-        if math.isfinite(within) or math.isfinite(between):
-            found.append(Repeatability(direction, math.sqrt(within), math.sqrt(between)))
-    return tuple(found)
-
-
-def _variances(results: Sequence[Press], direction: str) -> tuple[float, float]:
-    """Return the variances (mm**2) within a region and between regions."""
-    objects = [lengths_by_region(own, direction) for own in by_object(results).values()]
-    within = variance_within([region for regions in objects for region in regions])
-    moved = [regions for regions in objects if len(regions) > 1]
-    if not moved:
-        return within, math.nan
-    noise = 0.0 if math.isnan(within) else within
-    degrees = sum(len(regions) - 1 for regions in moved)
-    between = sum((len(regions) - 1) * variance_between(regions, noise) for regions in moved)
-    return within, max(between / degrees, 0.0)
-
-
-def variance_within(groups: Sequence[Sequence[float]]) -> float:
-    """Return the pooled variance (mm**2) of repeats at one position; NaN without repeats.
-
-    Parameters
-    ----------
-    groups : sequence of sequences of float
-        Lengths (mm) by place, of one object or of several.
-    """
-    freedom = sum(len(values) - 1 for values in groups)
-    squares = sum(float(np.var(values)) * len(values) for values in groups)
-    return squares / freedom if freedom else math.nan
-
-
-def variance_between(groups: Sequence[Sequence[float]], within: float) -> float:
-    """Return the variance (mm**2) between positions; below 0 if there is none.
-
-    Parameters
-    ----------
-    groups : sequence of sequences of float
-        Lengths (mm) of one object, for two or more positions.
-    within : float
-        Variance (mm**2) of repeats at one place.
-    """
-    # The means of few repeats scatter, too; only the excess is due to the position.
-    share = float(np.mean([1.0 / len(values) for values in groups]))
-    return float(np.var([np.mean(values) for values in groups], ddof=1)) - share * within
-
-
-def lengths_by_region(results: Iterable[Press], direction: str) -> list[list[float]]:
-    """Return the measured lengths (mm) of an object, one list for each position.
-
-    Parameters
-    ----------
-    results : iterable of Press
-        Of one object; presses without a region or a measurement are left out.
-    direction : str
-        ``planar`` (its size) or ``depth`` (its height).
-    """
-    regions: dict[str, list[float]] = defaultdict(list)
-    for result in results:
-        value = result.measured_mm(direction)
-        # "random" is not one position: two such presses are not repeats of each other.
-        if math.isfinite(value) and result.region:
-            name = result.region
-            key = f"{name} {result.file}" if name.lower() == "random" else name
-            regions[key].append(value)
-    return list(regions.values())

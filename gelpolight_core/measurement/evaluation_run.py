@@ -16,7 +16,7 @@ from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.protocol_run import crossing_of
-from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_image, require_colour
@@ -26,8 +26,8 @@ Outcome = Measurement | str
 """A measurement, or the sentence why there is none."""
 
 
-def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, str], Measurement]:
-    """Return the function that measures the object of a given shape in an image file.
+def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, Truth], Measurement]:
+    """Return the function that measures a given object in an image file: its shape, its edge.
 
     Parameters
     ----------
@@ -36,18 +36,24 @@ def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, str], Mea
     """
     calibration = reconstructor.calibration
 
-    def measure(path: Path, shape: str) -> Measurement:
+    def measure(path: Path, truth: Truth) -> Measurement:
         image = read_image(path, response=calibration.response)
         require_colour(image, where=str(path))
         heightmap = measurable_depth(reconstructor, image.rgb, name=path.name, where=str(path))
-        return judged(measure_heightmap(heightmap, shape=shape), heightmap)
+        found = measure_heightmap(
+            heightmap,
+            shape=truth.shape,
+            edge_radius_mm=truth.edge_radius_mm,
+            edge_radius_sd_mm=truth.edge_radius_sd_mm,
+        )
+        return judged(found, heightmap)
 
     return measure
 
 
 def evaluate_presses(
     folder: Path,
-    measure: Callable[[Path, str], Outcome],
+    measure: Callable[[Path, Truth], Outcome],
     *,
     progress: Callable[[str, float], None] = lambda _name, _share: None,
     submit: Callable[..., Future[Outcome]] | None = None,
@@ -59,7 +65,7 @@ def evaluate_presses(
     ----------
     folder : Path
         Images and ``truth.csv``.
-    measure : callable (image's path, shape) -> Measurement or str
+    measure : callable (image's path, Truth) -> Measurement or str
         Such as :func:`press_measurement` returns.
     progress : callable, optional
         Called with the file name and the share done, 0..1.
@@ -88,10 +94,10 @@ def evaluate_presses(
     if submit is None:
         for row in table.rows:
             progress(row.file, len(outcomes) / len(table.rows))
-            outcomes[row.file] = outcome_of(measure, folder / row.file, row.truth.shape)
+            outcomes[row.file] = outcome_of(measure, folder / row.file, row.truth)
     else:
         jobs = {
-            submit(outcome_of, measure, folder / row.file, row.truth.shape): row.file
+            submit(outcome_of, measure, folder / row.file, row.truth): row.file
             for row in table.rows
         }
         for job in as_completed(jobs):
@@ -104,19 +110,19 @@ def evaluate_presses(
     return replace(evaluation, flat_um=flat)
 
 
-def measure_with(calibration: Path, model: str | None, image: Path, shape: str) -> Outcome:
+def measure_with(calibration: Path, model: str | None, image: Path, truth: Truth) -> Outcome:
     """Measure an image with a calibration file, which each process reads once."""
-    return _measurement(calibration, model)(image, shape)
+    return _measurement(calibration, model)(image, truth)
 
 
 @lru_cache(maxsize=1)
-def _measurement(calibration: Path, model: str | None) -> Callable[[Path, str], Outcome]:
+def _measurement(calibration: Path, model: str | None) -> Callable[[Path, Truth], Outcome]:
     return press_measurement(Reconstructor(read_calibration(calibration), model=model, workers=1))
 
 
-def outcome_of(measure: Callable[[Path, str], Outcome], image: Path, shape: str) -> Outcome:
+def outcome_of(measure: Callable[[Path, Truth], Outcome], image: Path, truth: Truth) -> Outcome:
     """Measure the object in an image, or return as a sentence why it cannot be measured."""
     try:
-        return measure(image, shape)
+        return measure(image, truth)
     except InputError as error:  # a failed press is a result of the evaluation and does not stop it
         return error.text

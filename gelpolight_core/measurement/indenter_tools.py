@@ -33,6 +33,7 @@ def measure_heightmap(
     shape: str,
     seed_mm: Point | None = None,
     edge_radius_mm: float | None = None,
+    edge_radius_sd_mm: float | None = None,
 ) -> Measurement:
     """Measure the pressed object with all data of a height map.
 
@@ -46,6 +47,8 @@ def measure_heightmap(
         A point (x, y) on the object; needed where several objects are pressed.
     edge_radius_mm : float, optional
         Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
+    edge_radius_sd_mm : float, optional
+        Its standard uncertainty.
 
     Raises
     ------
@@ -64,6 +67,7 @@ def measure_heightmap(
             mode=mode,
             reach_mm=reach_mm,
             edge_radius_mm=edge_radius_mm,
+            edge_radius_sd_mm=edge_radius_sd_mm,
         )
     except InputError as error:
         for doubt in heightmap.doubts:
@@ -126,14 +130,25 @@ class FittedIndenter:
     ----------
     at_mm : (float, float) or None
         A point on it; None where nothing else is pressed.
+    edge_radius_mm, edge_radius_sd_mm : float or None
+        Stated fillet of its edge and its standard uncertainty; None: fitted. A ball has none.
     """
 
     name: ClassVar[str]
     at_mm: Point | None = None
+    edge_radius_mm: float | None = None
+    edge_radius_sd_mm: float | None = None
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
-        return _fitted(self, measure_heightmap(heightmap, shape=self.name, seed_mm=self.at_mm))
+        fit = measure_heightmap(
+            heightmap,
+            shape=self.name,
+            seed_mm=self.at_mm,
+            edge_radius_mm=self.edge_radius_mm,
+            edge_radius_sd_mm=self.edge_radius_sd_mm,
+        )
+        return _fitted(self, fit)
 
 
 class Ball(FittedIndenter):

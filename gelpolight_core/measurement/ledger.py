@@ -1,8 +1,8 @@
 """Finished measurements, one line each, so that no press is measured twice.
 
-The key of a line contains everything that its result depends on: the bytes of the image, the shape,
-and the name of the ledger (calibration, model, program version). An image that was captured again,
-or another calibration, therefore never gets an old result.
+The key of a line contains everything that its result depends on: the bytes of the image, the shape
+and stated edge of the object, and the name of the ledger (calibration, model, program version). An
+image that was captured again, or another calibration, therefore never gets an old result.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gelpolight_core.io.atomic import append_json
 from gelpolight_core.io.reading import json_lines, plain_text
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.measurement.evaluation_run import Outcome, outcome_of
-from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.translation import english
 
 
@@ -46,16 +46,18 @@ class Ledger:
         for _, line in json_lines(path):
             self._take_in(line)
 
-    def outcome(self, image: Path, shape: str, measure: Callable[[Path, str], Outcome]) -> Outcome:
+    def outcome(
+        self, image: Path, truth: Truth, measure: Callable[[Path, Truth], Outcome]
+    ) -> Outcome:
         """Return the result of an image, which is measured and kept if it is not known.
 
         Parameters
         ----------
         image : Path
             The press.
-        shape : str
+        truth : Truth
             What is pressed.
-        measure : callable (image, shape) -> Measurement
+        measure : callable (image, Truth) -> Measurement
             As for :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
 
         Raises
@@ -63,23 +65,25 @@ class Ledger:
         InputError
             If the file of the ledger cannot be written.
         """
-        key = self.key(image, shape)
+        key = self.key(image, truth)
         known = None if key is None else self.find(key)
         if known is not None:
             return known
-        outcome = outcome_of(measure, image, shape)
+        outcome = outcome_of(measure, image, truth)
         if key is not None:
             self.keep(key, outcome)
         return outcome
 
-    def key(self, image: Path, shape: str) -> str | None:
+    def key(self, image: Path, truth: Truth) -> str | None:
         """Return what an image's result is found by; None where the image cannot be read."""
         try:
             content = image.read_bytes()
         except OSError:  # the measurement itself reports this error
             return None
         digest = hashlib.sha256(content)
-        digest.update(f"\n{shape}\n{self._name}".encode())
+        edge = truth.edge_radius_mm, truth.edge_radius_sd_mm
+        stated = "" if edge[0] is None else f"\n{edge}"
+        digest.update(f"\n{truth.shape}\n{self._name}{stated}".encode())
         return digest.hexdigest()
 
     def find(self, key: str) -> Outcome | None:

@@ -74,6 +74,7 @@ def measure_object(
     mode: ModeError | None = None,
     reach_mm: float = 0.0,
     edge_radius_mm: float | None = None,
+    edge_radius_sd_mm: float | None = None,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane; its drape is fitted, too.
 
@@ -94,6 +95,8 @@ def measure_object(
         slopes are correlated over the drape; 0 if they can be white noise.
     edge_radius_mm : float, optional
         Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
+    edge_radius_sd_mm : float, optional
+        Its standard uncertainty; by default a tenth of it, at least 0.01 mm.
 
     Raises
     ------
@@ -112,7 +115,7 @@ def measure_object(
         window = replace(window, depth_mm=_sharpened(window, mode.smoothed_mm2))
     model = MODELS[shape]
     if edge_radius_mm is not None:
-        prior = _stated(prior, model, edge_radius_mm)
+        prior = _stated(prior, model, edge_radius_mm, edge_radius_sd_mm)
     fit = fit_indenter(model, window, model.start(region), edge=prior)
     anchor = no_anchor(heightmap.flags, region)
     problems = (*fit_problems(shape, fit, window, region, prior), anchor)
@@ -129,7 +132,9 @@ def measure_object(
     return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, findings)
 
 
-def _stated(prior: EdgePrior, model: IndenterModel, edge_radius_mm: float) -> EdgePrior:
+def _stated(
+    prior: EdgePrior, model: IndenterModel, edge_radius_mm: float, sd_mm: float | None
+) -> EdgePrior:
     """Return what is known of an edge whose fillet was stated."""
     if "edge_radius_mm" not in model.names:
         raise InputError(
@@ -145,7 +150,7 @@ def _stated(prior: EdgePrior, model: IndenterModel, edge_radius_mm: float) -> Ed
             where=tr("edge radius"),
             advice=tr("Correct it, or leave it out: it is fitted then"),
         )
-    sd_mm = max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
+    sd_mm = sd_mm or max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
     return replace(prior, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
 
 

@@ -14,12 +14,20 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, is_file_name
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.result import Measurement, Truth
-from gelpolight_core.quantity import percent_error
+from gelpolight_core.measurement.result import Measurement, Truth, checked_day, compare
+from gelpolight_core.quantity import DECISIONS, TOLERANCE_PERCENT, Quantity, percent_error
+from gelpolight_core.session.session import (
+    INDENTERS,
+    REFERENCE_RANGE,
+    parse_indenters,
+    read_description,
+)
 from gelpolight_core.translation import tr
 
-LONGEST_MM = 1000.0
+LONGEST_MM = REFERENCE_RANGE[1]
 NEEDED = ("file", "shape", "height_mm")
+INDENTER = "indenter"
+"""The column that names an object of ``[indenters]``, from which a row takes its empty cells."""
 LENGTHS: Mapping[str, str] = MappingProxyType({"planar": "size_mm", "depth": "height_mm"})
 """The length that is judged in each direction of the evaluation."""
 
@@ -72,10 +80,20 @@ class Press:
         """Return the signed error of size or height; NaN without a measurement."""
         return percent_error(self.measured_mm(direction), self.true_mm(direction))
 
-    def as_row(self) -> dict[str, Any]:
+    def quantity(
+        self, direction: str, limits_percent: tuple[float, float] = TOLERANCE_PERCENT
+    ) -> Quantity | None:
+        """Return the size or height beside its reference; None without a measurement."""
+        if self.measurement is None:
+            return None
+        found = compare(self.measurement, self.truth, limits_percent)
+        return found[tuple(LENGTHS).index(direction)]
+
+    def as_row(self, limits_percent: tuple[float, float] = TOLERANCE_PERCENT) -> dict[str, Any]:
         """Return the press as one line of the evaluation's tables; None: not known."""
         truth, measured = self.truth, self.measurement
         lengths: dict[str, float | None] = {}
+        judged: dict[str, float | str | None] = {}
         for direction, key in LENGTHS.items():
             known = measured is not None
             sd_key = key.replace("_mm", "_sd_mm")
@@ -85,6 +103,13 @@ class Press:
                 sd_key: getattr(measured, sd_key, None),
                 f"{direction}_error_percent": self.error_percent(direction) if known else None,
             }
+            found = self.quantity(direction, limits_percent)
+            verdict = None if found is None else found.verdict
+            judged |= {
+                f"{direction}_expanded_mm": None if found is None else found.deviation_expanded,
+                f"{direction}_en": None if found is None else found.en,
+                f"{direction}_decision": None if verdict is None else DECISIONS[verdict],
+            }
         return {
             "file": self.file,
             "shape": truth.shape,
@@ -93,6 +118,7 @@ class Press:
             **lengths,
             "verdict": measured.verdict if measured else "not measured",
             "reason": measured.reason if measured else self.outcome,
+            **judged,
         }
 
 
@@ -115,6 +141,11 @@ class TruthTable:
 def read_truth(path: Path) -> TruthTable:
     """Read ``truth.csv`` (file, shape, diameter_mm, side_mm, height_mm [, region, repeat]).
 
+    Further columns state the reference: standard uncertainties (k = 1) ``diameter_sd_mm``,
+    ``side_sd_mm`` and ``height_sd_mm``, its edge ``edge_radius_mm`` and ``edge_radius_sd_mm``,
+    ``certificate``, ``due`` (a day, such as 2027-03-31) and ``serial``. A row that names an
+    ``indenter`` of the session takes its empty cells from there.
+
     Parameters
     ----------
     path : Path
@@ -128,6 +159,10 @@ def read_truth(path: Path) -> TruthTable:
     """
     path = path / "truth.csv" if path.is_dir() else path
     records = _records(path)
+    if any(record.get(INDENTER) for _, record in records):
+        session = path.parent.parent
+        known = parse_indenters(read_description(session), session / "session.toml")
+        records = [(line, _completed(record, known, path, line)) for line, record in records]
     rows: list[Press] = []
     skipped: list[str] = []
     seen: set[str] = set()
@@ -175,7 +210,9 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         ) from error
     header = [name.strip() for name in numbered[0][1]] if numbered else []
     missing = [name for name in NEEDED if name not in header]
-    if not {"diameter_mm", "side_mm"} & set(header):
+    if INDENTER in header:
+        missing = [name for name in missing if name == "file"]
+    elif not {"diameter_mm", "side_mm"} & set(header):
         missing.append("diameter_mm")
     if missing:
         raise InputError(
@@ -189,9 +226,39 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     ]
 
 
+def _completed(
+    record: dict[str, str], known: Mapping[str, Mapping[str, Any]], path: Path, line: int
+) -> dict[str, str]:
+    """Return a row whose empty cells come from the indenter that it names."""
+    name = record.get(INDENTER, "")
+    if name and name not in known:
+        raise InputError(
+            tr("'{name}' is not an indenter of session.toml").format(name=brief(name)),
+            where=tr("{path}, line {line}").format(path=path, line=line),
+            advice=Remedy.ONE_OF.format(names=", ".join(known) or f"[{INDENTERS}]"),
+        )
+    stated = {key: str(value) for key, value in known.get(name, {}).items()}
+    return stated | {key: cell for key, cell in record.items() if cell}
+
+
 def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
-    key = "side_mm" if shape == "cuboid" else "diameter_mm"
-    truth = Truth(shape, _length(record, key, where), _length(record, "height_mm", where))
+    size = "side" if shape == "cuboid" else "diameter"
+
+    def optional(key: str) -> float | None:
+        return _length(record, key, where, least=0.0) if record.get(key) else None
+
+    truth = Truth(
+        shape,
+        _length(record, f"{size}_mm", where),
+        _length(record, "height_mm", where),
+        optional(f"{size}_sd_mm"),
+        optional("height_sd_mm"),
+        optional("edge_radius_mm"),
+        optional("edge_radius_sd_mm"),
+        record.get("certificate", ""),
+        checked_day(record.get("due", ""), where),
+        record.get("serial", ""),
+    )
     names = record.get("region", ""), record.get("repeat", "")
     if not record.get("position_sd_mm"):
         return Press(file, truth, *names)
@@ -212,13 +279,13 @@ def _number(record: dict[str, str], key: str, where: str) -> float:
     )
 
 
-def _length(record: dict[str, str], key: str, where: str) -> float:
+def _length(record: dict[str, str], key: str, where: str, least: float = math.ulp(0.0)) -> float:
     text = record.get(key, "")
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if 0.0 < value <= LONGEST_MM:
+    if least <= value <= LONGEST_MM:
         return value
     found = tr("{key} is '{text}'") if text else tr("{key} is empty")
     advice = tr("Give a length in mm greater than zero")

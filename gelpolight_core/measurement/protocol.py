@@ -32,6 +32,7 @@ from gelpolight_core.io.reading import (
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.statistics import missing_repeats
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
@@ -99,6 +100,11 @@ class Protocol:
     def crossing(self) -> Crossing:
         """Where its two series cross."""
         return Crossing(self.at_size_mm, self.at_height_mm)
+
+    @property
+    def missing_repeats(self) -> int:
+        """How many repeats the standard deviation in one region lacks to be worth stating."""
+        return missing_repeats(len(self.objects) * max(self.repeats - 1, 0))
 
     def presses(self) -> tuple[Press, ...]:
         """Return every press: object by object, first in the same region, then in the random ones.

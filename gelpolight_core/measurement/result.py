@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding, reason_of
+from gelpolight_core.finding import Finding, Verdict, reason_of
+from gelpolight_core.io.reading import brief
 from gelpolight_core.measurement.statistics import finite_or_none
-from gelpolight_core.quantity import Quantity
+from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -123,16 +126,38 @@ class Measurement:
         """Standard deviation of `height_mm`."""
         return float(self.sd.get("height_mm", math.nan))
 
-    def as_json(self, truth: Truth | None = None) -> dict[str, Any]:
-        """Return the measurement as plain values; true sizes that are known add errors in percent.
+    def parts_of(self, key: str) -> tuple[tuple[str, float], ...]:
+        """Return the known sources of a standard deviation, and their parts of it.
+
+        Parameters
+        ----------
+        key : str
+            As in `sd`; the sides of a cuboid count as their mean, for they err together.
+        """
+        parts = (
+            ("noise", self.noise_sd),
+            ("calibration", self.calibration_sd),
+            ("model", self.mode_sd),
+        )
+        return tuple((name, float(np.mean(sd[key]))) for name, sd in parts if sd is not None)
+
+    def as_json(
+        self,
+        truth: Truth | None = None,
+        limits_percent: tuple[float, float] = TOLERANCE_PERCENT,
+    ) -> dict[str, Any]:
+        """Return the measurement as plain values, compared with the true sizes that are known.
 
         Parameters
         ----------
         truth : Truth, optional
-            Nominal sizes.
+            The reference.
+        limits_percent : (float, float), optional
+            Tolerances of size and height.
         """
         whole = truth if truth is not None and truth.is_whole else None
-        errors = whole and {q.name: q.error_percent for q in compare(self, whole)}
+        known = [q for q in compare(self, truth, limits_percent) if q.truth is not None]
+        errors = whole and {q.name: q.error_percent for q in known}
         size: dict[str, Any] = {"diameter_mm": self.diameter_mm}
         if self.side_mm is not None:
             size = {"side_mm": list(self.side_mm)}
@@ -149,6 +174,8 @@ class Measurement:
             "mode_sd": _plain(self.mode_sd),
             "truth": whole and whole.as_json(),
             "error_percent": errors,
+            "comparisons": [quantity.as_json() for quantity in known],
+            "reference_findings": [finding.text for finding in truth.findings()] if truth else [],
             "verdict": self.verdict,
             "reason": self.reason,
             "edge_radius_mm": self.edge_radius_mm,
@@ -165,7 +192,7 @@ def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Nominal sizes of a pressed object.
+    """The reference: what is known of a pressed object, with standard uncertainties (k = 1).
 
     Attributes
     ----------
@@ -175,11 +202,26 @@ class Truth:
         Diameter, or mean side of a cuboid.
     height_mm : float
         Indentation depth.
+    size_sd_mm, height_sd_mm : float or None
+        Their standard uncertainties; None where they are not stated.
+    edge_radius_mm, edge_radius_sd_mm : float or None
+        Fillet of the edge and its standard uncertainty; None where they are not stated.
+    certificate, serial : str
+        Number of its calibration certificate, and its own; empty if not stated.
+    due : str
+        Day on which its calibration ends, such as ``2027-03-31``; empty if not stated.
     """
 
     shape: str
     size_mm: float
     height_mm: float
+    size_sd_mm: float | None = None
+    height_sd_mm: float | None = None
+    edge_radius_mm: float | None = None
+    edge_radius_sd_mm: float | None = None
+    certificate: str = ""
+    due: str = ""
+    serial: str = ""
 
     @property
     def size_key(self) -> str:
@@ -191,9 +233,47 @@ class Truth:
         """Whether both sizes are known."""
         return math.isfinite(self.size_mm) and math.isfinite(self.height_mm)
 
+    def findings(self, on: date | None = None) -> tuple[Finding, ...]:
+        """Return what is wrong with the reference on a day, by default today."""
+        if not self.due or date.fromisoformat(self.due) >= (on or date.today()):
+            return ()
+        text = tr("the calibration of the reference {number} ended on {day}").format(
+            number=self.certificate or self.serial, day=self.due
+        )
+        remedy = tr("Have the reference calibrated again, or use another one")
+        return (Finding("reference_due", text, verdict=Verdict.WARN, remedy=remedy),)
+
     def as_json(self) -> dict[str, Any]:
-        """Return the truth as plain values."""
-        return {"shape": self.shape, self.size_key: self.size_mm, "height_mm": self.height_mm}
+        """Return the reference as plain values, without what is not stated."""
+        more = {
+            self.size_key.replace("_mm", "_sd_mm"): self.size_sd_mm,
+            "height_sd_mm": self.height_sd_mm,
+            "edge_radius_mm": self.edge_radius_mm,
+            "edge_radius_sd_mm": self.edge_radius_sd_mm,
+            "certificate": self.certificate or None,
+            "due": self.due or None,
+            "serial": self.serial or None,
+        }
+        sizes = {"shape": self.shape, self.size_key: self.size_mm, "height_mm": self.height_mm}
+        return sizes | {key: value for key, value in more.items() if value is not None}
+
+
+def checked_day(text: str, where: Path | str) -> str:
+    """Return a day such as ``2027-03-31``, or an empty text.
+
+    Raises
+    ------
+    InputError
+        If it is another text.
+    """
+    try:
+        return text and date.fromisoformat(text).isoformat()
+    except ValueError as error:
+        raise InputError(
+            tr("'{text}' is not a day").format(text=brief(text)),
+            where=where,
+            advice=tr("Write it as 2027-03-31"),
+        ) from error
 
 
 def compare(
@@ -210,7 +290,7 @@ def compare(
     truth : Truth, optional
         Nominal sizes, greater than zero; NaN where one is not known.
     limits_percent : (float, float), optional
-        Largest errors of size and height that pass.
+        Tolerances of size and height.
 
     Raises
     ------
@@ -237,8 +317,19 @@ def compare(
         (truth.size_key, measurement.size_mm, measurement.size_sd_mm, truth.size_mm),
         ("height_mm", measurement.height_mm, measurement.height_sd_mm, truth.height_mm),
     )
+    references = truth.size_sd_mm, truth.height_sd_mm
     size, height = (
-        Quantity(name, value, finite_or_none(sd), finite_or_none(true), limit)
-        for (name, value, sd, true), limit in zip(rows, limits_percent, strict=True)
+        Quantity(
+            name,
+            value,
+            finite_or_none(sd),
+            finite_or_none(true),
+            limit,
+            reference,
+            measurement.parts_of(name),
+        )
+        for (name, value, sd, true), reference, limit in zip(
+            rows, references, limits_percent, strict=True
+        )
     )
     return size, height

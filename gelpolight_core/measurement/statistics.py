@@ -9,6 +9,23 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.stats import norm
 
+from gelpolight_core.translation import tr
+
+SD_ERROR = 0.25
+"""Largest relative standard error of a standard deviation that is worth stating. With f degrees of
+freedom it is 1 / sqrt(2 f) (GUM E.4.3): 25 % needs f = 8, nine repeats of one object."""
+NEEDED_FREEDOM = math.ceil(0.5 / SD_ERROR**2)
+
+
+def missing_repeats(freedom: int) -> int:
+    """Return how many repeats a standard deviation with these degrees of freedom lacks."""
+    return max(NEEDED_FREEDOM - freedom, 0)
+
+
+def too_few(missing: int) -> str:
+    """Return what to answer where repeats are missing; empty if there are enough."""
+    return tr("too few: {n} more").format(n=missing) if missing else ""
+
 
 @dataclass(frozen=True, slots=True)
 class Statistics:

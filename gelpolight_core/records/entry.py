@@ -7,9 +7,12 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.quantity import Quantity
 
-PASSED, FAILED, DOUBTFUL, UNJUDGED = "pass", "fail", "doubtful", ""
+PASSED, FAILED, UNDECIDED, DOUBTFUL, UNJUDGED = "pass", "fail", "undecided", "doubtful", ""
+OF_VERDICT = {Verdict.PASS: PASSED, Verdict.WARN: UNDECIDED, Verdict.FAIL: FAILED}
+"""What is stored for the verdict of a comparison."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +28,8 @@ class MeasurementRecord:
     quantities : tuple of Quantity
         The measured values; at least one.
     verdict : str
-        ``pass``, ``fail``, ``doubtful``, or empty if there was nothing to judge.
+        ``pass``, ``fail``, ``undecided`` where the uncertainty is too large to decide,
+        ``doubtful``, or empty if there was nothing to judge.
     reason : str
         Reason for ``doubtful``.
     settings : mapping
@@ -79,7 +83,5 @@ def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool = False) -> str
     """Return the verdict on a measurement: the worst one of its quantities."""
     if doubtful:
         return DOUBTFUL
-    judged = [q.passed for q in quantities if q.passed is not None]
-    if not judged:
-        return UNJUDGED
-    return PASSED if all(judged) else FAILED
+    judged = QualityTable(tuple(q.finding for q in quantities if q.finding is not None))
+    return OF_VERDICT[judged.verdict] if judged.figures else UNJUDGED

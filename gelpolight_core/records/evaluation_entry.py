@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 
-from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation
+from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation, evaluation_errors
 from gelpolight_core.quantity import Quantity
-from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord
+from gelpolight_core.records.entry import DOUBTFUL, OF_VERDICT, MeasurementRecord
 from gelpolight_core.records.records import Records
 
 SHAPE = "evaluation"
@@ -18,7 +18,6 @@ def evaluation_record(
     *,
     serial: str,
     calibration_id: str,
-    limits_percent: tuple[float, float],
     operator: str = "",
     folder: str = "",
 ) -> MeasurementRecord | None:
@@ -30,8 +29,6 @@ def evaluation_record(
         Evaluation of all presses.
     serial, calibration_id, operator
         As in :class:`MeasurementRecord`.
-    limits_percent : (float, float)
-        Largest mean errors that pass, planar and in depth.
     folder : str
         Folder of the presses; stored as the image name.
 
@@ -40,7 +37,6 @@ def evaluation_record(
     record : MeasurementRecord or None
         None if nothing could be measured.
     """
-    limits = dict(zip(DIRECTIONS, limits_percent, strict=True))
     errors = {direction: evaluation.overall(direction).mean_absolute for direction in DIRECTIONS}
     found = {direction: error for direction, error in errors.items() if math.isfinite(error)}
     if not found:
@@ -48,16 +44,15 @@ def evaluation_record(
     quantities = tuple(
         Quantity(f"{direction}_error_percent", error) for direction, error in found.items()
     )
-    within = all(error <= limits[direction] for direction, error in found.items())
     failed = evaluation.failure
     return MeasurementRecord(
         serial=serial,
         calibration_id=calibration_id,
         shape=SHAPE,
         quantities=quantities,
-        verdict=DOUBTFUL if failed else (PASSED if within else FAILED),
+        verdict=DOUBTFUL if failed else OF_VERDICT[evaluation_errors(evaluation).verdict],
         reason=failed,
-        settings={"limits_percent": limits},
+        settings={"limits_percent": dict(zip(DIRECTIONS, evaluation.limits_percent, strict=True))},
         details={
             "groups": [
                 asdict(group) | {"statistic": group.statistic.as_json("percent")}

@@ -95,7 +95,7 @@ class Records(Closing):
             )
             number = cursor.lastrowid
             connection.executemany(
-                "INSERT INTO quantities VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                "INSERT INTO quantities VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 [(number, *row) for row in quantity_rows(record)],
             )
         assert number is not None

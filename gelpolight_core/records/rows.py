@@ -44,7 +44,7 @@ def row_of(record: MeasurementRecord) -> tuple[str | None, ...]:
 def quantity_rows(record: MeasurementRecord) -> list[tuple[object, ...]]:
     """Return the measured values as rows, without the measurement's number."""
     return [
-        (k, q.name, q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent)
+        (k, q.name, q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent, q.truth_sd)
         for k, q in enumerate(record.quantities)
     ]
 
@@ -66,7 +66,7 @@ def records_of(
 
 
 def _quantity(row: sqlite3.Row) -> Quantity:
-    numbers = (row["value"], row["sd"], row["truth"], row["limit_percent"])
+    numbers = (row["value"], row["sd"], row["truth"], row["limit_percent"], row["truth_sd"])
     return Quantity(written_text(row["name"]), *numbers)
 
 
@@ -93,7 +93,8 @@ def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRe
 _WHICH = "id", "time_utc", "sensor", "calibration", "shape", "quantity"
 _NUMBERS = "value", "sd", "truth", "error", "error_percent", "limit_percent"
 _REMARKS = "verdict", "reason", "operator", "picture", "note", "settings"
-COLUMNS = (*_WHICH, *_NUMBERS, *_REMARKS)
+_REFERENCE = "truth_sd", "en"
+COLUMNS = (*_WHICH, *_NUMBERS, *_REMARKS, *_REFERENCE)
 
 
 def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
@@ -107,7 +108,8 @@ def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
         for q in r.quantities:
             which = map(_safe, (r.serial, r.calibration_id, r.shape, q.name))
             numbers = (getattr(q, name) for name in _NUMBERS)
-            rows.append((r.id, time, *which, *numbers, *last))
+            reference = (getattr(q, name) for name in _REFERENCE)
+            rows.append((r.id, time, *which, *numbers, *last, *reference))
     return rows
 
 

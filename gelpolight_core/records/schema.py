@@ -55,7 +55,9 @@ _FIRST = (
     "CREATE INDEX measurements_by_sensor ON measurements (serial, time)",
 )
 
-MIGRATIONS: tuple[tuple[str, ...], ...] = (_FIRST,)
+_REFERENCE = ("ALTER TABLE quantities ADD COLUMN truth_sd REAL",)
+
+MIGRATIONS: tuple[tuple[str, ...], ...] = (_FIRST, _REFERENCE)
 """Statements that migrate each version to the next, starting from an empty file."""
 
 

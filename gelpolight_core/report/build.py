@@ -189,8 +189,8 @@ def _numbers(c: Calibration) -> dict[str, Any]:
 
 def _stated(c: Calibration) -> Validated:
     if c.validation is not None:
-        verdict = Verdict.PASS if c.validation.passed else Verdict.FAIL
-        return Validated("; ".join(c.validation.lines()), verdict, data=c.validation.as_json())
+        lines, verdict = c.validation.lines(), c.validation.verdict
+        return Validated("; ".join(lines), verdict, data=c.validation.as_json())
     sentence = tr(
         "Not validated: no object of known size was measured with this calibration. A wrong ball "
         "diameter, square size or scale makes every result wrong, and no image can show this"

@@ -10,19 +10,21 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from gelpolight_core.calibration.recipe import Facts
-from gelpolight_core.finding import QualityTable, Verdict, judge
+from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.characteristics import Characteristic, characteristics
 from gelpolight_core.measurement.evaluation import (
-    ALL,
     DIRECTIONS,
-    PAPER_PERCENT,
     Evaluation,
+    by_object,
+    evaluation_errors,
 )
-from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
-from gelpolight_core.measurement.statistics import finite_or_none
+from gelpolight_core.measurement.gauge import GaugeRow, Scatter, gauge_figures, gauge_rows
+from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.statistics import finite_or_none, too_few
+from gelpolight_core.quantity import PAPER_PERCENT
 from gelpolight_core.report.document import (
     Listing,
     Report,
@@ -39,14 +41,12 @@ from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 EM_DASH = "\N{EM DASH}"
-PAPER_LIMITS = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"])
 
 
 def evaluation_document(
     evaluation: Evaluation,
     *,
     facts: Facts = (),
-    limits_percent: tuple[float, float] = PAPER_LIMITS,
 ) -> Report:
     """Return the report of an evaluation.
 
@@ -56,10 +56,8 @@ def evaluation_document(
         Presses compared with their truth.
     facts : tuple of (label, value), optional
         Sensor, calibration and other facts for the head of the report.
-    limits_percent : (float, float), optional
-        Largest mean absolute errors, planar and in depth, for it to pass.
     """
-    errors = evaluation_errors(evaluation, limits_percent)
+    errors = evaluation_errors(evaluation)
     sections = [
         Section(
             "errors",
@@ -75,7 +73,7 @@ def evaluation_document(
     ]
     gauge = gauge_rows(evaluation)
     if gauge:
-        sections.append(_gauge_section(evaluation, gauge))
+        sections.append(_gauge_section(gauge))
     sections.append(
         Section(
             "characteristics",
@@ -119,31 +117,6 @@ def validation_of(evaluation: Evaluation) -> Validated:
     )
 
 
-def evaluation_errors(
-    evaluation: Evaluation, limits_percent: tuple[float, float] = PAPER_LIMITS
-) -> QualityTable:
-    """Return the mean errors, judged by the limits of the planar and the depth direction."""
-    title = tr("Mean absolute error, {direction}")
-    title_in = tr("Mean absolute error, {direction}, {regions}")
-    advice = tr("Calibrate again, or check the worst presses")
-    figures = []
-    for direction, limit in zip(DIRECTIONS, limits_percent, strict=True):
-        if not evaluation.series(direction):
-            continue  # there is no press for this direction yet
-        name = label(direction)
-        mean = evaluation.overall(direction).mean_absolute
-        text = title.format(direction=name)
-        figures.append(judge(f"{direction}_mean", text, mean, "%", fail=limit, remedy=advice))
-        for group in evaluation.groups:
-            overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
-            mean = group.statistic.mean_absolute
-            if group.direction == direction and overall and math.isfinite(mean):
-                regions = group.regions.replace(" ", "_")
-                text = title_in.format(direction=name, regions=label(group.regions))
-                figures.append(judge(f"{direction}_{regions}", text, mean, "%"))
-    return QualityTable(tuple(figures))
-
-
 def _characteristics(evaluation: Evaluation) -> tuple[Characteristic, ...]:
     return characteristics(evaluation.results, evaluation.flat_um)
 
@@ -174,56 +147,44 @@ def _groups(evaluation: Evaluation) -> Listing:
     )
 
 
-def _gauge_section(evaluation: Evaluation, gauge: tuple[GaugeRow, ...]) -> Section:
+def _gauge_section(gauge: tuple[GaugeRow, ...]) -> Section:
     table = listing(
         tr("Object by object"),
-        gauge,
+        [row for row in gauge if row.truth is not None],
         (tr("direction"), lambda row: label(row.direction)),
-        (tr("shape"), lambda row: label(row.truth.shape)),
+        (tr("shape"), lambda row: label(row.shape)),
         (tr("true (mm)"), lambda row: f"{row.true_mm:g}"),
         (tr("n, same region"), lambda row: str(row.same.count)),
         (tr("mean (mm)"), lambda row: _number(row.same.mean, ".4f")),
-        (tr("sd: repeatability"), lambda row: _micrometres(row.repeatability_mm)),
+        (tr("sd: repeatability"), lambda row: _scatter(row.repeatability)),
         (tr("n, random regions"), lambda row: str(row.random.count)),
         (tr("mean (mm)"), lambda row: _number(row.random.mean, ".4f")),
         (tr("sd"), lambda row: _micrometres(row.random.sd)),
-        (tr("reproducibility"), lambda row: _micrometres(row.reproducibility_mm)),
+        (tr("reproducibility"), lambda row: _scatter(row.reproducibility)),
     )
     intro = tr(
         "Repeatability is the standard deviation of presses in one region; reproducibility "
         "is the additional scatter between regions"
     )
-    pooled = _pooled(evaluation)
     title = tr("Repeatability of the gauge")
-    return Section("gauge", title, intro, QualityTable(), pooled, listings=(table,))
-
-
-def _pooled(evaluation: Evaluation) -> Facts:
-    """Return repeatability and reproducibility over all objects."""
-    texts = {
-        "within_region_mm": tr("Repeatability, {direction}, all objects"),
-        "between_regions_mm": tr("Reproducibility, {direction}, all objects"),
-    }
-    return tuple(
-        (text.format(direction=label(pooled.direction)), _micrometres(getattr(pooled, name)))
-        for pooled in evaluation.repeatability
-        for name, text in texts.items()
-    )
+    return Section("gauge", title, intro, gauge_figures(gauge), listings=(table,))
 
 
 def known_objects(evaluation: Evaluation, title: str) -> Listing:
     """Return every press with its true and its measured lengths."""
     return listing(
         title,
-        [press.as_row() for press in evaluation.results],
+        evaluation.rows,
         (tr("image"), lambda press: press["file"]),
         (tr("shape"), lambda press: label(press["shape"])),
         (tr("size (mm)"), lambda press: f"{press['true_size_mm']:g}"),
         (tr("measured"), lambda press: _with_sd(press["size_mm"], press["size_sd_mm"])),
         (tr("error"), lambda press: _number(press["planar_error_percent"], "+.2f", " %")),
+        ("En", lambda press: _number(press["planar_en"], ".2f")),
         (tr("height (mm)"), lambda press: f"{press['true_height_mm']:g}"),
         (tr("measured"), lambda press: _with_sd(press["height_mm"], press["height_sd_mm"])),
         (tr("error"), lambda press: _number(press["depth_error_percent"], "+.2f", " %")),
+        ("En", lambda press: _number(press["depth_en"], ".2f")),
         (tr("verdict"), lambda p: ": ".join(filter(None, (label(p["verdict"]), p["reason"])))),
     )
 
@@ -255,6 +216,11 @@ def _number(value: float | None, form: str, unit: str = "") -> str:
     return f"{value:{form}}{unit}" if known else EM_DASH
 
 
+def _scatter(scatter: Scatter) -> str:
+    """Return a standard deviation, or how many repeats it lacks to be worth stating."""
+    return too_few(scatter.missing) or _micrometres(scatter.sd_mm)
+
+
 def _micrometres(value_mm: float) -> str:
     return _number(1e3 * value_mm, ".1f", " \N{MICRO SIGN}m")
 
@@ -267,7 +233,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
     """Return the evaluation as lines of text: every press, then every group."""
     presses = known_objects(evaluation, tr("Every press"))
     lines = [*text_lines(presses), "", *text_lines(_groups(evaluation)), ""]
-    lines += [f"{name}: {value}" for name, value in _pooled(evaluation)]
+    lines += [figure.sentence for figure in gauge_figures(gauge_rows(evaluation)).figures]
     lines += [known.finding.stated for known in _characteristics(evaluation)]
     lines.append(evaluation_sentence(evaluation))
     if evaluation.failed:
@@ -296,16 +262,28 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
             }
             for group in evaluation.groups
         ],
+        "tolerance_percent": dict(zip(DIRECTIONS, evaluation.limits_percent, strict=True)),
+        "errors": [
+            row | {"value": finite_or_none(row["value"])}
+            for row in evaluation_errors(evaluation).as_rows()
+        ],
         "repeatability": [
             {
-                "direction": pooled.direction,
-                "within_region_sd_mm": finite_or_none(pooled.within_region_mm),
-                "between_regions_sd_mm": finite_or_none(pooled.between_regions_mm),
+                "direction": row.direction,
+                "within_region_sd_mm": finite_or_none(row.repeatability.sd_mm),
+                "within_region_missing": row.repeatability.missing,
+                "between_regions_sd_mm": finite_or_none(row.reproducibility.sd_mm),
+                "between_regions_missing": row.reproducibility.missing,
             }
-            for pooled in evaluation.repeatability
+            for row in gauge_rows(evaluation)
+            if row.truth is None
         ],
         "characteristics": [known.as_json() for known in _characteristics(evaluation)],
-        "presses": [press.as_row() for press in evaluation.results],
+        "references": [
+            truth.as_json() | {"findings": [finding.text for finding in truth.findings()]}
+            for truth in by_object(evaluation.results)
+        ],
+        "presses": evaluation.rows,
         "failed": len(evaluation.failed),
         "skipped": list(evaluation.skipped),
     }
@@ -316,7 +294,6 @@ def write_evaluation_files(
     folder: Path,
     *,
     calibration: Calibration | None = None,
-    limits_percent: tuple[float, float] = PAPER_LIMITS,
 ) -> tuple[Path, ...]:
     """Write ``evaluation.txt``, ``.csv``, ``.json``, ``.png``, ``.pdf`` and a gauge CSV.
 
@@ -328,8 +305,6 @@ def write_evaluation_files(
         Destination; it must exist.
     calibration : Calibration, optional
         Named in the report.
-    limits_percent : (float, float), optional
-        Largest mean absolute errors, planar and in depth, for it to pass.
 
     Returns
     -------
@@ -341,37 +316,36 @@ def write_evaluation_files(
     InputError
         If a file cannot be written.
     """
-    document = evaluation_document(
-        evaluation,
-        facts=() if calibration is None else head_facts(calibration),
-        limits_percent=limits_percent,
-    )
+    facts = () if calibration is None else head_facts(calibration)
+    document = evaluation_document(evaluation, facts=facts)
     content = json.dumps(evaluation_json(evaluation), indent=2, allow_nan=False)
     contents = {
         "evaluation.txt": (evaluation_table(evaluation) + "\n").encode(),
-        "evaluation.csv": csv_of([press.as_row() for press in evaluation.results]).encode(),
+        "evaluation.csv": csv_of(evaluation.rows).encode(),
         "evaluation.json": (content + "\n").encode(),
         "evaluation.png": png(lambda figure: paint_evaluation(figure, evaluation), 11.0, 11.0),
         "evaluation.pdf": report_pdf(document),
     }
     gauge = gauge_rows(evaluation)
     if gauge:
-        contents["gauge.csv"] = csv_of([_gauge_row(row) for row in gauge]).encode()
+        contents["gauge.csv"] = csv_of(
+            [_gauge_row(row, row.truth) for row in gauge if row.truth is not None]
+        ).encode()
     return write_files(folder, contents)
 
 
-def _gauge_row(row: GaugeRow) -> dict[str, str | float | None]:
+def _gauge_row(row: GaugeRow, truth: Truth) -> dict[str, str | float | None]:
     """Return one object and direction as a line of the table."""
     return {
         "direction": row.direction,
-        "shape": row.truth.shape,
-        "size_mm": row.truth.size_mm,
-        "height_mm": row.truth.height_mm,
+        "shape": truth.shape,
+        "size_mm": truth.size_mm,
+        "height_mm": truth.height_mm,
         "same_region_n": row.same.count,
         "same_region_mean_mm": finite_or_none(row.same.mean),
-        "repeatability_sd_mm": finite_or_none(row.repeatability_mm),
+        "repeatability_sd_mm": finite_or_none(row.repeatability.sd_mm),
         "random_regions_n": row.random.count,
         "random_regions_mean_mm": finite_or_none(row.random.mean),
         "random_regions_sd_mm": finite_or_none(row.random.sd),
-        "reproducibility_sd_mm": finite_or_none(row.reproducibility_mm),
+        "reproducibility_sd_mm": finite_or_none(row.reproducibility.sd_mm),
     }

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
-    PAPER_PERCENT,
     Evaluation,
     errors_by_dimension,
     region_kinds,
 )
 from gelpolight_core.measurement.press import Press
+from gelpolight_core.quantity import PAPER_PERCENT
 from gelpolight_core.translation import tr
 
 COLOURS = {"cylinder": "#0072b2", "cuboid": "#d55e00", "ball": "#009e73"}

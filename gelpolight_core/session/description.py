@@ -15,6 +15,7 @@ from gelpolight_core.session.session import (
     ELASTOMER,
     FORMAT,
     IN_PLACE,
+    INDENTERS,
     VERSION,
     InPlace,
     Session,
@@ -49,6 +50,8 @@ def write_description(session: Session) -> None:
     content["balls"] = radii
     if camera := _camera(session):
         content["camera"] = camera
+    if session.indenters:
+        content[INDENTERS] = {name: dict(stated) for name, stated in session.indenters.items()}
 
     write_text(session.folder / FILE_NAME, tomli_w.dumps(content), inside=session.folder)
 

@@ -25,7 +25,8 @@ from gelpolight_core.translation import tr
 FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
-COMMON = ("format", "version", "sensor", "balls", "camera")
+INDENTERS = "indenters"
+COMMON = ("format", "version", "sensor", "balls", "camera", INDENTERS)
 """Tables and keys of every session.toml."""
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 DENSEST_INDEX = 2.5
@@ -43,6 +44,19 @@ NOT_IN_A_NAME = '/\\:*?"<>|'
 """Characters that the name of a folder cannot have everywhere; files are named by the serial."""
 SCALE_RANGE = (1e-4, 10.0)
 PUNCH_RANGE = (0.1, 100.0)
+REFERENCE_LENGTHS = (
+    "diameter_mm",
+    "diameter_sd_mm",
+    "side_mm",
+    "side_sd_mm",
+    "height_mm",
+    "height_sd_mm",
+    "edge_radius_mm",
+    "edge_radius_sd_mm",
+)
+REFERENCE_TEXTS = ("shape", "certificate", "due", "serial")
+"""What ``[indenters]`` and the columns of ``truth.csv`` state of a pressed object."""
+REFERENCE_RANGE = (0.0, 1000.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +161,8 @@ class Session(SessionImages):
         From ``[sensor]``: name or serial number of the elastomer; empty if not stated.
     in_place : InPlace or None
         From ``[in_place]``; None for a sensor that can be opened.
+    indenters : mapping
+        From ``[indenters]``: what is stated of each object that is pressed, by its name.
     """
 
     folder: Path
@@ -162,6 +178,7 @@ class Session(SessionImages):
     camera_settings: CameraSettings | None = None
     elastomer: str = ""
     in_place: InPlace | None = None
+    indenters: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
 
     @property
     def serial(self) -> str:
@@ -272,8 +289,31 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         decisions=read_decisions(path.parent),
         camera_settings=parse_settings(camera) if "device" in camera.content else None,
         elastomer=top.table("sensor").optional_text(ELASTOMER),
+        indenters=parse_indenters(content, path),
         **own,
     )
+
+
+def parse_indenters(content: dict[str, Any], path: Path) -> dict[str, dict[str, str | float]]:
+    """Return ``[indenters]`` of a session.toml: what is stated of each object, by its name.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown, or a value of the wrong type or out of range.
+    """
+    listed = Table({INDENTERS: {}} | content, "", path).table(INDENTERS)
+    found: dict[str, dict[str, str | float]] = {}
+    for name in listed.content:
+        stated = listed.table(name)
+        stated.no_more(*REFERENCE_LENGTHS, *REFERENCE_TEXTS)
+        found[name] = {
+            key: stated.text(key)
+            if key in REFERENCE_TEXTS
+            else stated.number(key, *REFERENCE_RANGE)
+            for key in stated.content
+        }
+    return found
 
 
 def _parse_opened(top: Table) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -167,10 +168,12 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
     for name in ("a.png", "b.png", "c.png"):
         (tmp_path / name).touch()
 
-    def measure(path: Path, shape: str) -> Measurement:
+    def measure(path: Path, truth: Truth) -> Measurement:
         if path.name == "c.png":
             raise InputError("the image is all black", where=path.name, advice="Open the shutter")
-        return measure_heightmap(heights({"a.png": 2.0, "b.png": 3.0}[path.name]), shape=shape)
+        return measure_heightmap(
+            heights({"a.png": 2.0, "b.png": 3.0}[path.name]), shape=truth.shape
+        )
 
     reported: list[tuple[str, float]] = []
     evaluation = evaluate_presses(
@@ -222,7 +225,7 @@ def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet() -
     found = [measurement("cylinder", 4.04, 1.0)] * 2
     evaluation = evaluate(rows, found, crossing=Crossing(size_mm=5.0, height_mm=1.0))
     document = evaluation_document(evaluation)
-    assert document.verdict is Verdict.PASS
+    assert document.verdict is Verdict.WARN  # too few, but no missing error
     assert document.validation is not None
     assert "planar direction 1.00 %" in document.validation.sentence
     assert "nan" not in document.validation.sentence and "depth" not in document.validation.sentence
@@ -233,19 +236,36 @@ def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -
     rows += [press("cuboid", 5.0, 1.0, region=f"r{k}") for k in range(3)]
     heights_mm = [0.99, 1.0, 1.01, 0.95, 1.0, 1.05]
     found: list[Measurement | str] = [measurement("cuboid", 5.0, h) for h in heights_mm]
-    planar, depth = gauge_rows(evaluate(rows, found))
+    _, planar, _, depth = gauge_rows(evaluate(rows, found))
     assert (depth.same.count, depth.random.count) == (3, 3)
     assert depth.true_mm == 1.0 and planar.true_mm == 5.0
     assert depth.same.mean == pytest.approx(1.0)
-    assert depth.repeatability_mm == pytest.approx(0.01)
+    assert depth.repeatability.sd_mm == pytest.approx(0.01)
     assert depth.random.sd == pytest.approx(0.05)
-    assert depth.reproducibility_mm == pytest.approx(math.sqrt(0.05**2 - 0.01**2))
-    assert planar.reproducibility_mm == 0.0
+    assert depth.reproducibility.sd_mm == pytest.approx(math.sqrt(0.05**2 - 0.01**2))
+    assert planar.reproducibility.sd_mm == 0.0
     found[3:] = ["no object is pressed"] * 3
-    _, depth = gauge_rows(evaluate(rows, found))
+    depth = gauge_rows(evaluate(rows, found))[-1]
     assert depth.random.count == 0
-    assert math.isnan(depth.reproducibility_mm)
+    assert math.isnan(depth.reproducibility.sd_mm)
     assert gauge_rows(evaluate([press("cuboid", 5.0, 1.0)], found[:1])) == ()
+
+
+def test_too_few_presses_neither_pass_nor_tell_their_scatter() -> None:
+    rows = [press("cuboid", 5.0, 1.0, region="same", repeat=str(k)) for k in range(9)]
+    found = [measurement("cuboid", 5.0, 1.0 + 0.001 * k) for k in range(9)]
+
+    def verdicts(count: int) -> dict[str, Verdict]:
+        document = evaluation_document(evaluate(rows[:count], found[:count]))
+        return {
+            figure.key: figure.verdict for s in document.sections for figure in s.quality.figures
+        }
+
+    few, enough = verdicts(8), verdicts(9)
+    assert (few["depth_mean"], few["depth_repeatability"]) == (Verdict.WARN, Verdict.WARN)
+    assert (enough["depth_mean"], enough["depth_repeatability"]) == (Verdict.PASS, Verdict.PASS)
+    wrong = evaluate(rows[:1], [measurement("cuboid", 6.0, 1.0)])
+    assert evaluation_document(wrong).verdict is Verdict.FAIL
 
 
 def test_the_report_is_whole(tmp_path: Path) -> None:
@@ -266,12 +286,13 @@ def test_the_report_is_whole(tmp_path: Path) -> None:
     assert len(gauge) == 2 * 2
     assert {row["same_region_n"] for row in gauge} == {"5"}
     assert evaluation_document(evaluation).verdict is Verdict.PASS
-    strict = evaluation_document(evaluation, limits_percent=(5.0, 0.1))
+    strict = evaluation_document(replace(evaluation, limits_percent=(5.0, 0.1)))
     assert strict.verdict is Verdict.FAIL
 
 
 def test_the_reports_files_are_judged_by_the_limits_that_are_given(tmp_path: Path) -> None:
-    write_evaluation_files(paper_protocol(sizes=[5.0]), tmp_path, limits_percent=(5.0, 0.1))
+    evaluation = replace(paper_protocol(sizes=[5.0]), limits_percent=(5.0, 0.1))
+    write_evaluation_files(evaluation, tmp_path)
     assert report_data(tmp_path / "evaluation.pdf")["verdict"] == "fail"
 
 

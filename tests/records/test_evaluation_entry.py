@@ -4,24 +4,41 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.press import Press
-from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.records.evaluation_entry import add_once, evaluation_record
 from gelpolight_core.records.records import NAME, Records
+
+FIT = Measurement(
+    shape="cylinder",
+    diameter_mm=5.0,
+    side_mm=None,
+    height_mm=1.0,
+    centre_mm=(0.0, 0.0),
+    yaw_deg=None,
+    drape_decay_mm=0.7,
+    sd={"diameter_mm": 0.02, "height_mm": 0.004},
+    edge_radius_mm=0.08,
+    blur_mm=0.05,
+    baseline_mm=0.0,
+    residual_rms_mm=0.001,
+    correlated_pixels=10.0,
+    outline_mm=np.zeros((3, 2)),
+)
 
 
 def evaluation(*errors: tuple[float, float], failed: int = 0) -> Evaluation:
     press = Press("p.png", Truth("cylinder", 5.0, 1.0), outcome="too dark")
     good = [
-        replace(press, outcome=SimpleNamespace(size_mm=5 + size / 20, height_mm=1 + depth / 100))  # type: ignore[arg-type]
+        replace(press, outcome=replace(FIT, diameter_mm=5 + size / 20, height_mm=1 + depth / 100))
         for size, depth in errors
     ]
-    return Evaluation((*good, *[press] * failed), (), ())
+    return Evaluation((*good, *[press] * failed), ())
 
 
 def record(found: Evaluation) -> object:
@@ -29,17 +46,18 @@ def record(found: Evaluation) -> object:
         found,
         serial="A",
         calibration_id="A-1",
-        limits_percent=(5.0, 8.0),
         folder="run",
     )
 
 
 def test_the_mean_errors_are_stored_and_judged_by_the_limits() -> None:
-    kept = record(evaluation((2.0, -4.0), (-4.0, 6.0)))
+    kept = record(evaluation(*[(2.0, -4.0), (-4.0, 6.0)] * 5))
     assert kept.quantity("planar_error_percent").value == pytest.approx(3.0)
     assert kept.quantity("depth_error_percent").value == pytest.approx(5.0)
     assert kept.verdict == "pass"
     assert record(evaluation((6.0, 1.0))).verdict == "fail"
+    assert record(evaluation((2.0, 1.0))).verdict == "undecided"  # a single press
+    assert record(evaluation(*[(4.9, 1.0)] * 9)).verdict == "undecided"  # 5 % less 0.3 %
     assert record(evaluation((1.0, 1.0), failed=1)).verdict == "doubtful"
     assert record(evaluation(failed=2)) is None
 

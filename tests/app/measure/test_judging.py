@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.measure.judging import Reference, quantities_of, record_of
+from app.measure.judging import quantities_of, record_of
 from app.services.preferences import Limits
-from gelpolight_core.finding import doubt
+from app.workspace.reference import Reference
+from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
@@ -56,7 +57,7 @@ def _record(
 @given(size=LENGTHS, height=LENGTHS)
 def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
     found = compare(FIT, Truth("cylinder", size, height))
-    record = _record(PRESSED, Reference(size, height))
+    record = _record(PRESSED, Reference(size_mm=size, height_mm=height))
     assert [q.error_percent for q in record.quantities] == [q.error_percent for q in found]
     assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
 
@@ -64,18 +65,18 @@ def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, hei
 def test_only_what_is_known_is_judged() -> None:
     def limits(result: ToolResult, reference: Reference) -> dict[str, float | None]:
         found = quantities_of(result, reference, Limits())
-        return {q.name: q.limit_percent for q in found if q.passed is not None}
+        return {q.name: q.limit_percent for q in found if q.verdict is not None}
 
     assert limits(PRESSED, Reference()) == {}
     assert limits(PRESSED, Reference(size_mm=5.0)) == {"diameter_mm": 5.0}
     assert limits(PRESSED, Reference(height_mm=1.0)) == {"height_mm": 8.0}
     (apart,) = quantities_of(APART, Reference(size_mm=2.0), Limits())
     assert apart.error_percent == pytest.approx(50.0)
-    assert apart.passed is False
+    assert apart.verdict is Verdict.FAIL
 
 
 def test_the_verdict_follows_the_limits() -> None:
-    reference = Reference(5.0, 1.0)
+    reference = Reference(size_mm=5.0, height_mm=1.0)
     assert _record(PRESSED, reference).verdict == PASSED
     strict = Limits(size_percent=1.0)
     assert _record(PRESSED, reference, strict).verdict == FAILED

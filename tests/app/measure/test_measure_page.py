@@ -22,9 +22,9 @@ from pytestqt.qtbot import QtBot
 from app.command_line.main import main
 from app.context.context import AppContext
 from app.live.grips import grips_of
-from app.measure.judging import Reference
 from app.measure.page import MeasurePage
 from app.services.preferences import Limits
+from app.workspace.reference import Reference
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.measurement.tools import Distance, tool_from_dict
 from gelpolight_core.quantity import Quantity
@@ -134,7 +134,7 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     assert press_view.work.tool.name == "cylinder"
     true = _true(press)
     press_view.inspector.reference.state(
-        Reference(float(true["diameter_mm"]), float(true["height_mm"]))
+        Reference(size_mm=float(true["diameter_mm"]), height_mm=float(true["height_mm"]))
     )
     press_view.inspector.operator.setText("Ada")
     press_view.inspector.note.setText("on the bench")
@@ -161,10 +161,10 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     assert known == (used.identity, "full", used.provenance.created, used.verdict.value)
 
     # Other limits of the user apply at once.
-    assert press_view.state.rows[0].role == "pass"
-    context.settings.limits = Limits(size_percent=0.001)
+    assert press_view.state.rows[0].role == "warn"  # this sensor is known to 7 %
+    context.settings.limits = Limits(size_percent=20.0)
     context.requests.preferences_changed.emit()
-    assert press_view.state.rows[0].role == "fail"
+    assert press_view.state.rows[0].role == "pass"
 
     again = _open(context)
     _kept(again, qtbot, 1)

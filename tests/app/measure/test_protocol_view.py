@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -228,11 +229,14 @@ def test_presses_are_captured_automatically_continued_and_reported(
     names = {path.suffix for path in (folder / "report").iterdir()}
     assert {".csv", ".json", ".pdf"} <= names
 
-    # The report uses the limits that were shown, not the present ones.
-    assert context.settings.limits == Limits()
-    assert "Fail (" in view.run.result.verdict.text()
-    assert report_data(folder / "report" / "evaluation.pdf")["verdict"] == "fail"
+    # The report uses the tolerances that were shown, not the present ones.
+    report = report_data(folder / "report" / "evaluation.pdf")["data"]["evaluation"]
+    assert report["tolerance_percent"] == {"planar": 1e-6, "depth": 1e-6}
 
+    view.run.result.show_evaluation(replace(view.run.result._evaluation, limits_percent=(5.0, 8.0)))
+    (folder / "report" / "gauge.csv").unlink()
+    view.run.result.save(folder / "report")
+    qtbot.waitUntil((folder / "report" / "gauge.csv").is_file, timeout=WAIT_MS)
     calibration = context.workspace.entries()[0].path
     assert main(["evaluate", str(calibration), str(folder), "-o", str(tmp_path / "out")]) == 0
     for name in ("evaluation.csv", "evaluation.json", "gauge.csv"):

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from pytestqt.qtbot import QtBot
 
-from app.measure.judging import Reference
 from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState
 from app.workspace.indenters import Indenter
+from app.workspace.reference import Reference
 
 BALL = Indenter("Ball 8 mm", "ball", 8.0)
 ROD = Indenter("Rod", "cylinder", 5.0, height_mm=1.0)
@@ -49,18 +49,18 @@ def test_an_object_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen
     _show(form, "ball")
     _choose(form, "Ball 8 mm")
     form.show_objects((replace(BALL, size_mm=7.95), replace(ROD, height_mm=0.75)))
-    assert changes[-1] == form.stated == Reference(7.95, 0.0, "Ball 8 mm")
+    assert changes[-1] == form.stated == Reference(size_mm=7.95, name="Ball 8 mm")
     _show(form, "cylinder")
-    assert form.stated == Reference(5.0, 0.75, "Rod")
+    assert form.stated == Reference(size_mm=5.0, height_mm=0.75, name="Rod")
     form.form.change(size_mm=5.1)
-    assert form.stated == Reference(5.1, 0.75, "")
+    assert form.stated == Reference(size_mm=5.1, height_mm=0.75)
 
 
 def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot: QtBot) -> None:
     form, changes = _form(qtbot)
     again = "Same as the press before"
     _show(form, "cylinder")
-    form.state(Reference(5.0, 0.56))
+    form.state(Reference(size_mm=5.0, height_mm=0.56))
     assert form.known.findText(again) < 0
     form.new_press()
     assert changes[-1] == form.stated == Reference()
@@ -68,4 +68,4 @@ def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot:
     assert form.known.findText(again) < 0  # the press before was a cylinder
     _show(form, "cylinder")
     _choose(form, again)
-    assert form.stated == Reference(5.0, 0.56)
+    assert form.stated == Reference(size_mm=5.0, height_mm=0.56)

@@ -1,0 +1,155 @@
+"""References with their uncertainty, and the decision on what was measured beside them."""
+
+from __future__ import annotations
+
+import math
+from datetime import date
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
+from gelpolight_core.measurement.press import read_truth
+from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.statistics import missing_repeats
+from gelpolight_core.quantity import Quantity
+from gelpolight_core.session.description import write_description
+from gelpolight_core.session.session import read_session
+
+SESSION = """format = "gelpolight-session"
+version = 1
+[sensor]
+serial = "A-1"
+[in_place]
+mm_per_px = 0.06
+[balls]
+default = 3.0
+[indenters."Pin 5"]
+shape = "cylinder"
+diameter_mm = 5.002
+diameter_sd_mm = 0.001
+height_mm = 1.0
+edge_radius_mm = 0.15
+certificate = "K-2041"
+due = "2027-03-31"
+serial = "7"
+"""
+PIN = Truth("cylinder", 5.002, 1.0, 0.001, None, 0.15, None, "K-2041", "2027-03-31", "7")
+
+
+def compared(value: float, sd: float | None, truth_sd: float | None = None) -> Quantity:
+    """Return a size beside 5 mm, with a tolerance of 5 %, which is 0.25 mm."""
+    return Quantity("diameter_mm", value, sd, 5.0, 5.0, truth_sd)
+
+
+@pytest.mark.parametrize(
+    ("value", "decision"),
+    [
+        (5.0, Verdict.PASS),
+        (5.14, Verdict.PASS),  # 0.25 less 0.1 mm
+        (5.16, Verdict.WARN),
+        (5.34, Verdict.WARN),
+        (5.36, Verdict.FAIL),  # 0.25 and 0.1 mm
+        (4.64, Verdict.FAIL),
+    ],
+)
+def test_the_tolerance_is_narrower_by_the_uncertainty_for_conformity_and_wider_against_it(
+    value: float, decision: Verdict
+) -> None:
+    assert compared(value, 0.04, 0.03).verdict is decision
+
+
+def test_without_a_stated_uncertainty_the_tolerance_alone_decides() -> None:
+    assert compared(5.249, None).verdict is Verdict.PASS
+    assert compared(5.251, None).verdict is Verdict.FAIL
+    assert compared(5.1, None).en is None
+    assert Quantity("diameter_mm", 5.1, 0.01).verdict is None
+
+
+def test_a_tolerance_below_the_uncertainty_decides_nothing_near_the_reference() -> None:
+    assert compared(5.0, 0.2).verdict is Verdict.WARN
+
+
+def test_en_is_the_deviation_over_both_expanded_uncertainties() -> None:
+    assert compared(5.05, 0.04, 0.03).en == pytest.approx(0.05 / 0.1)
+    assert compared(4.95, 0.04).en == pytest.approx(0.05 / 0.08)
+
+
+def test_the_budget_adds_up_to_the_uncertainty_of_the_deviation() -> None:
+    parts = (("noise", 0.01), ("calibration", 0.02), ("model", 0.02))
+    found = Quantity("diameter_mm", 5.0, 0.05, 5.0, 5.0, 0.03, parts)
+    assert [source for source, _ in found.budget] == [
+        "noise",
+        "calibration",
+        "model",
+        "fit",
+        "reference",
+    ]
+    assert dict(found.budget)["fit"] == pytest.approx(0.04)
+    assert 2.0 * math.hypot(*(sd for _, sd in found.budget)) == pytest.approx(
+        found.deviation_expanded
+    )
+    plain = found.as_json()
+    assert plain["true_expanded"] == 0.06 and plain["decision"] == "conforms"
+
+
+def test_a_reference_is_read_with_what_its_certificate_states(tmp_path: Path) -> None:
+    (tmp_path / "truth.csv").write_text(
+        "file,shape,diameter_mm,side_mm,height_mm,diameter_sd_mm,height_sd_mm,edge_radius_mm,"
+        "edge_radius_sd_mm,certificate,due,serial\n"
+        "a.png,cylinder,5.002,,1,0.001,0.002,0.15,0.01,K-1,2027-03-31,7\n"
+        "b.png,cuboid,,4,1,,,,,,,\n"
+    )
+    first, second = read_truth(tmp_path).rows
+    assert first.truth == Truth(
+        "cylinder", 5.002, 1.0, 0.001, 0.002, 0.15, 0.01, "K-1", "2027-03-31", "7"
+    )
+    assert second.truth == Truth("cuboid", 4.0, 1.0)
+
+
+def test_a_press_takes_its_reference_from_an_indenter_of_the_session(tmp_path: Path) -> None:
+    (tmp_path / "session.toml").write_text(SESSION)
+    presses = tmp_path / "presses"
+    presses.mkdir()
+    (presses / "truth.csv").write_text("file,indenter,height_mm\na.png,Pin 5,\nb.png,Pin 5,0.5\n")
+    first, second = read_truth(presses).rows
+    assert first.truth == PIN
+    assert second.truth.height_mm == 0.5 and second.truth.certificate == "K-2041"
+    (presses / "truth.csv").write_text("file,indenter\na.png,Pin 6\n")
+    with pytest.raises(InputError, match="line 2: 'Pin 6' is not an indenter"):
+        read_truth(presses)
+
+
+def test_a_session_that_is_written_again_keeps_its_indenters(tmp_path: Path) -> None:
+    (tmp_path / "session.toml").write_text(SESSION)
+    session = read_session(tmp_path)
+    write_description(session)
+    assert read_session(tmp_path).indenters == session.indenters
+    assert session.indenters["Pin 5"]["diameter_mm"] == 5.002
+
+
+def test_an_unknown_statement_about_an_indenter_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "session.toml").write_text(SESSION.replace('serial = "7"', 'colour = "red"'))
+    with pytest.raises(InputError, match="colour"):
+        read_session(tmp_path)
+
+
+def test_a_reference_says_that_its_calibration_has_ended() -> None:
+    assert PIN.findings(date(2027, 3, 31)) == ()
+    (found,) = PIN.findings(date(2027, 4, 1))
+    assert (found.key, found.verdict) == ("reference_due", Verdict.WARN)
+    assert "K-2041" in found.text
+    assert Truth("cylinder", 5.0, 1.0).findings(date(2999, 1, 1)) == ()
+
+
+def test_a_due_day_that_is_none_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "truth.csv").write_text(
+        "file,shape,diameter_mm,height_mm,due\na.png,ball,5,1,next May\n"
+    )
+    with pytest.raises(InputError, match="'next May' is not a day"):
+        read_truth(tmp_path)
+
+
+def test_a_standard_deviation_needs_nine_repeats_to_be_known_to_a_quarter() -> None:
+    assert [missing_repeats(count - 1) for count in (1, 5, 8, 9, 25)] == [8, 4, 1, 0, 0]
