@@ -61,7 +61,7 @@ class TrendLog(QObject):
             self._report((serial, ""), str(error))
             return
         for finding in found:
-            self._report((calibration, finding.key), f"{serial}: {finding.sentence}")
+            self._report((calibration, finding.key), f"{serial}: {finding.line}")
 
     def _report(self, what: tuple[str, str], text: str) -> None:
         """Show a message once: it may come every hour."""

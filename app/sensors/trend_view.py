@@ -68,7 +68,7 @@ class TrendView(QWidget):
         parts = zip(self.shown, CHANNEL_COLOURS, SYMBOLS, strict=False)
         self.chart.show_series([_series(*part) for part in parts], group[0].unit)
         lines = [
-            f"<span style='color:@{f.verdict.value}'>{escaped(f.sentence)}</span>"
+            f"<span style='color:@{f.verdict.value}'>{escaped(f.line)}</span>"
             for f in (course.finding for course in self.shown)
         ]
         nothing = tr("Nothing was seen yet. Values are kept while the live image shows no object")

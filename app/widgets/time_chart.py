@@ -68,7 +68,7 @@ class TimeChart(QWidget):
         self.shown: tuple[Series, ...] = ()
         self._unit = ""
         self._plot = bare_plot(bottom=pg.DateAxisItem())
-        self._legend = self._plot.addLegend(offset=(-8, 8))
+        self._legend = self._plot.addLegend(offset=(8, 8))
         vbox(self._plot, of=self, margins=0)
         self._draw()
 

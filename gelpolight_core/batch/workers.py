@@ -10,16 +10,17 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
+T = TypeVar("T")
 ANSWER_S = 10.0
 TASKS_PER_CORE = 3
 """Tasks in the scheduler for each core, running and waiting, so that no core waits for its next."""
@@ -51,6 +52,11 @@ class Workers:
     submit: Callable[..., Future[Any]]
     most: Callable[[], int]
     ended: type[Exception]
+
+    def map(self, function: Callable[..., T], *arguments: Iterable[Any]) -> Iterator[T]:
+        """Yield the results of a function in the order of its arguments, as :func:`map` does."""
+        futures = [self.submit(function, *each) for each in zip(*arguments, strict=True)]
+        return (future.result() for future in futures)
 
 
 @contextmanager

@@ -22,6 +22,8 @@ DAYS_A_YEAR = 365
 QUANTITIES = 8
 """Values of a sensor that are followed: light of three channels, shift along two axes, blur, and
 errors of size and height in a validation."""
+LEAST_DAYS = 4
+"""Days with values from which on a line and its scatter are known."""
 CONFIDENCE = 0.95
 """Of the earliest and the latest day."""
 WANDER = 0.99
@@ -102,7 +104,7 @@ def drifts(days: Array, values: Array, sds: Array) -> tuple[Line, ...]:
     Parameters
     ----------
     days : (n,) float64
-        Rising, at most one value of each day; n is at least 3.
+        Rising, at most one value of each day; n is at least :data:`LEAST_DAYS`.
     values : (n, quantities) float64
         Of the same unit, such as the light of the channels.
     sds : (n,) float64
@@ -122,8 +124,18 @@ def drifts(days: Array, values: Array, sds: Array) -> tuple[Line, ...]:
     found = []
     for lines in zip(*fitted, strict=True):
         worst = min(lines, key=lambda line: line.chance)
-        alarm = worst.chance < level
-        found.append(replace(worst, alarm=True) if alarm else lines[0])
+        found.append(replace(worst, alarm=True) if worst.chance < level else lines[0])
+    if any(line.alarm for line in found):
+        # What is known to drift begins on the day that explains it best. As that day is not known
+        # exactly, only the values from then on count for the line.
+        every = [_lines(days, values, sds, start) for start in days[: -LEAST_DAYS + 1].tolist()]
+        for k, lines in enumerate(zip(*every, strict=True)):
+            if found[k].alarm:
+                start = min(lines, key=lambda line: line.chance).start_day
+                late = days >= start
+                found[k] = replace(
+                    _lines(days[late], values[late], sds[late], start)[k], alarm=True
+                )
     return tuple(found)
 
 

@@ -25,7 +25,7 @@ from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.io.atomic import append_json, make_folder
 from gelpolight_core.io.reading import json_lines, plain_text
-from gelpolight_core.lab.drift import Line, drifts
+from gelpolight_core.lab.drift import LEAST_DAYS, Line, drifts
 from gelpolight_core.light.finding import StateChange
 from gelpolight_core.light.judging import ALONE, BLUR_PX, GAIN, SHIFT_PX
 from gelpolight_core.translation import tr
@@ -33,8 +33,6 @@ from gelpolight_core.validation import Validation
 
 Array = NDArray[np.float64]
 FILE = "trend.jsonl"
-LEAST_DAYS = 4
-"""Days with values from which on a line and its scatter are known."""
 DAY_S = 86_400.0
 MONTH_DAYS = 365.25 / 12.0
 FARTHEST_DAYS = 3652
@@ -78,7 +76,7 @@ def followed(size_percent: float, height_percent: float) -> dict[str, tuple[Foll
     size_percent, height_percent : float
         Largest errors that pass a validation.
     """
-    again = tr("Set to zero, or calibrate again, before the limit is reached")
+    again = tr("Set to zero, or calibrate again")
     led = tr("Check the current and the cable of this LED. {again}").format(again=again)
     seat = tr("Seat the camera and the elastomer firmly. {again}").format(again=again)
     clean = tr("Clean the lens and check its focus. {again}").format(again=again)
@@ -199,18 +197,19 @@ class Course:
     @property
     def finding(self) -> Finding:
         """The change of a month, and when the limit will be reached."""
-        key, unit = f"{self.followed.key}_drift", f"{self.followed.unit}/month"
-        judged = partial(Finding, key, unit=unit)
+        key, unit = f"{self.followed.key}_drift", self.followed.unit
+        judged = partial(Finding, key, unit=f"{unit}/month")
         name, line = self.followed.name, self.line
         if line is None:
             text = tr("{name}: too few days with values: {n} more are needed")
             return judged(text.format(name=name, n=LEAST_DAYS - len(self.days)))
-        change, sd = MONTH_DAYS * line.per_day, MONTH_DAYS * line.per_day_sd
+        change, expanded = MONTH_DAYS * line.per_day, 2.0 * MONTH_DAYS * line.per_day_sd
+        digits = max(1 - math.floor(math.log10(expanded)), 0) if expanded else 0
         day, earliest, latest = line.reaches(self.followed.limit)
         values = {
             "name": name,
-            "change": f"{change:+.2g} \N{PLUS-MINUS SIGN} {2.0 * sd:.1g} {self.followed.unit}",
-            "limit": f"{self.followed.limit:.2g} {self.followed.unit}",
+            "change": f"{change:+.{digits}f} \N{PLUS-MINUS SIGN} {expanded:.{digits}f} {unit}",
+            "limit": f"{self.followed.limit:.2g} {unit}",
             "day": date_text(day, line.last_day),
             "first": date_text(earliest, line.last_day),
             "last": date_text(latest, line.last_day),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Future, as_completed
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 from gelpolight_core.calibration.file import read_calibration
@@ -56,7 +55,7 @@ def evaluate_presses(
     measure: Callable[[Path, Truth], Outcome],
     *,
     progress: Callable[[str, float], None] = lambda _name, _share: None,
-    submit: Callable[..., Future[Outcome]] | None = None,
+    mapped: Callable[..., Iterable[Outcome]] = map,
     reconstructor: Reconstructor | None = None,
 ) -> Evaluation:
     """Measure every press of a folder with ``truth.csv`` and compare it with the truth.
@@ -69,8 +68,8 @@ def evaluate_presses(
         Such as :func:`press_measurement` returns.
     progress : callable, optional
         Called with the file name and the share done, 0..1.
-    submit : callable, optional
-        Of an executor: sends a function and its arguments to another process.
+    mapped : callable, optional
+        In place of :func:`map`, such as that of an executor.
     reconstructor : Reconstructor, optional
         Of the sensor, for the images of its untouched membrane in the folder ``flat``.
 
@@ -90,21 +89,14 @@ def evaluate_presses(
             where=folder / "truth.csv",
             advice=Remedy.TRUTH_ROW,
         )
-    outcomes: dict[str, Outcome] = {}
-    if submit is None:
-        for row in table.rows:
-            progress(row.file, len(outcomes) / len(table.rows))
-            outcomes[row.file] = outcome_of(measure, folder / row.file, row.truth)
-    else:
-        jobs = {
-            submit(outcome_of, measure, folder / row.file, row.truth): row.file
-            for row in table.rows
-        }
-        for job in as_completed(jobs):
-            outcomes[jobs[job]] = job.result()
-            progress(jobs[job], len(outcomes) / len(jobs))
+    paths = [folder / row.file for row in table.rows]
+    truths = [row.truth for row in table.rows]
+    found: list[Outcome] = []
+    outcomes = iter(mapped(partial(outcome_of, measure), paths, truths))
+    for path in paths:
+        progress(path.name, len(found) / len(paths))
+        found.append(next(outcomes))
     progress("", 1.0)
-    found = [outcomes[row.file] for row in table.rows]
     evaluation = evaluate(table.rows, found, skipped=table.skipped, crossing=crossing_of(folder))
     flat = () if reconstructor is None else flat_maps(reconstructor, folder)
     return replace(evaluation, flat_um=flat)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import sqlite3
 from collections.abc import Iterable, Sequence
@@ -12,6 +10,7 @@ from pathlib import Path
 
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.io.reading import parse_json, written_text
+from gelpolight_core.io.table import csv_text
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.records.database import VALUE_LIMIT
@@ -126,9 +125,6 @@ def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(COLUMNS)
-    writer.writerows(rows_of(records))
     # The byte order mark tells spreadsheets that the file is UTF-8.
-    write_atomically(path, lambda stream: stream.write(text.getvalue().encode("utf-8-sig")))
+    text = csv_text(COLUMNS, rows_of(records)).encode("utf-8-sig")
+    write_atomically(path, lambda stream: stream.write(text))

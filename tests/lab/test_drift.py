@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gelpolight_core.lab.drift import CONFIDENCE, drifts
-from tests.studies.drift import days_to_alarm, false_alarms
+from gelpolight_core.lab.trend import MONTH_DAYS
+from tests.studies.drift import WITHIN_DAY_PERCENT, days_to_alarm, false_alarms, light
 
 
 def test_one_percent_a_month_of_one_led_is_reported_within_two_weeks() -> None:
@@ -51,3 +52,14 @@ def test_without_a_trend_the_limit_has_an_earliest_day_and_no_latest() -> None:
     (line,) = drifts(np.arange(40.0), values, np.zeros(40))
     _, earliest, latest = line.reaches(0.44)
     assert not line.alarm and earliest > 39.0 and latest == np.inf
+
+
+def test_the_date_holds_the_truth_although_the_begin_of_the_drift_is_not_known() -> None:
+    stable, limit, held = 20, 1.5, []
+    days = np.arange(40.0)
+    for trial in range(60):
+        values = light(np.random.default_rng([3, trial]), 40, stable=stable, monthly=1.0)
+        line, *_ = drifts(days, values, np.full(40, WITHIN_DAY_PERCENT))
+        _, earliest, latest = line.reaches(limit)
+        held.append(line.alarm and earliest < stable + limit * MONTH_DAYS < latest)
+    assert np.mean(held) > 0.85

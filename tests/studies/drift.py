@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.lab.drift import drifts
-from gelpolight_core.lab.trend import LEAST_DAYS, MONTH_DAYS
+from gelpolight_core.lab.drift import LEAST_DAYS, drifts
+from gelpolight_core.lab.trend import MONTH_DAYS
 from tests.studies.presses import show
 
 SCATTER_PERCENT, WITHIN_DAY_PERCENT = 0.1, 0.02
