@@ -27,6 +27,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
 MOST_FRAMES = 10_000_000
+ABOUT_STRIDE = tr("Meshes use every n-th row and column, which makes smaller files")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +44,7 @@ class ExportChoice:
     ply: bool = switch(False, "", tr("ply: mesh with normals"))
     stl: bool = switch(False, "", tr("stl: mesh only, for 3D printing"))
     glb: bool = switch(False, "", tr("glb: glTF mesh in metres, for 3D viewers and web pages"))
-    stride: int = number(
-        1,
-        tr("Mesh: every n-th node"),
-        1,
-        16,
-        tip=tr("Meshes use every n-th row and column, which makes smaller files"),
-    )
+    stride: int = number(1, tr("Mesh: every n-th node"), 1, 16, tip=ABOUT_STRIDE)
     folder: str = folder_field("", tr("Folder"), relative=True)
     part: bool = switch(False, "", tr("Frames"), tr("Export a range of frames"))
     first: int = number(1, tr("First frame"), 1, MOST_FRAMES, when=lambda c: c.part)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import ipaddress
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QFormLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.live.depth import LiveDepth
 from app.live.frame_results import Shown
 from app.widgets.buttons import Slot, push_button
 from app.widgets.dialog import Dialog
-from app.widgets.inputs import ComboBox, SpinBox
+from app.widgets.fields import choice, number
+from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -26,6 +28,10 @@ from gelpolight_core.translation import tr
 HOST, PORT = "127.0.0.1", 5557
 ANY_HOST = "0.0.0.0"
 """All networks of this computer."""
+REACH = {
+    False: tr("Programs on this computer"),
+    True: tr("Other computers of the network, too"),
+}
 WAITING = 1
 """Messages that wait for a slow receiver. It loses the ones after them; the others lose none."""
 MOST_RECEIVED = 4096
@@ -137,6 +143,14 @@ class DepthStream(QObject):
         self.count += 1
 
 
+@dataclass(frozen=True, slots=True)
+class Receivers:
+    """Who can receive the stream, and where."""
+
+    reach: bool = choice(False, tr("&Receivers"), REACH)
+    port: int = number(PORT, tr("&Port"), 1024, 65535)
+
+
 class StreamDialog(Dialog):
     """Lets the user start and stop the stream. The network needs an explicit consent."""
 
@@ -151,30 +165,19 @@ class StreamDialog(Dialog):
             ),
             wrap=True,
         )
-        self.reach = named(ComboBox(), "stream.reach", tr("Receivers"))
-        self.reach.addItem(tr("Programs on this computer"), False)
-        self.reach.addItem(tr("Other computers of the network, too"), True)
-        self.port = named(SpinBox(), "stream.port", tr("Port"))
-        self.port.setRange(1024, 65535)
-        self.port.setValue(PORT)
+        self.form = Form(Receivers(), "stream", at_once=True)
         self.state = named(PlainLabel(wrap=True), "stream.state", tr("State of the stream"))
         self.button = push_button(
             "stream.start", "", self._toggle, accessible=tr("Start or stop the stream")
         )
-        form = QFormLayout()
-        form.addRow(about)
-        form.addRow(tr("&Receivers"), self.reach)
-        form.addRow(tr("&Port"), self.port)
-        form.addRow(self.state)
-        self.fill(form, add=(self.button,))
+        self.fill(about, self.form, self.state, add=(self.button,))
         self.refresh()
 
     def refresh(self) -> None:
         """Show whether it sends."""
         on = self._stream.on
         self.button.setText(tr("Stop") if on else tr("Start"))
-        for box in (self.reach, self.port):
-            box.setEnabled(not on)
+        self.form.setEnabled(not on)
         self._say(self._stream.text or tr("Nothing is sent."), "pass" if on else "muted")
 
     def _say(self, text: str, meaning: str) -> None:
@@ -184,7 +187,7 @@ class StreamDialog(Dialog):
     def _toggle(self) -> None:
         if self._stream.on:
             self._stream.stop()
-        elif self.reach.currentData():
+        elif self.form.value.reach:
             ask(
                 self,
                 tr("Open to the network"),
@@ -199,7 +202,7 @@ class StreamDialog(Dialog):
 
     def _start(self, *, network: bool) -> None:
         try:
-            self._stream.start(self.port.value(), network=network)
+            self._stream.start(self.form.value.port, network=network)
         except InputError as error:
             self._say(str(error), "fail")
 

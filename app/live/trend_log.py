@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject
 
 from app.context.context import AppContext
+from app.widgets.timers import timer
 from gelpolight_core.errors import InputError
 from gelpolight_core.lab.trend import drifting, keep_sample, read_samples, sample_of_frames
 from gelpolight_core.light.finding import StateChange
@@ -32,8 +33,7 @@ class TrendLog(QObject):
         self._of = "", ""
         self._changes: list[StateChange] = []
         self._reported: set[tuple[str, str]] = set()
-        self._keep = QTimer(self, singleShot=True, interval=KEEP_MS)
-        self._keep.timeout.connect(self.flush)
+        self._keep = timer(self, KEEP_MS, self.flush, once=True)
 
     def follow(self, serial: str, calibration: str, change: StateChange) -> None:
         """Add what a frame shows of a sensor, with the identity of its calibration."""

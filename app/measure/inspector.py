@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QCheckBox, QProgressBar, QWidget
 
 from app.measure.record_table import VERDICTS, verdict_word
 from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState, Row
 from app.widgets.actions import action_button
 from app.widgets.buttons import Slot
+from app.widgets.fields import text
 from app.widgets.fold import Fold
+from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, keep_space, side_panel, vbox
 from app.widgets.meaning import make_bold, show_ground, show_meaning
@@ -24,6 +28,14 @@ from gelpolight_core.translation import tr
 NAMES = "measured", "reference", "deviation"
 LEAST_PX, MOST_PX = 272, 380
 HEAD = "font-size: 11px; color: @muted"
+
+
+@dataclass(frozen=True, slots=True)
+class Remarks:
+    """What is said of a measurement."""
+
+    operator: str = text("", tr("Operator"))
+    note: str = text("", tr("Note"), example=tr("Any remark"))
 
 
 class Inspector(QWidget):
@@ -62,13 +74,7 @@ class Inspector(QWidget):
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.reason = named(PlainLabel(wrap=True), "measure.reason", tr("Why it is doubtful"))
         self.reference = ReferenceForm(on_reference, on_edit)
-        self.operator = named(QLineEdit(user_name()), "measure.operator", tr("Operator"))
-        self.note = named(QLineEdit(placeholderText=tr("Any remark")), "measure.note", tr("Note"))
-        remarks = QWidget()
-        form = QFormLayout(remarks)
-        form.setContentsMargins(0, 0, 0, 0)
-        form.addRow(tr("Operator"), self.operator)
-        form.addRow(tr("Note"), self.note)
+        self.remarks = Form(Remarks(user_name()), "measure", at_once=True)
         self.bench = Fold("measure.bench", tr("Virtual bench"), bench)
         words = tr("Freeze the image and detect the object when a press is steady")
         self.auto = named(QCheckBox(tr("Freeze when steady")), "measure.auto", words)
@@ -91,7 +97,7 @@ class Inspector(QWidget):
                 self.table,
                 self.reason,
                 vbox(heading, self.reference, spacing=4),
-                Fold("measure.remarks", tr("Operator and note"), remarks),
+                Fold("measure.remarks", tr("Operator and note"), self.remarks),
                 self.bench,
             ),
             (

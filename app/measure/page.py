@@ -154,7 +154,7 @@ class MeasurePage(QWidget):
                 what=shape_label(record.shape).lower(),
                 value=quantity_text(record.quantities[0]),
             )
-            self.press_view.inspector.note.clear()
+            self.press_view.inspector.remarks.change(note="")
             self.press_view.inspector.say(text, "pass", link=tr("Show records"))
 
         self.book.add(record, done, calibration=self.press_view.calibration)

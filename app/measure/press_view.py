@@ -338,8 +338,8 @@ class PressView(QWidget):
             heightmap,
             limits=self.context.settings.limits,
             serial=self._best.calibration.serial,
-            operator=self.inspector.operator.text().strip(),
-            note=self.inspector.note.text().strip(),
+            operator=self.inspector.remarks.value.operator.strip(),
+            note=self.inspector.remarks.value.note.strip(),
         )
         self._on_save(record)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
@@ -24,6 +25,8 @@ from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.report.document import Listing, Report
 from gelpolight_core.report.evaluation import evaluation_document, evaluation_sentence
 from gelpolight_core.translation import tr
+
+SAVE_AS = tr("Write CSV and PDF into another folder")
 
 
 class Drawing(QWidget):
@@ -65,28 +68,17 @@ class ResultView(QWidget):
         self._folder = work.run.folder / REPORT
         self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
         make_bold(self.verdict, size=1.45)
-        self._back = push_button(
-            "protocol.back", tr("&Continue pressing"), on_back, tip=tr("Return to the presses")
-        )
-        save = push_button(
-            "protocol.save",
-            tr("&Save the report"),
-            lambda: self.save(work.run.folder / REPORT),
-            tip=tr("Write CSV and PDF next to the run"),
+        here = partial(self.save, work.run.folder / REPORT)
+        self._back, save, save_as, leave = (
+            push_button(f"protocol.{name}", text, slot, tip=tip)
+            for name, text, slot, tip in (
+                ("back", tr("&Continue pressing"), on_back, tr("Return to the presses")),
+                ("save", tr("&Save the report"), here, tr("Write CSV and PDF next to the run")),
+                ("save_as", tr("Save &as…"), self._save_as, SAVE_AS),
+                ("leave_result", tr("Lea&ve"), on_leave, tr("Leave the run. Everything is saved")),
+            )
         )
         save.setProperty("primary", True)
-        save_as = push_button(
-            "protocol.save_as",
-            tr("Save &as…"),
-            self._save_as,
-            tip=tr("Write CSV and PDF into another folder"),
-        )
-        leave = push_button(
-            "protocol.leave_result",
-            tr("Lea&ve"),
-            on_leave,
-            tip=tr("Leave the run. Everything is saved"),
-        )
         self.sentence = named(PlainLabel(wrap=True), "protocol.sentence", tr("Results"))
         self.figure = named(
             Drawing(), "protocol.figure", tr("Errors by size and height, as in the paper's Fig. 13")

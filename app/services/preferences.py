@@ -14,6 +14,7 @@ ABOUT_SPEED = tr(
     "Accuracy or speed of live images, as on the Inspect page. Frozen images always have the full "
     "accuracy of the model"
 )
+ABOUT_RECORDING = tr("A recording stops at this size. Cameras need 2 GB a minute")
 UNITS = {"mm": tr("mm"), "um": tr("um")}
 ABOUT_UNIT = tr(
     "Depths and measured lengths are shown in this unit. Positions, inputs, records and files keep "
@@ -49,13 +50,7 @@ class Preferences:
     )
     # About ten minutes of a fast camera.
     recording_limit_gb: float = number(
-        20.0,
-        tr("Largest recording"),
-        0.1,
-        10_000.0,
-        tr(" GB"),
-        1,
-        tip=tr("A recording stops at this size. Cameras need 2 GB a minute"),
+        20.0, tr("Largest recording"), 0.1, 10_000.0, tr(" GB"), 1, tip=ABOUT_RECORDING
     )
     captures_automatically: bool = True
     last_page: str = ""

@@ -79,6 +79,8 @@ def _can_turn(scene: Scene) -> bool:
 _LARGEST_MM = 12.0
 _DEEPEST_MM = 3.0
 _MM = " " + tr("mm")
+TIMES = " " + tr("times")
+ABOUT_NOISE = tr("0 is no noise, 1 is the noise of the design")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,16 +128,7 @@ class Conditions:
     exposure_ms: float = number(NOMINAL_EXPOSURE_MS, tr("Exposure"), 0.1, 100.0, " ms", 2, step=0.5)
     gain_db: float = number(0.0, tr("Gain"), 0.0, 24.0, " dB", 1)
     rate_hz: float = number(30.0, tr("Frame rate"), 1.0, 60.0, " Hz")
-    noise: float = number(
-        1.0,
-        tr("Noise"),
-        0.0,
-        5.0,
-        " " + tr("times"),
-        2,
-        step=0.1,
-        tip=tr("0 is no noise, 1 is the noise of the design"),
-    )
+    noise: float = number(1.0, tr("Noise"), 0.0, 5.0, TIMES, 2, step=0.1, tip=ABOUT_NOISE)
     faults: frozenset[str] = frozenset()
 
 

@@ -26,6 +26,9 @@ Point = tuple[float, float]
 # Those of ISO 21920-3 that fit on a sensor.
 CUTOFFS_MM = (0.25, 0.8, 2.5)
 CUTOFFS = {0.0: tr("none"), **{c: tr("at {c:g} mm").format(c=c) for c in CUTOFFS_MM}}
+MM = tr(" mm")
+ABOUT_WIDTH = tr("Depth is averaged over this width across the line")
+ABOUT_LEVEL = tr("Depth at which the width is measured. 0: half of the height")
 ABOUT_CUTOFF = tr(
     "Measure Ra, Rq and Rz along the line (ISO 21920). The cut-off separates roughness from "
     "waviness"
@@ -73,26 +76,9 @@ class Section:
 
     lines: tuple[Line, ...] = (Line(),)
     chosen: int = 1
-    width_mm: float = number(
-        0.2,
-        tr("Width"),
-        0.0,
-        5.0,
-        tr(" mm"),
-        2,
-        step=0.1,
-        tip=tr("Depth is averaged over this width across the line"),
-    )
+    width_mm: float = number(0.2, tr("Width"), 0.0, 5.0, MM, 2, step=0.1, tip=ABOUT_WIDTH)
     level_mm: float = number(
-        0.0,
-        tr("Width at"),
-        0.0,
-        5.0,
-        tr(" mm"),
-        3,
-        step=0.01,
-        none=tr("half height"),
-        tip=tr("Depth at which the width is measured. 0: half of the height"),
+        0.0, tr("Width at"), 0.0, 5.0, MM, 3, step=0.01, none=tr("half height"), tip=ABOUT_LEVEL
     )
     cutoff_mm: float = choice(0.0, tr("Ra, Rq, Rz"), CUTOFFS, ABOUT_CUTOFF)
     region: bool = switch(

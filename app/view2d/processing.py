@@ -24,6 +24,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Point = tuple[float, float]
+MM = tr(" mm")
 MASKS = {
     "none": tr("none"),
     "inside": tr("keep the rectangle"),
@@ -78,19 +79,12 @@ class Processing:
 
     mask: str = choice("none", tr("Mask"), MASKS, ABOUT_MASK)
     deeper_mm: float = number(
-        0.1,
-        tr("Deeper than"),
-        -5.0,
-        5.0,
-        tr(" mm"),
-        3,
-        step=0.05,
-        when=lambda p: p.mask == "deeper",
+        0.1, tr("Deeper than"), -5.0, 5.0, MM, 3, step=0.05, when=lambda p: p.mask == "deeper"
     )
     level: str = choice("none", tr("Levelling"), LEVELS, ABOUT_LEVEL)
     filter: str = choice("none", tr("Filter"), FILTERS, ABOUT_FILTER)
     sigma_mm: float = number(
-        0.1, tr("Sigma"), 0.01, 2.0, tr(" mm"), 2, step=0.05, when=lambda p: p.filter == "gaussian"
+        0.1, tr("Sigma"), 0.01, 2.0, MM, 2, step=0.05, when=lambda p: p.filter == "gaussian"
     )
     nodes: int = number(
         3, tr("Size"), 3, LARGEST_MEDIAN, tr(" points"), step=2, when=lambda p: p.filter == "median"

@@ -150,6 +150,11 @@ LARGEST_PX = 8000
 LARGEST_MOVIE_PX = 3840
 
 
+def _in_3d(choice: ImageChoice) -> bool:
+    """Whether the surface alone is saved, in any size."""
+    return choice.what == "surface"
+
+
 @dataclass(frozen=True, slots=True)
 class ImageChoice:
     """Which image to save: the surface in any size, or all views, as shown on the screen."""
@@ -159,21 +164,10 @@ class ImageChoice:
         tr("Save"),
         {"surface": tr("The surface in 3D"), "views": tr("All views, as on the screen")},
     )
-    width_px: int = number(
-        800, tr("Width"), 64, LARGEST_PX, tr(" px"), when=lambda c: c.what == "surface"
-    )
-    height_px: int = number(
-        600, tr("Height"), 64, LARGEST_PX, tr(" px"), when=lambda c: c.what == "surface"
-    )
-    transparent: bool = switch(
-        False, "", tr("Transparent background"), when=lambda c: c.what == "surface"
-    )
-    paper: bool = switch(
-        False,
-        "",
-        tr("For print: white background, large letters"),
-        when=lambda c: c.what == "surface",
-    )
+    width_px: int = number(800, tr("Width"), 64, LARGEST_PX, tr(" px"), when=_in_3d)
+    height_px: int = number(600, tr("Height"), 64, LARGEST_PX, tr(" px"), when=_in_3d)
+    transparent: bool = switch(False, "", tr("Transparent background"), when=_in_3d)
+    paper: bool = switch(False, "", tr("For print: white background, large letters"), when=_in_3d)
 
 
 @dataclass(frozen=True, slots=True)

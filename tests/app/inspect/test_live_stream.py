@@ -118,9 +118,8 @@ def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
 def test_the_network_is_opened_only_after_a_confirmation(page: InspectPage, qtbot: QtBot) -> None:
     page.show_stream()
     dialog = page.stream._dialog
-    assert dialog is not None and dialog.reach.currentData() is False
-    dialog.reach.setCurrentIndex(dialog.reach.findData(True))
-    dialog.port.setValue(_free_port())
+    assert dialog is not None and dialog.form.value.reach is False
+    dialog.form.change(reach=True, port=_free_port())
     dialog.button.click()
     assert not page.stream.on
     (question,) = dialog.findChildren(Question)
@@ -140,7 +139,7 @@ def test_a_port_in_use_or_a_missing_package_is_reported_in_the_dialog(
     dialog = page.stream._dialog
     assert dialog is not None
     with zmq.Context() as context, context.socket(zmq.PUB) as socket:
-        dialog.port.setValue(socket.bind_to_random_port("tcp://127.0.0.1"))
+        dialog.form.change(port=socket.bind_to_random_port("tcp://127.0.0.1"))
         dialog.button.click()
         assert "cannot be used" in dialog.state.text()
     monkeypatch.setitem(sys.modules, "zmq", None)

@@ -136,8 +136,7 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     press_view.inspector.reference.state(
         Reference(size_mm=float(true["diameter_mm"]), height_mm=float(true["height_mm"]))
     )
-    press_view.inspector.operator.setText("Ada")
-    press_view.inspector.note.setText("on the bench")
+    press_view.inspector.remarks.change(operator="Ada", note="on the bench")
     press_view.keep()
     _kept(page, qtbot, 1)
 
