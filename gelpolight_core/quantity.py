@@ -129,6 +129,11 @@ class Quantity:
         return None if self.finding is None else self.finding.verdict
 
     @property
+    def decision(self) -> str | None:
+        """The verdict in the words of files."""
+        return None if self.verdict is None else DECISIONS[self.verdict]
+
+    @property
     def sentence(self) -> str:
         """The comparison of a length in mm, as one line; empty without truth or tolerance."""
         if self.verdict is None or self.truth is None:
@@ -160,7 +165,7 @@ class Quantity:
             "deviation_expanded": self.deviation_expanded,
             "en": self.en,
             "tolerance_percent": self.limit_percent,
-            "decision": None if self.verdict is None else DECISIONS[self.verdict],
+            "decision": self.decision,
             "budget": [{"source": source, "sd": sd} for source, sd in self.budget],
         }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QLabel, QWidget
@@ -119,18 +119,9 @@ class ReferenceForm(QWidget):
         """Return the listed values of an object, or None if it is not in the list."""
         for known in self._objects:
             if (known.shape, known.name) == (kind, name):
-                return Reference(
-                    size_mm=known.mean_size_mm,
-                    size_expanded_mm=known.size_expanded_mm or 0.0,
-                    height_mm=known.height_mm or 0.0,
-                    height_expanded_mm=known.height_expanded_mm or 0.0,
-                    edge_radius_mm=known.edge_radius_mm or 0.0,
-                    edge_radius_expanded_mm=known.edge_radius_expanded_mm or 0.0,
-                    name=name,
-                    certificate=known.certificate,
-                    due=known.due,
-                    serial=known.serial,
-                )
+                values = {key: value for key, value in asdict(known).items() if value is not None}
+                mean = {"size_mm": known.mean_size_mm, "second_mm": 0.0, "shape": ""}
+                return Reference(**values | mean)
         return None
 
     def _on_known(self) -> None:

@@ -273,7 +273,7 @@ def _mean_expanded(evaluation: Evaluation, direction: str) -> float:
 
     Calibration, model and reference err alike in all presses; only the rest averages out.
     """
-    found = [press.quantity(direction) for press in evaluation.series(direction)]
+    found = [press.quantities().get(direction) for press in evaluation.series(direction)]
     common, own = [], []
     for quantity in filter(None, found):
         rows = dict(quantity.budget)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -15,7 +14,7 @@ from gelpolight_core.io.reading import brief, is_file_name
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement, Truth, checked_day, compare
-from gelpolight_core.quantity import DECISIONS, TOLERANCE_PERCENT, Quantity, percent_error
+from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity, percent_error
 from gelpolight_core.session.session import (
     INDENTERS,
     REFERENCE_RANGE,
@@ -24,7 +23,7 @@ from gelpolight_core.session.session import (
 )
 from gelpolight_core.translation import tr
 
-LONGEST_MM = REFERENCE_RANGE[1]
+LONGEST_MM, SHORTEST_MM = REFERENCE_RANGE[1], math.ulp(0.0)
 NEEDED = ("file", "shape", "height_mm")
 INDENTER = "indenter"
 """The column that names an object of ``[indenters]``, from which a row takes its empty cells."""
@@ -80,45 +79,38 @@ class Press:
         """Return the signed error of size or height; NaN without a measurement."""
         return percent_error(self.measured_mm(direction), self.true_mm(direction))
 
-    def quantity(
-        self, direction: str, limits_percent: tuple[float, float] = TOLERANCE_PERCENT
-    ) -> Quantity | None:
-        """Return the size or height beside its reference; None without a measurement."""
+    def quantities(
+        self, limits_percent: tuple[float, float] = TOLERANCE_PERCENT
+    ) -> dict[str, Quantity]:
+        """Return size and height beside their references by direction; none if not measured."""
         if self.measurement is None:
-            return None
+            return {}
         found = compare(self.measurement, self.truth, limits_percent)
-        return found[tuple(LENGTHS).index(direction)]
+        return dict(zip(LENGTHS, found, strict=True))
 
     def as_row(self, limits_percent: tuple[float, float] = TOLERANCE_PERCENT) -> dict[str, Any]:
         """Return the press as one line of the evaluation's tables; None: not known."""
-        truth, measured = self.truth, self.measurement
-        lengths: dict[str, float | None] = {}
-        judged: dict[str, float | str | None] = {}
+        found, lengths = self.quantities(limits_percent), dict[str, Any]()
         for direction, key in LENGTHS.items():
-            known = measured is not None
-            sd_key = key.replace("_mm", "_sd_mm")
+            quantity = found.get(direction)
             lengths |= {
                 f"true_{key}": self.true_mm(direction),
-                key: self.measured_mm(direction) if known else None,
-                sd_key: getattr(measured, sd_key, None),
-                f"{direction}_error_percent": self.error_percent(direction) if known else None,
+                key: quantity and quantity.value,
+                key.replace("_mm", "_sd_mm"): quantity and quantity.sd,
+                f"{direction}_error_percent": quantity and quantity.error_percent,
+                f"{direction}_expanded_mm": quantity and quantity.deviation_expanded,
+                f"{direction}_en": quantity and quantity.en,
+                f"{direction}_decision": quantity and quantity.decision,
             }
-            found = self.quantity(direction, limits_percent)
-            verdict = None if found is None else found.verdict
-            judged |= {
-                f"{direction}_expanded_mm": None if found is None else found.deviation_expanded,
-                f"{direction}_en": None if found is None else found.en,
-                f"{direction}_decision": None if verdict is None else DECISIONS[verdict],
-            }
+        measured = self.measurement
         return {
             "file": self.file,
-            "shape": truth.shape,
+            "shape": self.truth.shape,
             "region": self.region,
             "repeat": self.repeat,
             **lengths,
             "verdict": measured.verdict if measured else "not measured",
             "reason": measured.reason if measured else self.outcome,
-            **judged,
         }
 
 
@@ -245,7 +237,7 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
     size = "side" if shape == "cuboid" else "diameter"
 
     def optional(key: str) -> float | None:
-        return _length(record, key, where, least=0.0) if record.get(key) else None
+        return _length(record, key, where, 0.0) if record.get(key) else None
 
     truth = Truth(
         shape,
@@ -262,33 +254,24 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
     names = record.get("region", ""), record.get("repeat", "")
     if not record.get("position_sd_mm"):
         return Press(file, truth, *names)
-    x, y = (_number(record, key, where) for key in ("x_mm", "y_mm"))
+    x, y = (_length(record, key, where, -LONGEST_MM) for key in ("x_mm", "y_mm"))
     return Press(
         file, truth, *names, (x, y), position_sd_mm=_length(record, "position_sd_mm", where)
     )
 
 
-def _number(record: dict[str, str], key: str, where: str) -> float:
-    text = record.get(key, "")
-    with suppress(ValueError):
-        if math.isfinite(value := float(text)):
-            return value
-    found = tr("{key} is '{text}'") if text else tr("{key} is empty")
-    raise InputError(
-        found.format(key=key, text=brief(text)), where=where, advice=Remedy.CORRECT_VALUE
-    )
-
-
-def _length(record: dict[str, str], key: str, where: str, least: float = math.ulp(0.0)) -> float:
+def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHORTEST_MM) -> float:
     text = record.get(key, "")
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if least <= value <= LONGEST_MM:
+    if least_mm <= value <= LONGEST_MM:
         return value
     found = tr("{key} is '{text}'") if text else tr("{key} is empty")
-    advice = tr("Give a length in mm greater than zero")
+    advice = (
+        Remedy.CORRECT_VALUE if least_mm <= 0.0 else tr("Give a length in mm greater than zero")
+    )
     if value > LONGEST_MM:
         advice = tr("Give a length of at most {most:g} mm").format(most=LONGEST_MM)
     raise InputError(found.format(key=key, text=brief(text)), where=where, advice=advice)
