@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.matching import recording_notes, require_match
@@ -210,9 +209,13 @@ class _Finder:
                 require_match(recording, self._calibration)
                 self.notes += [f"{path}: {note}" for note in recording_notes(recording)]
                 started, numbers = recording.header.started, recording.numbers
-        output = str(PurePosixPath(output, path.stem))
-        job = partial(_recorded_frame, path, output, started, numbers)
-        self.sources.append(Source(output, len(numbers), job))
+        folder = str(PurePosixPath(output, path.stem))
+
+        def job(index: int) -> Job:
+            output = f"{folder}/{path.stem}_{index:06d}"
+            return Job(path, index, output, frame_stamp(started, numbers[index]))
+
+        self.sources.append(Source(folder, len(numbers), job))
 
 
 def frame_stamp(started: str, number: int) -> str:
@@ -221,24 +224,15 @@ def frame_stamp(started: str, number: int) -> str:
 
 
 def _images(folder: Path, names: Sequence[str], output: str) -> Source:
-    return Source(output, len(names), partial(_image, folder, names, output))
-
-
-def _image(folder: Path, names: Sequence[str], output: str, index: int) -> Job:
-    path = folder / names[index]
-    try:
-        status = path.stat()
-        stamp = f"{status.st_size} {status.st_mtime_ns}"
-    except OSError:  # the worker reports why it cannot be read
+    def job(index: int) -> Job:
+        path = folder / names[index]
         stamp = ""
-    return Job(path, None, str(PurePosixPath(output, path.stem)), stamp)
+        with suppress(OSError):  # the worker reports why it cannot be read
+            status = path.stat()
+            stamp = f"{status.st_size} {status.st_mtime_ns}"
+        return Job(path, None, str(PurePosixPath(output, path.stem)), stamp)
 
-
-def _recorded_frame(
-    path: Path, output: str, started: str, numbers: NDArray[np.int64], index: int
-) -> Job:
-    stamp = frame_stamp(started, numbers[index])
-    return Job(path, index, f"{output}/{path.stem}_{index:06d}", stamp)
+    return Source(output, len(names), job)
 
 
 def _raise(error: OSError) -> None:

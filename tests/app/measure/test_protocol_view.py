@@ -28,6 +28,7 @@ from app.sources.source import SourceInfo
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.io.lock import RunLock
+from gelpolight_core.measurement.characteristics import LEAST_FLAT
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.result import Truth
@@ -232,6 +233,10 @@ def test_presses_are_captured_automatically_continued_and_reported(
     # The report uses the tolerances that were shown, not the present ones.
     report = report_data(folder / "report" / "evaluation.pdf")["data"]["evaluation"]
     assert report["tolerance_percent"] == {"planar": 1e-6, "depth": 1e-6}
+    # Three images of the bare membrane at the beginning, and three when it went on.
+    assert len(list((folder / "presses" / "flat").glob("*.png"))) == 2 * LEAST_FLAT
+    known = {row["key"]: row["needed"] for row in report["characteristics"]}
+    assert known["amplification_z_percent"] and "flat" not in known["measurement_noise_um"]
 
     view.run.result.show_evaluation(replace(view.run.result._evaluation, limits_percent=(5.0, 8.0)))
     (folder / "report" / "gauge.csv").unlink()
