@@ -9,25 +9,27 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
+from scipy.stats import linregress
 
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import SUFFIXES, read_image, require_colour
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import marked, tr, translated
 
 Array = NDArray[np.float64]
 FLAT = "flat"
@@ -42,6 +44,28 @@ SAME_AS_TWO = float(ndtr(2.0))
 UM = "\N{MICRO SIGN}m"
 
 
+TERMS: Mapping[str, tuple[str, str]] = {
+    "measurement_noise_um": (marked("Measurement noise NM"), UM),
+    "flatness_deviation_um": (marked("Flatness deviation zFLT"), UM),
+    "amplification_z_percent": (
+        marked("Amplification coefficient \N{GREEK SMALL LETTER ALPHA}z less 1"),
+        "%",
+    ),
+    "linearity_deviation_z_um": (marked("Linearity deviation lz"), UM),
+    "amplification_xy_percent": (
+        marked("Amplification coefficient \N{GREEK SMALL LETTER ALPHA}xy less 1"),
+        "%",
+    ),
+    "linearity_deviation_xy_um": (marked("Linearity deviation lxy"), UM),
+    "mapping_deviation_xy_um": (
+        marked("x-y mapping deviation \N{GREEK CAPITAL LETTER DELTA}xy"),
+        UM,
+    ),
+    "lateral_period_limit_mm": (marked("Lateral period limit DLIM"), "mm"),
+}
+"""Term of the standard, and unit, by the key for scripts."""
+
+
 @dataclass(frozen=True, slots=True)
 class Characteristic:
     """One characteristic of a sensor.
@@ -49,11 +73,7 @@ class Characteristic:
     Attributes
     ----------
     key : str
-        Name for scripts.
-    name : str
-        Its term, with the symbol of the standard.
-    unit : str
-        Of value and uncertainty; empty for a ratio.
+        Of :data:`TERMS`.
     value, expanded : float
         The value and its expanded uncertainty (k = 2); NaN where too little was measured.
     needed : str
@@ -61,8 +81,6 @@ class Characteristic:
     """
 
     key: str
-    name: str
-    unit: str
     value: float = math.nan
     expanded: float = math.nan
     needed: str = ""
@@ -70,13 +88,10 @@ class Characteristic:
     @property
     def finding(self) -> Finding:
         """The characteristic as a figure without a limit."""
-        if self.needed:
-            text = tr("{name}: too few, {needed}").format(name=self.name, needed=self.needed)
-        else:
-            text = tr("{name}, U = {u:.2g} {unit}").format(
-                name=self.name, u=self.expanded, unit=self.unit
-            )
-        return Finding(self.key, text.rstrip(), self.value, self.unit)
+        term, unit = TERMS[self.key]
+        text = tr("{name}: too few, {needed}") if self.needed else "{name}, U = {u:.2g} {unit}"
+        text = text.format(name=translated(term), u=self.expanded, unit=unit, needed=self.needed)
+        return Finding(self.key, text, self.value, unit)
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values; None for what is not known."""
@@ -84,7 +99,7 @@ class Characteristic:
             "key": self.key,
             "value": finite_or_none(self.value),
             "expanded_uncertainty": finite_or_none(self.expanded),
-            "unit": self.unit,
+            "unit": TERMS[self.key][1],
             "needed": self.needed,
         }
 
@@ -101,14 +116,13 @@ def characteristics(
     flat_um : sequence of (rows, columns) float64, optional
         From :func:`flat_maps`.
     """
-    alpha = tr("Deviation from 1 of the amplification coefficient \N{GREEK SMALL LETTER ALPHA}")
-    linearity = tr("Linearity deviation l")
-    return (
-        *_of_flat(flat_um),
-        *_of_lengths(results, "depth", (f"{alpha}z", f"{linearity}z")),
-        *_of_lengths(results, "planar", (f"{alpha}xy", f"{linearity}xy")),
-        _mapping(results),
-        _period_limit(results),
+    return tuple(
+        chain(
+            _of_flat(flat_um),
+            _of_lengths(results, "depth", "z"),
+            _of_lengths(results, "planar", "xy"),
+            (_mapping(results), _period_limit(results)),
+        )
     )
 
 
@@ -139,118 +153,92 @@ def flat_maps(reconstructor: Reconstructor, presses: Path) -> tuple[Array, ...]:
     return tuple(found)
 
 
-def _of_flat(maps_um: Sequence[Array]) -> tuple[Characteristic, Characteristic]:
-    """Return the measurement noise, and the flatness deviation of the mean map."""
-    noise = partial(Characteristic, "measurement_noise_um", tr("Measurement noise NM"), UM)
-    flat = partial(Characteristic, "flatness_deviation_um", tr("Flatness deviation zFLT"), UM)
-    if len(maps_um) < LEAST_FLAT:
+def _of_flat(maps_um: Sequence[Array]) -> Iterator[Characteristic]:
+    """Yield the measurement noise, and the flatness deviation of the mean map."""
+    keys = "measurement_noise_um", "flatness_deviation_um"
+    needed, count = "", len(maps_um)
+    if count < LEAST_FLAT:
         more = tr("{n} more images of the untouched membrane in the folder {folder}")
-        needed = more.format(n=LEAST_FLAT - len(maps_um), folder=FLAT)
-        return noise(needed=needed), flat(needed=needed)
-    maps = np.array(maps_um)
-    if not np.nan_to_num(maps).any():
+        needed = more.format(n=LEAST_FLAT - count, folder=FLAT)
+    elif not np.nan_to_num(maps_um).any():
         needed = tr("this model reads 0 where nothing is pressed")
-        return noise(needed=needed), flat(needed=needed)
-    count = len(maps)
+    if needed:
+        yield from (Characteristic(key, needed=needed) for key in keys)
+        return
+    mean = np.mean(maps_um, axis=0)
     # Sq of each map less the mean of all, in which it has a share itself.
     share = math.sqrt(count / (count - 1))
-    sq = share * np.nanstd(maps - maps.mean(axis=0), axis=(1, 2))
-    mean_um = math.sqrt(float((sq**2).mean()))
-    surface = _levelled(maps.mean(axis=0))
+    sq = share * np.nanstd(np.array(maps_um) - mean, axis=(1, 2))
+    noise_um = math.sqrt(float((sq**2).mean()))
+    yield Characteristic(keys[0], noise_um, 2.0 * float(sq.std(ddof=1)) / math.sqrt(count))
+    places = np.argwhere(np.isfinite(mean)).astype(np.float64)
+    surface = above_plane(places[:, 1], places[:, 0], mean[np.isfinite(mean)])
     # Both of its ends scatter.
-    expanded = 2.0 * math.sqrt(2.0 / count) * mean_um
-    return (
-        noise(mean_um, 2.0 * float(sq.std(ddof=1)) / math.sqrt(count)),
-        flat(float(np.nanmax(surface) - np.nanmin(surface)), expanded),
-    )
+    yield Characteristic(keys[1], float(np.ptp(surface)), 2.0 * math.sqrt(2.0 / count) * noise_um)
 
 
-def _levelled(surface: Array) -> Array:
-    """Return a map less its plane."""
-    rows, columns = np.nonzero(np.isfinite(surface))
-    plane = np.stack([np.ones(rows.size), rows, columns], axis=1)
-    solved = np.linalg.lstsq(plane, surface[rows, columns], rcond=None)[0]
-    level = solved[0] + solved[1] * np.arange(surface.shape[0])[:, None]
-    return np.asarray(surface - level - solved[2] * np.arange(surface.shape[1]))
-
-
-def _of_lengths(
-    results: Sequence[Press], direction: str, names: tuple[str, str]
-) -> tuple[Characteristic, Characteristic]:
-    """Return slope less 1 and largest deviation of the line of measured over true lengths.
+def _of_lengths(results: Sequence[Press], direction: str, axis: str) -> Iterator[Characteristic]:
+    """Yield slope less 1 and largest deviation of the line of measured over true lengths.
 
     One object is one point: its presses share the error of its reference.
     """
-    key = {"depth": "z", "planar": "xy"}[direction]
-    slope = partial(Characteristic, f"amplification_{key}_percent", names[0], "%")
-    deviation = partial(Characteristic, f"linearity_deviation_{key}_um", names[1], UM)
+    keys = f"amplification_{axis}_percent", f"linearity_deviation_{axis}_um"
     found: dict[Truth, list[float]] = defaultdict(list)
     for press in results:
         if press.measurement is not None:
             found[press.truth].append(press.measured_mm(direction))
     true = np.array([float(getattr(truth, LENGTHS[direction])) for truth in found])
-    missing = max(LEAST_OBJECTS - np.unique(true).size, 0)
-    if missing:
+    missing = LEAST_OBJECTS - np.unique(true).size
+    if missing > 0:
         more = tr("{n} more heights") if direction == "depth" else tr("{n} more sizes")
-        return slope(needed=more.format(n=missing)), deviation(needed=more.format(n=missing))
+        yield from (Characteristic(key, needed=more.format(n=missing)) for key in keys)
+        return
     measured = np.array([np.mean(values) for values in found.values()])
-    parts = np.stack([np.ones_like(true), true])
-    covariance = np.linalg.inv(parts @ parts.T)
-    solved = covariance @ parts @ measured
-    away_um = 1e3 * (measured - solved @ parts)
+    line, k = linregress(true, measured), float(stdtrit(true.size - 2, SAME_AS_TWO))
+    yield Characteristic(keys[0], 100.0 * (line.slope - 1.0), k * 100.0 * line.stderr)
+    away_um = 1e3 * np.abs(measured - line.intercept - line.slope * true)
     sd_um = math.sqrt(float((away_um**2).sum()) / (true.size - 2))
+    worst = int(np.argmax(away_um))
     # The line itself follows a deviation in part.
-    free = np.sqrt(1.0 - np.einsum("in,ij,jn->n", parts, covariance, parts))
-    worst = int(np.argmax(np.abs(away_um)))
-    k = float(stdtrit(true.size - 2, SAME_AS_TWO))
-    return (
-        slope(
-            100.0 * (float(solved[1]) - 1.0), k * 0.1 * sd_um * math.sqrt(float(covariance[1, 1]))
-        ),
-        deviation(abs(float(away_um[worst])), k * sd_um * float(free[worst])),
-    )
+    off = true - true.mean()
+    free = 1.0 - 1.0 / true.size - off[worst] ** 2 / float((off**2).sum())
+    yield Characteristic(keys[1], float(away_um[worst]), k * sd_um * math.sqrt(free))
 
 
 def _mapping(results: Sequence[Press]) -> Characteristic:
     """Return the largest x-y mapping deviation, after the stated positions are turned and moved."""
-    named = partial(
-        Characteristic,
-        "mapping_deviation_xy_um",
-        tr("x-y mapping deviation \N{GREEK CAPITAL LETTER DELTA}xy"),
-        UM,
-    )
+    key = "mapping_deviation_xy_um"
     known = [
-        (press.position_mm, press.measurement.centre_mm, press.position_sd_mm)
+        (complex(*press.position_mm), complex(*press.measurement.centre_mm), press.position_sd_mm)
         for press in results
         if press.measurement is not None and math.isfinite(press.position_sd_mm)
     ]
     missing = LEAST_POSITIONS - len(known)
     if missing > 0:
         needed = tr("{n} more presses with x_mm, y_mm and position_sd_mm in {file}")
-        return named(needed=needed.format(n=missing, file="truth.csv"))
-    true, seen = (np.array([row[k] for row in known]) for k in (0, 1))
-    true, seen = true - true.mean(axis=0), seen - seen.mean(axis=0)
-    # The best rotation, by the polar form of complex numbers.
-    at, found = true @ (1.0, 1.0j), seen @ (1.0, 1.0j)
-    turn = np.vdot(at, found)
-    away_um = 1e3 * np.abs(found - at * turn / abs(turn))
-    reference_um = 1e3 * max(row[2] for row in known)
+        return Characteristic(key, needed=needed.format(n=missing, file="truth.csv"))
+    # As complex numbers, of which the best rotation is one, too.
+    true, seen, reference_mm = (np.array(column) for column in zip(*known, strict=True))
+    true, seen = true - true.mean(), seen - seen.mean()
+    turn = np.vdot(true, seen)
+    away_um = 1e3 * np.abs(seen - true * turn / abs(turn))
     # Scatter along one axis; three of the values follow from the rotation and the translation.
     scatter_um = math.sqrt(float((away_um**2).sum()) / (2 * len(known) - 3))
-    return named(float(away_um.max()), 2.0 * math.hypot(reference_um, scatter_um))
+    return Characteristic(
+        key, float(away_um.max()), 2.0 * math.hypot(1e3 * reference_mm.max(), scatter_um)
+    )
 
 
 def _period_limit(results: Sequence[Press]) -> Characteristic:
     """Return the lateral period limit, from the blur of the edges of cylinders and cuboids."""
-    named = partial(
-        Characteristic, "lateral_period_limit_mm", tr("Lateral period limit DLIM"), "mm"
-    )
+    key = "lateral_period_limit_mm"
     blurs = [press.measurement.blur_mm for press in results if press.measurement is not None]
     periods = [HALF_RESPONSE * blur for blur in blurs if blur is not None]
     missing = LEAST_EDGES - len(periods)
     if missing > 0:
-        return named(needed=tr("{n} more presses of a cylinder or cuboid").format(n=missing))
+        needed = tr("{n} more presses of a cylinder or cuboid").format(n=missing)
+        return Characteristic(key, needed=needed)
     period_mm = float(np.mean(periods))
     scatter_mm = float(np.std(periods, ddof=1)) / math.sqrt(len(periods))
     form_mm = (OTHER_FORM / HALF_RESPONSE - 1.0) * period_mm / math.sqrt(3.0)
-    return named(period_mm, 2.0 * math.hypot(scatter_mm, form_mm))
+    return Characteristic(key, period_mm, 2.0 * math.hypot(scatter_mm, form_mm))
