@@ -17,7 +17,7 @@ from app.sources.stream import Stream
 from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, scroll_area, vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import heading, show_meaning
 from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
 from app.widgets.quality_table import QualityTableWidget
@@ -102,9 +102,7 @@ class CameraPanel(QWidget):
         tables = QWidget()
         column = vbox(of=tables, margins=0)
         for title, table in ((tr("Lock"), self.locks), (tr("Stability"), self.steady)):
-            heading = PlainLabel(title)
-            make_bold(heading)
-            column.addWidget(heading)
+            column.addWidget(heading(title))
             column.addWidget(table)
         column.addStretch(1)
         area = named(scroll_area(tables), "camera.verdicts", tr("Lock and stability"))

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 from app.live.drawing import colour_of
 from app.live.overlay import Role
 from app.widgets.label import PlainLabel, plain_tip
-from app.widgets.layout import hbox
+from app.widgets.layout import hbox, keep_space
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
 from app.widgets.quality_table import SIGNS
@@ -33,10 +33,8 @@ class FocusBar(QProgressBar):
         )
         self.setRange(0, 1000)
         self.setFixedSize(170, 18)
-        policy = self.sizePolicy()
         # Still images have no focus to adjust; the image above must not jump because of that.
-        policy.setRetainSizeWhenHidden(True)
-        self.setSizePolicy(policy)
+        keep_space(self)
         self.show_share(0.0)
 
     def show_share(self, share: float) -> None:

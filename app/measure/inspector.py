@@ -6,19 +6,20 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QCheckBox, QProgressBar, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from app.measure.record_table import VERDICTS, verdict_word
 from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState, Row
 from app.widgets.actions import action_button
+from app.widgets.busy import busy_bar
 from app.widgets.buttons import Slot
 from app.widgets.fields import text
 from app.widgets.fold import Fold
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
-from app.widgets.layout import hbox, keep_space, side_panel, vbox
-from app.widgets.meaning import make_bold, show_ground, show_meaning
+from app.widgets.layout import hbox, side_panel, vbox
+from app.widgets.meaning import heading, make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.units import unit_word
 from gelpolight_core.io.user import user_name
@@ -79,24 +80,18 @@ class Inspector(QWidget):
         words = tr("Freeze the image and detect the object when a press is steady")
         self.auto = named(QCheckBox(tr("Freeze when steady")), "measure.auto", words)
         self.auto.setChecked(True)
-        self.busy = named(QProgressBar(), "measure.busy", tr("Measuring"))
-        self.busy.setRange(0, 0)
-        self.busy.setFixedHeight(4)
-        self.busy.setTextVisible(False)
-        keep_space(self.busy)
+        self.busy = busy_bar("measure.busy", tr("Measuring"))
         self.message = named(MarkupLabel(wrap=True), "measure.message", tr("Last answer"))
         self.message.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.message.setFixedHeight(3 * self.message.fontMetrics().lineSpacing())
         self.message.linkActivated.connect(lambda _link: on_records())
-        heading = PlainLabel(tr("Reference"))
-        make_bold(heading)
         head = hbox((self.title, 1), (self.verdict, 0, Qt.AlignmentFlag.AlignTop), spacing=8)
         panel = side_panel(
             (
                 vbox(head, self.image, spacing=2),
                 self.table,
                 self.reason,
-                vbox(heading, self.reference, spacing=4),
+                vbox(heading(tr("Reference")), self.reference, spacing=4),
                 Fold("measure.remarks", tr("Operator and note"), self.remarks),
                 self.bench,
             ),

@@ -26,7 +26,7 @@ from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import heading, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from gelpolight_core.measurement.protocol import SHAPES, Protocol
@@ -83,7 +83,7 @@ class ProtocolSetup(QScrollArea):
         for button in self._runs:
             button.setFixedWidth(RUNS_WIDTH)
             button.setStyleSheet("text-align: left")
-        runs = vbox(_heading(tr("Runs so far")), self._no_runs, *self._runs, None)
+        runs = vbox(heading(tr("Runs so far"), size=1.45), self._no_runs, *self._runs, None)
         inside = QWidget()
         hbox(None, self._build_form(), runs, None, of=inside, margins=(24, 16, 24, 16), spacing=32)
         self.setWidget(inside)
@@ -142,7 +142,7 @@ class ProtocolSetup(QScrollArea):
         for label in (explanation, self.problem):
             label.setFixedWidth(WIDTH)
         return vbox(
-            _heading(tr("Evaluate a sensor")),
+            heading(tr("Evaluate a sensor"), size=1.45),
             explanation,
             top,
             self.presses,
@@ -216,9 +216,3 @@ def _duration(seconds: float) -> str:
     if seconds < 90.0 * 60.0:
         return tr("{n} min").format(n=max(round(seconds / 60.0), 1))
     return tr("{n:.1f} hours").format(n=seconds / 3600.0)
-
-
-def _heading(text: str) -> PlainLabel:
-    label = PlainLabel(text)
-    make_bold(label, size=1.45)
-    return label

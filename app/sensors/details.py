@@ -7,14 +7,15 @@ from datetime import datetime
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
-from PySide6.QtWidgets import QLineEdit, QProgressBar, QTabWidget, QWidget
+from PySide6.QtWidgets import QLineEdit, QTabWidget, QWidget
 
 from app.sensors.tables import made_cell
 from app.sensors.trend_view import TrendView
 from app.theme.icons import icon
 from app.widgets.actions import action_button
+from app.widgets.busy import busy_bar
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
-from app.widgets.layout import hbox, keep_space, scroll_area, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
@@ -54,12 +55,7 @@ class Details(QWidget):
             buttons.addWidget(action_button(action))
         self._area = scroll_area(QWidget())
         named(self._area, "sensors.details.stages", tr("Quality of the stages"))
-        self.busy = named(QProgressBar(self), "sensors.busy", tr("Writing the report"))
-        self.busy.setRange(0, 0)
-        self.busy.hide()
-        self.busy.setFixedHeight(4)
-        self.busy.setTextVisible(False)
-        keep_space(self.busy)
+        self.busy = busy_bar("sensors.busy", tr("Writing the report"))
         self._message = named(MarkupLabel(wrap=True), "sensors.message", tr("Last answer"))
         self._message.linkActivated.connect(
             lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))

@@ -10,9 +10,8 @@ from PySide6.QtWidgets import QWidget
 
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import Cell, CellsTable
-from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
-from app.widgets.meaning import make_bold
+from app.widgets.meaning import heading
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
@@ -133,9 +132,7 @@ class SessionsBox(QWidget):
         self.go_on = make_action(
             self, "sensors.go_on", tr("&Continue calibration"), self._continue, tip=tip
         )
-        title = PlainLabel(tr("Sessions"))
-        make_bold(title)
-        row = hbox(title, None, action_button(self.go_on))
+        row = hbox(heading(tr("Sessions")), None, action_button(self.go_on))
         vbox(row, (self.table, 1), of=self, margins=(0, 8, 0, 0))
 
     def set_entries(self, entries: tuple[SessionEntry, ...]) -> None:

@@ -11,7 +11,7 @@ from app.context.context import AppContext
 from app.context.source_button import SourceButton
 from app.services.status import StatusModel
 from app.widgets.label import PlainLabel
-from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.meaning import heading, make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -37,9 +37,7 @@ class StateBar(QToolBar):
         self.setIconSize(QSize(18, 18))
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         self._status = context.status
-        title = PlainLabel(tr("GelPoLight Studio"))
-        make_bold(title)
-        self._title = self.addWidget(title)
+        self._title = self.addWidget(heading(tr("GelPoLight Studio")))
         self._sensor = named(PlainLabel(), "chip", tr("Sensor"))
         self._sensor_shown = self.addWidget(self._sensor)
         self.camera = SourceButton(context=context)

@@ -20,11 +20,9 @@ class Fold(QWidget):
         Text.
     content : QWidget
         The widget.
-    unfolded : bool, optional
-        Whether it is visible at first.
     """
 
-    def __init__(self, name: str, title: str, content: QWidget, *, unfolded: bool = False) -> None:
+    def __init__(self, name: str, title: str, content: QWidget) -> None:
         super().__init__()
         self._content = content
         self.title = named(QToolButton(autoRaise=True), name, title)
@@ -35,8 +33,7 @@ class Fold(QWidget):
         self.title.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.title.toggled.connect(self._show)
         vbox(self.title, content, of=self, margins=0, spacing=4)
-        self.title.setChecked(unfolded)
-        self._show(unfolded)
+        self._show(False)
 
     def _show(self, unfolded: bool) -> None:
         self.title.setArrowType(Qt.ArrowType.DownArrow if unfolded else Qt.ArrowType.RightArrow)

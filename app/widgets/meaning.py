@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QWidget
 
+from app.widgets.label import PlainLabel
+
 PROPERTY = "meaning"
 """The property by which the program's style sheet selects the colour."""
 
@@ -41,3 +43,10 @@ def make_bold(widget: QWidget, *, size: float = 1.0) -> None:
     font.setPointSizeF(font.pointSizeF() * size)
     font.setBold(True)
     widget.setFont(font)
+
+
+def heading(text: str, *, size: float = 1.0) -> PlainLabel:
+    """Return a text in bold, in a multiple of the usual size."""
+    label = PlainLabel(text)
+    make_bold(label, size=size)
+    return label
