@@ -160,7 +160,7 @@ def test_a_validated_calibration_is_marked(
     )
     context.requests.calibrations_changed.emit()
     assert "Validated: cylinder 5 mm" in words(page)
-    assert "+2.0 %" in words(page)
+    assert "+2.00 %" in words(page)
     count = len(context.toasts.shown())
     page.offered["use"].trigger()
     again = page.chosen()
