@@ -19,11 +19,14 @@ from gelpolight_core.labels import label as words
 from gelpolight_core.light.finding import as_dict
 from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
+from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.tools import Tool, ToolResult, result_as_dict
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.report.document import refuse_other_endings
+from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.translation import tr
 
 
@@ -39,6 +42,11 @@ class Measure(ToolArguments):
         metavar="MM",
     )
     json: Path | None = result()
+    report: Path | None = option(
+        help=tr("certificate to write, with uncertainty budget and decisions; with --shape"),
+        metavar="FILE.pdf",
+        writes=True,
+    )
     despite_faults: bool = despite_faults()
     model: str | None = model()
 
@@ -52,13 +60,24 @@ class Measure(ToolArguments):
             raise InputError(
                 tr("Tools do not use an edge radius"), "--edge-radius", Remedy.REMOVE_OPTION
             )
+        if tools and self.report is not None:
+            raise InputError(
+                tr("A certificate states sizes, not results of tools"),
+                "--report",
+                Remedy.REMOVE_OPTION,
+            )
+        if self.report is not None:
+            refuse_other_endings(self.report)
         truths = self._truths()
         reconstructor = load_reconstructor(self.calibration, self.model)
         several = len(self.images) > 1
         entries, refused = [], 0
+        certified: list[MeasuredPress] = []
         for image in self.images:
             try:
-                entry, lines = self._measured(image, reconstructor, tools, truths.get(image.name))
+                entry, lines = self._measured(
+                    image, reconstructor, tools, truths.get(image.name), certified
+                )
             except InputError as error:
                 if not several:
                     raise
@@ -71,10 +90,20 @@ class Measure(ToolArguments):
             say("\n".join([f"{image}:", *(f"  {line}" for line in lines)] if several else lines))
         if self.json:
             write_json(self.json, entries if several else entries[0])
+        if self.report and certified:
+            from gelpolight_core.report.file import write_report  # slow to import
+            from gelpolight_core.report.measurement import measurement_report
+
+            write_report(measurement_report(reconstructor.calibration, certified), self.report)
         return MENDABLE if refused else 0
 
     def _measured(
-        self, image: Path, reconstructor: Reconstructor, tools: Sequence[Tool], truth: Truth | None
+        self,
+        image: Path,
+        reconstructor: Reconstructor,
+        tools: Sequence[Tool],
+        truth: Truth | None,
+        certified: list[MeasuredPress],
     ) -> tuple[dict[str, Any], list[str]]:
         """Reconstruct an image, fit the object or apply the tools. Return JSON values and text."""
         heightmap = measurable_depth(
@@ -109,6 +138,8 @@ class Measure(ToolArguments):
             edge_radius_sd_mm=edge_sd_mm,
         )
         measurement = judged(found, heightmap)
+        digest = file_hash(image)
+        certified.append(MeasuredPress(image.name, digest, heightmap, measurement, truth))
         values = measurement.as_json(truth)
         corrected += [] if truth is None else [finding.line for finding in truth.findings()]
         shape = [f"{tr('shape'):<12} {measurement.shape}"] if self.shape == AUTO else []

@@ -19,9 +19,9 @@ from gelpolight_core.measurement.protocol_run import presses_folder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report as Document
-from gelpolight_core.report.document import Validated
+from gelpolight_core.report.document import Validated, refuse_other_endings
 from gelpolight_core.report.evaluation import validation_of
-from gelpolight_core.report.file import refuse_other_endings, write_report
+from gelpolight_core.report.file import write_report
 from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.translation import tr
 

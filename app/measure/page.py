@@ -98,7 +98,7 @@ class MeasurePage(QWidget):
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
-        return (self.results.export_action,)
+        return (self.press_view.certify_action, self.results.export_action)
 
     def _show_again(self) -> None:
         """Show the values in another unit, and judge them by other limits."""

@@ -32,20 +32,22 @@ from app.measure.steady import SteadyPress
 from app.measure.tool_map import ToolMap
 from app.measure.tool_section import ToolSection
 from app.measure.work import Work
-from app.services.file_dialogs import ask_open
-from app.services.jobs import Jobs
+from app.services.file_dialogs import ask_open, ask_save
+from app.services.jobs import Job, Jobs
 from app.theme.icons import icon
 from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tools import Cuboid, Cylinder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.translation import tr
 
 IMAGES = (".png", ".tif", ".tiff")
@@ -86,7 +88,7 @@ class PressView(QWidget):
     ) -> None:
         super().__init__()
         named(self, "measure.press", tr("Measure a press"))
-        self.context, self._on_save = context, on_save
+        self.context, self._jobs, self._on_save = context, jobs, on_save
         self.work = Work(self)
         self.live = LiveSession(context=context, name="measure live", parent=self)
         self.live_depth = LiveDepth(self.live, jobs, self, context=context)
@@ -140,6 +142,12 @@ class PressView(QWidget):
         )
         self.save_action = add(
             "measure.keep", tr("Save to records"), self.keep, keys=("Ctrl+Return",)
+        )
+        self.certify_action = add(
+            "measure.certify",
+            tr("Certificate…"),
+            self.choose_certificate,
+            tip=tr("Save the sizes with their uncertainty budget and decisions as PDF"),
         )
         tip, remove = tr("Remove the chosen tool (Del)"), self.work.remove
         self.remove_action = add(
@@ -343,6 +351,38 @@ class PressView(QWidget):
         )
         self._on_save(record)
 
+    def choose_certificate(self) -> None:
+        """Let the user choose the file of the certificate of the measured object."""
+        title, name = tr("Save the certificate"), "measurement.pdf"
+        chosen = ask_save(self, self.context.settings, "report", title, name, tr("PDF (*.pdf)"))
+        if chosen is not None:
+            self.certify(chosen)
+
+    def certify(self, path: Path) -> None:
+        """Write the certificate of the measured object; the panel shows how it ended."""
+        image, heightmap, fit = self.work.image, self.work.heightmap, self._measurement
+        calibration = self.calibration
+        if image is None or heightmap is None or fit is None or calibration is None:
+            return
+        digest = "" if image.path is None else file_hash(image.path)
+        truth = self.inspector.reference.stated_for(fit.shape).truth(fit.shape)
+        press = MeasuredPress(image.name, digest, heightmap, fit, truth)
+        limits, operator = self.context.settings.limits, self.inspector.operator.text().strip()
+
+        def work(_progress: object) -> None:
+            from gelpolight_core.report.file import write_report  # slow to import
+            from gelpolight_core.report.measurement import measurement_report
+
+            report = measurement_report(
+                calibration, (press,), limits_percent=limits.percent, operator=operator
+            )
+            write_report(report, path)
+
+        def done(_nothing: None) -> None:
+            self.inspector.say(tr("Certificate saved as {path}").format(path=path), "pass")
+
+        self._jobs.submit(Job(tr("Writing the certificate"), work, done))
+
     def _place(self, kind: str) -> None:
         """Let the user place a tool on the frozen image. Empty: none."""
         if kind and not self.state.measurable:
@@ -389,6 +429,7 @@ class PressView(QWidget):
         self.freeze_action.setEnabled(state.frozen or state.freezable)
         self.freeze_action.setText(tr("Next object") if state.frozen else tr("Freeze"))
         self.save_action.setEnabled(state.savable)
+        self.certify_action.setEnabled(state.savable and self._measurement is not None)
         earlier = tr("Save the earlier press")
         self.save_action.setText(earlier if state.earlier else tr("Save to records"))
         self.remove_action.setEnabled(bool(state.kind))

@@ -149,7 +149,7 @@ def _assemble(c: Calibration, run: Run | None, validation: Validated | None) -> 
     for stage in recipe.stages:
         if show := SHOWN.get(stage):
             parts |= show(c.data, run)
-    validation = validation or _stated(c)
+    validation = validation or stated_validation(c)
     cause, quality = with_one_cause(c.quality)
     sections = tuple(
         Section(
@@ -187,7 +187,8 @@ def _numbers(c: Calibration) -> dict[str, Any]:
     return {key: value for key, value in manifest.items() if key != "quality"} | few
 
 
-def _stated(c: Calibration) -> Validated:
+def stated_validation(c: Calibration) -> Validated:
+    """Return what a calibration says of its validation."""
     if c.validation is not None:
         lines, verdict = c.validation.lines(), c.validation.verdict
         return Validated("; ".join(lines), verdict, data=c.validation.as_json())

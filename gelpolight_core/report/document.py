@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeVar
 
 from gelpolight_core.calibration.recipe import Facts
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, Verdict
+from gelpolight_core.translation import tr
 
 T = TypeVar("T")
+ENDING = ".pdf"
 MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}
 """A symbol next to each verdict, so that it is not shown by colour alone."""
 
@@ -161,3 +165,19 @@ class Report:
     listings: tuple[Listing, ...] = ()
     created: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
+
+
+def refuse_other_endings(path: Path) -> None:
+    """Refuse a report name that does not end in .pdf.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
+    if path.suffix.lower() != ENDING:
+        raise InputError(
+            tr("A report is written as PDF, so its name must end in .pdf"),
+            where=path,
+            advice=Remedy.CHOOSE_NAME,
+        )

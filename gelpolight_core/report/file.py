@@ -15,31 +15,13 @@ import numpy as np
 import typst
 
 from gelpolight_core import __version__
-from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.io.atomic import write_atomically
-from gelpolight_core.report.document import MARKS, Report
+from gelpolight_core.report.document import MARKS, Report, refuse_other_endings
 from gelpolight_core.report.drawing import FONTS, printable
 from gelpolight_core.translation import current_language, tr
 
-ENDING = ".pdf"
 TEMPLATE = Path(__file__).with_name("report.typ")
-
-
-def refuse_other_endings(path: Path) -> None:
-    """Refuse a report name that does not end in .pdf.
-
-    Raises
-    ------
-    InputError
-        If it does not.
-    """
-    if path.suffix.lower() != ENDING:
-        raise InputError(
-            tr("A report is written as PDF, so its name must end in .pdf"),
-            where=path,
-            advice=Remedy.CHOOSE_NAME,
-        )
 
 
 def write_report(report: Report, path: Path) -> None:
@@ -89,7 +71,7 @@ def report_json(report: Report) -> Any:
     number = count()
     texts = {
         "summary": tr("Summary"),
-        "stage": tr("Stage"),
+        "stage": tr("Part"),
         "todo": tr("What to do"),
         "figure": tr("Figure"),
         "value": tr("Value"),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
+import math
 import shutil
 from pathlib import Path
 
@@ -69,3 +71,61 @@ def test_presses_without_a_folder_are_refused_before_any_work(
     presses, page = str(run_folder / named), str(tmp_path / "r.pdf")
     line = refusal(capsys, "report", "none.gplcal", "-o", page, "--presses", presses)
     assert "not a folder" in line
+
+
+def test_whoever_has_the_certificate_alone_can_decide_again(
+    calibration: Path, press: Path, tmp_path: Path
+) -> None:
+    """From what was measured, the budget, the reference and the tolerance in the attached data."""
+    page, truth = tmp_path / "m.pdf", tmp_path / "truth.csv"
+    truth.write_text(
+        "file,shape,diameter_mm,height_mm,diameter_sd_mm,certificate,due\n"
+        f"{press.name},cylinder,8.0,1.0,0.01,K-7,2020-01-31\n"
+    )
+    arguments = [str(press), "--shape", "cylinder", "--truth", str(truth), "--report", str(page)]
+    assert main(["measure", str(calibration), *arguments]) == 0
+    data = report_data(page)
+    (measured,) = data["data"]["measurements"]
+    assert measured["sha256"] == hashlib.sha256(press.read_bytes()).hexdigest()
+    assert measured["truth"]["certificate"] == "K-7"
+    decisions = {}
+    for row in measured["comparisons"]:
+        expanded = data["data"]["coverage_factor"] * math.hypot(*(b["sd"] for b in row["budget"]))
+        deviation = abs(row["measured"] - row["true"])
+        tolerance = row["true"] * row["tolerance_percent"] / 100.0
+        assert row["en"] == pytest.approx(deviation / expanded)
+        word = "not decidable"
+        if deviation <= tolerance - expanded:
+            word = "conforms"
+        elif deviation > tolerance + expanded:
+            word = "does not conform"
+        decisions[row["quantity"]] = word
+        assert row["decision"] == word
+    assert decisions == {"diameter_mm": "does not conform", "height_mm": "not decidable"}
+    (section,) = data["sections"]
+    keys = {figure["key"] for figure in section["figures"]}
+    assert {"deviation", "reference_due"} <= keys
+    assert data["verdict"] == "fail"
+    text = report_text(page)
+    assert "does not conform" in text and "K-7" in text
+
+
+def test_a_certificate_of_tools_is_refused(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tool = [
+        "--tool",
+        "step-height",
+        "--at",
+        "-6",
+        "-6",
+        "0,0",
+        "--size",
+        "1",
+        "1",
+        "10",
+        "--report",
+        str(tmp_path / "m.pdf"),
+    ]
+    line = refusal(capsys, "measure", str(calibration), str(press), *tool)
+    assert "--report" in line

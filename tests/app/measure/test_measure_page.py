@@ -18,6 +18,7 @@ import pytest
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QAction, QDropEvent
 from pytestqt.qtbot import QtBot
+from report_pdf import report_data
 
 from app.command_line.main import main
 from app.context.context import AppContext
@@ -152,6 +153,13 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     assert [q.value for q in record.quantities] == [reported["diameter_mm"], reported["height_mm"]]
     assert [q.error_percent for q in record.quantities] == list(reported["error_percent"].values())
     assert (record.operator, record.note, record.picture) == ("Ada", "on the bench", press.name)
+
+    certificate = tmp_path / "measurement.pdf"
+    assert press_view.certify_action in page.export_actions()
+    press_view.certify(certificate)
+    qtbot.waitUntil(certificate.exists, timeout=PATIENCE_MS)
+    (certified,) = report_data(certificate)["data"]["measurements"]
+    assert {key: certified[key] for key in reported} == reported
 
     with closing(sqlite3.connect(context.workspace.folder / NAME)) as records:
         calibrations = records.execute("SELECT id, model, made, verdict FROM calibrations")

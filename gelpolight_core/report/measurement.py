@@ -1,0 +1,180 @@
+"""The certificate of measured objects: sizes, uncertainty budgets, references and decisions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+
+import cv2
+import numpy as np
+from matplotlib.figure import Figure
+
+from gelpolight_core.calibration.recipe import Facts
+from gelpolight_core.finding import QualityTable, Verdict, worst_of
+from gelpolight_core.labels import label
+from gelpolight_core.measurement.measured_press import MeasuredPress
+from gelpolight_core.measurement.profile import take_profile
+from gelpolight_core.measurement.result import Truth, compare
+from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, decision_word
+from gelpolight_core.report.build import stated_validation
+from gelpolight_core.report.document import Listing, Report, Section, listing
+from gelpolight_core.report.drawing import ACCENT, MAP_PX, drawing
+from gelpolight_core.report.facts import head_facts
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.translation import tr
+
+
+def measurement_report(
+    calibration: Calibration,
+    images: Sequence[MeasuredPress],
+    *,
+    limits_percent: tuple[float, float] = TOLERANCE_PERCENT,
+    operator: str = "",
+    created: str | None = None,
+) -> Report:
+    """Return the certificate of measured objects.
+
+    The attached data hold every number that the decisions need.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Used for all of them.
+    images : sequence of MeasuredPress
+        One section each.
+    limits_percent : (float, float), optional
+        Tolerances of size and height.
+    operator : str, optional
+        Who measured.
+    created : str, optional
+        ISO 8601 time of the measurement; by default now.
+    """
+    created = created or datetime.now().astimezone().isoformat(timespec="seconds")
+    about = tr(
+        "U is the expanded uncertainty (k = 2, about 95 %) of the deviation from the reference, or "
+        "of the value without one. The object conforms where deviation and U together are within "
+        "the tolerance, and does not conform where they cannot be (ISO 14253-1)"
+    )
+    sections = tuple(
+        _section(image, limits_percent, "" if number else about)
+        for number, image in enumerate(images)
+    )
+    validation = stated_validation(calibration)
+    worst = worst_of(figure for section in sections for figure in section.quality.figures)
+    measured = (tr("Measured"), f"{created.replace('T', ' ')}, {operator}".rstrip(", "))
+    return Report(
+        title=tr("Measurement with sensor {serial}").format(serial=calibration.serial),
+        verdict=Verdict.PASS if worst is None else worst.verdict,
+        sections=sections,
+        facts=(measured, *head_facts(calibration)),
+        validation=validation,
+        created=created,
+        data={
+            "calibration": calibration.identity,
+            "coverage_factor": COVERAGE,
+            "measurements": [
+                {"image": image.name, "sha256": image.sha256}
+                | image.measurement.as_json(image.truth, limits_percent)
+                for image in images
+            ],
+        },
+    )
+
+
+def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: str) -> Section:
+    quantities = compare(image.measurement, image.truth, limits_percent)
+    decisions = [quantity.finding for quantity in quantities if quantity.finding is not None]
+    reference = () if image.truth is None else image.truth.findings()
+    return Section(
+        image.name,
+        f"{image.name}: {label(image.measurement.shape)}",
+        about,
+        QualityTable((*image.measurement.findings, *reference, *decisions)),
+        _facts(image),
+        (_draw_press(image),),
+        (_sizes(quantities), _budget(quantities)),
+    )
+
+
+def _facts(image: MeasuredPress) -> Facts:
+    found, truth = image.measurement, image.truth or Truth(image.measurement.shape, 1.0, 1.0)
+    known = (
+        (tr("Centre (x, y)"), "{:.3f}, {:.3f} mm".format(*found.centre_mm)),
+        (tr("Edge radius"), _number(found.edge_radius_mm, ".3f", " mm")),
+        (tr("Decay length of the membrane"), f"{found.drape_decay_mm:.3f} mm"),
+        (tr("Reference"), truth.serial),
+        (tr("Certificate of the reference"), truth.certificate),
+        (tr("Valid until"), truth.due),
+        ("SHA-256", image.sha256),
+    )
+    return tuple((name, value) for name, value in known if value)
+
+
+def _sizes(quantities: Sequence[Quantity]) -> Listing:
+    return listing(
+        tr("Sizes"),
+        quantities,
+        (tr("quantity"), _name),
+        (tr("measured (mm)"), lambda q: f"{q.value:.4f}"),
+        (tr("reference (mm)"), lambda q: _number(q.truth, ".4f")),
+        (tr("U of the reference"), lambda q: _number(q.truth_expanded, ".4f")),
+        (tr("deviation (mm)"), lambda q: _number(q.error, "+.4f")),
+        ("U (mm)", lambda q: f"{q.deviation_expanded:.4f}"),
+        ("En", lambda q: _number(q.en, ".2f")),
+        (tr("tolerance"), lambda q: _number(q.truth and q.limit_percent, "g", " %")),
+        (tr("decision"), lambda q: "" if q.verdict is None else decision_word(q.verdict)),
+    )
+
+
+def _budget(quantities: Sequence[Quantity]) -> Listing:
+    rows = [(quantity, *row) for quantity in quantities for row in quantity.budget]
+    return listing(
+        tr("Standard uncertainties by source"),
+        rows,
+        (tr("quantity"), lambda row: _name(row[0])),
+        (tr("source"), lambda row: label(row[1])),
+        ("u (mm)", lambda row: f"{row[2]:.5f}"),
+        (tr("share of the variance"), lambda row: f"{_share(row[0], row[2]):.0f} %"),
+    )
+
+
+def _share(quantity: Quantity, sd: float) -> float:
+    whole = (quantity.deviation_expanded / COVERAGE) ** 2
+    return 100.0 * sd**2 / whole if whole else math.nan
+
+
+def _name(quantity: Quantity) -> str:
+    return label(quantity.name.removesuffix("_mm"))
+
+
+def _number(value: float | None, form: str, unit: str = "") -> str:
+    return "" if value is None or not math.isfinite(value) else f"{value:{form}}{unit}"
+
+
+@drawing(62.0)
+def _draw_press(figure: Figure, image: MeasuredPress) -> str:
+    """Show the height map with the contact, and the depth along a line across it."""
+    shown, found = image.height_map, image.measurement
+    x, y = shown.x_mm, shown.y_mm
+    fine = min(MAP_PX / x.size, 1.0)
+    depth = cv2.resize(shown.depth_mm, None, fx=fine, fy=fine, interpolation=cv2.INTER_AREA)
+    plan, section = figure.subplots(1, 2, width_ratios=(1.0, 1.4))
+    drawn = plan.imshow(depth, extent=(x[0], x[-1], y[-1], y[0]), cmap="cividis")
+    plan.plot(*np.vstack([found.outline_mm, found.outline_mm[:1]]).T, color=ACCENT, lw=0.8)
+    plan.set(xlabel="x (mm)", ylabel="y (mm)")
+    figure.colorbar(drawn, ax=plan, label=tr("depth (mm)"), shrink=0.8, pad=0.01)
+    angle = math.radians(found.yaw_deg or 0.0)
+    along = found.size_mm * np.array([math.cos(angle), math.sin(angle)])
+    low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
+    start, end = (np.clip(np.add(found.centre_mm, s * along), low, high) for s in (-1.0, 1.0))
+    line = take_profile(shown, tuple(start), tuple(end))
+    plan.plot(*np.stack([start, end]).T, color="white", lw=0.6)
+    section.plot(line.along_mm, line.depth_mm, color="0.2", lw=0.9)
+    for level in (found.baseline_mm, found.baseline_mm + found.height_mm):
+        section.axhline(level, color=ACCENT, lw=0.7, ls="--")
+    section.set(xlabel=tr("along the line (mm)"), ylabel=tr("depth (mm)"))
+    return tr(
+        "Height map with the contact, and depth along the white line; dashed: the level of the "
+        "membrane around the object, and its measured height"
+    )
