@@ -367,7 +367,7 @@ class PressView(QWidget):
         digest = "" if image.path is None else file_hash(image.path)
         truth = self.inspector.reference.stated_for(fit.shape).truth(fit.shape)
         press = MeasuredPress(image.name, digest, heightmap, fit, truth)
-        limits, operator = self.context.settings.limits, self.inspector.operator.text().strip()
+        limits, operator = self.context.settings.limits, self.inspector.remarks.value.operator
 
         def work(_progress: object) -> None:
             from gelpolight_core.report.file import write_report  # slow to import

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,23 +106,31 @@ def fit_figures(
     focal = max(100.0 * sd[0] / camera.fx, 100.0 * sd[1] / camera.fy)
     centre = float(np.hypot(sd[2], sd[3]))
     steady = tr("Use a flat board, hold it still, and focus; check the views with large errors")
-    again, width = more_views_advice(), camera.width
+    again = more_views_advice()
     middle, length = tr("Uncertainty of the principal point"), tr("Uncertainty of the focal length")
-    px, other = partial(judge, unit="px"), tr("Error on held-out views")
-    most = 100.0 * MAX_FOCAL_SD
+    other, error = tr("Error on held-out views"), tr("Reprojection error")
     return (
         # A good print is accurate to 0.1 px; half a pixel at the edge is 0.05 mm on the membrane.
-        px(
-            "reprojection_rms",
-            tr("Reprojection error"),
-            fit.rms_px,
-            warn=0.3,
-            fail=1.0,
-            remedy=steady,
+        judge("reprojection_rms", error, fit.rms_px, "px", warn=0.3, fail=1.0, remedy=steady),
+        judge("held_out_rms", other, held_out_rms, "px", warn=0.4, fail=1.5, remedy=again),
+        judge(
+            "focal_sd",
+            length,
+            float(focal),
+            "%",
+            warn=0.1,
+            fail=100.0 * MAX_FOCAL_SD,
+            remedy=again,
         ),
-        px("held_out_rms", other, held_out_rms, warn=0.4, fail=1.5, remedy=again),
-        judge("focal_sd", length, float(focal), "%", warn=0.1, fail=most, remedy=again),
-        px("centre_sd", middle, centre, warn=width / 500.0, fail=width / 50.0, remedy=again),
+        judge(
+            "centre_sd",
+            middle,
+            centre,
+            "px",
+            warn=camera.width / 500.0,
+            fail=camera.width / 50.0,
+            remedy=again,
+        ),
     )
 
 
@@ -148,16 +155,39 @@ def view_figures(
         if not view.used
     ]
     edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
-    more, tilt = partial(judge, higher_is_better=True), MIN_NORMAL_SPREAD_DEG
-    tilted = tr("Tilt the board more and in different directions")
+    tilt, again = tr("Tilt the board more and in different directions"), more_views_advice()
     corners = tr("Also show the board in the corners of the image")
-    words, covered = tr("Variation of the board tilt"), tr("Image area covered by corners")
-    again = more_views_advice()
     return (
-        more("views_used", tr("Views used"), used, warn=8, fail=MIN_VIEWS, remedy=again),
+        judge(
+            "views_used",
+            tr("Views used"),
+            used,
+            warn=8,
+            fail=MIN_VIEWS,
+            higher_is_better=True,
+            remedy=again,
+        ),
         judge_left_out("views_left_out", tr("Views left out"), refused),
-        more("normal_spread", words, spread_deg, "deg", warn=10.0, fail=tilt, remedy=tilted),
+        judge(
+            "normal_spread",
+            tr("Variation of the board tilt"),
+            spread_deg,
+            "deg",
+            warn=10.0,
+            fail=MIN_NORMAL_SPREAD_DEG,
+            higher_is_better=True,
+            remedy=tilt,
+        ),
         # Without corners, the distortion is a guess.
-        more("coverage", covered, 100.0 * coverage, "%", warn=60.0, fail=25.0, remedy=corners),
+        judge(
+            "coverage",
+            tr("Image area covered by corners"),
+            100.0 * coverage,
+            "%",
+            warn=60.0,
+            fail=25.0,
+            higher_is_better=True,
+            remedy=corners,
+        ),
         judge("edge_width", tr("Edge width of the squares"), float(np.median(edges)), "px"),
     )
