@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
 
 import numpy as np
 
@@ -320,14 +319,15 @@ def _plane_figures(
     plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
 ) -> tuple[Finding, ...]:
     more = tr("Capture several sharp views of a flat board that fills the top surface")
-    unsure, flat = partial(judge, warn=0.1, fail=1.0, remedy=more), tr("Tilt of the top surface")
+    far, turned = tr("Uncertainty of the distance"), tr("Uncertainty of the normal")
+    flat = tr("Tilt of the top surface")
     press = tr("Press the board flat onto the surface; check how the camera is mounted")
     sd_percent = 100.0 * distance_sd_mm / plane.distance_mm
     return (
         judge("distance", tr("Distance of the top surface"), plane.distance_mm, "mm"),
-        unsure("distance_sd", tr("Uncertainty of the distance"), sd_percent, "%"),
+        judge("distance_sd", far, sd_percent, "%", warn=0.1, fail=1.0, remedy=more),
         # A tilt error of one degree moves a mirrored LED by 1 mm (see "lights from mirror spots").
-        unsure("normal_sd", tr("Uncertainty of the normal"), normal_sd_deg, "deg"),
+        judge("normal_sd", turned, normal_sd_deg, "deg", warn=0.1, fail=1.0, remedy=more),
         judge("tilt", flat, tilt_deg, "deg", warn=5.0, fail=20.0, remedy=press),
     )
 
@@ -367,6 +367,15 @@ def _view_figures(
             "chosen. To be sure, use a larger or sharper board"
         )
         words, sure = tr("Certainty against the mirrored pose"), math.sqrt(max(margin, 0.0))
-        least, more = math.sqrt(SURE_MARGIN), partial(judge, higher_is_better=True)
-        figures.append(more("mirrored_margin", words, sure, "sd", warn=least, remedy=remedy))
+        figures.append(
+            judge(
+                "mirrored_margin",
+                words,
+                sure,
+                "sd",
+                warn=math.sqrt(SURE_MARGIN),
+                higher_is_better=True,
+                remedy=remedy,
+            )
+        )
     return tuple(figures)
