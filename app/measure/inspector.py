@@ -153,11 +153,11 @@ def _row(row: Row) -> str:
         return f"<tr>{label}{_cell(row.measured)}{sd}</tr>"
     first = "".join(map(_cell, (row.measured, row.reference, row.deviation)))
     second = _cell(row.sd, "muted") + _cell("") + _cell(row.percent, row.role)
-    third = f"<tr><td></td>{_cell(row.decision, row.role, 3)}</tr>" if row.decision else ""
-    return f"<tr>{label}{first}</tr><tr><td></td>{second}</tr>{third}"
+    colour = f"color:@{row.role}" if row.role else ""
+    third = f"<td colspan='4' align='right' style='{colour}'>{row.decision}</td>"
+    return f"<tr>{label}{first}</tr><tr><td></td>{second}</tr><tr>{third}</tr>"
 
 
-def _cell(text: str, role: str = "", columns: int = 1) -> str:
+def _cell(text: str, role: str = "") -> str:
     colour = f"color:@{role}" if role else ""
-    cell = f"<td align='right' colspan='{columns}' style='white-space:nowrap;{colour}'>"
-    return f"{cell}{text}</td>"
+    return f"<td align='right' style='white-space:nowrap;{colour}'>{text}</td>"

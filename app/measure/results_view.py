@@ -23,7 +23,7 @@ from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.time_chart import TimeChart
-from gelpolight_core.measurement.statistics import Statistics, statistics_of
+from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.translation import tr
 
@@ -225,11 +225,6 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
     note = tr(
         "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
     )
-    if len(group) == 1:
-        note = tr(
-            "Statistics need at least two measurements. Press the object again and save the "
-            "result, too."
-        )
     table = f"<table>{_row('th', '', heads)}{''.join(rows)}</table>"
     return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
 
@@ -239,10 +234,11 @@ def _cells(name: str, found: Statistics, errors: list[float]) -> tuple[str, list
     label, _, unit = name.rpartition("_")
     cells = [
         f"{value:.4f}" if math.isfinite(value) else "-"
-        for value in (found.mean, found.sd, found.spread, found.repeatability)
+        for value in (found.mean, found.sd, found.spread)
     ]
+    limit = too_few(found.missing) or f"{found.repeatability:.4f}"
     error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
-    return f"{label.replace('_', ' ')} ({unit})", [*cells, error]
+    return f"{label.replace('_', ' ')} ({unit})", [*cells, limit, error]
 
 
 def _row(tag: str, label: str, cells: Sequence[str]) -> str:

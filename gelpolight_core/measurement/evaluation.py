@@ -15,12 +15,7 @@ from gelpolight_core.finding import Finding, QualityTable, Verdict, judge
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.result import Measurement, Truth
-from gelpolight_core.measurement.statistics import (
-    Statistics,
-    missing_repeats,
-    statistics_of,
-    too_few,
-)
+from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
 from gelpolight_core.quantity import COVERAGE, REST, TOLERANCE_PERCENT, guarded
 from gelpolight_core.translation import tr
 
@@ -262,10 +257,9 @@ def _mean_error(evaluation: Evaluation, direction: str, text: str, limit: float)
         _mean_expanded(evaluation, direction),
         remedy=tr("Calibrate again, or check the worst presses"),
     )
-    lacking = too_few(missing_repeats(mean.count - 1))
-    if found.verdict is Verdict.FAIL or not lacking:
+    if found.verdict is Verdict.FAIL or not mean.missing:
         return found
-    return replace(found, verdict=Verdict.WARN, remedy=lacking)
+    return replace(found, verdict=Verdict.WARN, remedy=too_few(mean.missing))
 
 
 def _mean_expanded(evaluation: Evaluation, direction: str) -> float:

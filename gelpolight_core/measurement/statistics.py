@@ -56,6 +56,11 @@ class Statistics:
         return self.highest - self.lowest
 
     @property
+    def missing(self) -> int:
+        """How many values `sd` lacks to be worth stating."""
+        return missing_repeats(self.count - 1)
+
+    @property
     def repeatability(self) -> float:
         """Two measurements differ by less than this with a probability of 95 %.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PySide6.QtWidgets import QDialog
 from pytestqt.qtbot import QtBot
 
@@ -18,7 +20,10 @@ def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_acce
     dialog = IndentersDialog((BALL, ROD))
     qtbot.addWidget(dialog)
     dialog.remove()
-    dialog.form.change(size_mm=5.02)
+    dialog.form.change(size_mm=5.02, size_expanded_mm=0.002, certificate="K-1", due="next May")
+    dialog.accept()
+    assert "next May" in dialog.problem.text() and dialog.result() != QDialog.DialogCode.Accepted
+    dialog.form.change(due="2027-03-31")
     dialog.add()
     dialog.form.change(name="", shape="cuboid", second_mm=4.0)
     dialog.accept()
@@ -27,6 +32,6 @@ def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_acce
     dialog.accept()
     assert dialog.result() == QDialog.DialogCode.Accepted
     assert dialog.indenters == (
-        Indenter("Rod", "cylinder", 5.02, height_mm=1.0),
+        replace(ROD, size_mm=5.02, size_expanded_mm=0.002, certificate="K-1", due="2027-03-31"),
         Indenter("Block", "cuboid", 5.0, 4.0),
     )

@@ -179,6 +179,32 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     _close(again)
 
 
+@pytest.mark.usefixtures("library")
+def test_the_fit_uses_a_stated_edge_radius_and_an_ended_calibration_is_said(
+    page: MeasurePage, qtbot: QtBot, press: Path
+) -> None:
+    _put_cylinder(page, press, qtbot)
+    work, reference = page.press_view.work, page.press_view.inspector.reference
+    fitted = work.result.measurement
+    reference.state(
+        Reference(
+            size_mm=4.0,
+            edge_radius_mm=0.3,
+            edge_radius_expanded_mm=0.02,
+            certificate="K-2041",
+            due="2020-01-01",
+        )
+    )
+    _measured(page, qtbot)
+    assert (work.tool.edge_radius_mm, work.tool.edge_radius_sd_mm) == (0.3, 0.01)
+    assert work.result.measurement.edge_radius_mm == pytest.approx(0.3, abs=0.03)
+    assert work.result.measurement.diameter_mm > fitted.diameter_mm + 0.01
+    assert "K-2041" in page.press_view.state.reason
+    reference.state(Reference())
+    _measured(page, qtbot)
+    assert work.result.measurement.diameter_mm == pytest.approx(fitted.diameter_mm)
+
+
 def _true(press: Path) -> dict[str, str]:
     with (press.parent / "truth.csv").open(newline="") as stream:
         return next(row for row in csv.DictReader(stream) if row["file"] == press.name)
