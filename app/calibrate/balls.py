@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -17,16 +17,17 @@ from app.calibrate.detection import (
     Detection,
     Detector,
     as_image,
+    ball_contour,
+    ball_handle,
     judged,
     or_refusal,
     refuse_size,
     too_early,
+    working_circle,
 )
 from app.calibrate.image_step import ImageStep
-from app.calibrate.marks import ball_contour, ball_handle, working_circle
-from app.calibrate.step import Parts
-from app.calibrate.step_data import step_of
-from app.calibrate.step_panel import Remedy
+from app.calibrate.page_state import Remedy
+from app.calibrate.setup_values import USUAL_RADIUS_MM
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
@@ -35,13 +36,14 @@ from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS, TOP_POSE
 from gelpolight_core.calibration.project import Project
-from gelpolight_core.calibration.recipe import Results
+from gelpolight_core.calibration.recipe import Results, Stage
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable, seen_at
 from gelpolight_core.reflectance.agreement import PressAgreement
 from gelpolight_core.reflectance.ball import ball_depth_from_contact
 from gelpolight_core.reflectance.ball_detection import find_indentation
+from gelpolight_core.reflectance.next_press import next_press_mm
 from gelpolight_core.reflectance.press import BallPress, find_ball, larger_contact
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr
@@ -51,9 +53,6 @@ Point = tuple[float, float]
 
 # Radius of the contact circle drawn when no contact was found; the user moves it into position.
 FIRST_RADIUS = 0.1
-# A ball pressed in by half its radius has a contact of this radius.
-CONTACT_OF_RADIUS = 0.87
-COARSER = 8
 LIVE_NODES = 200
 """A contact of 1 mm radius still has more nodes than its detection needs."""
 
@@ -87,30 +86,21 @@ class BallSetting:
 
     def coarser(self) -> BallSetting:
         """Return the setting for live images, on at least LIVE_NODES nodes along each axis."""
-        step = max(1, min(self.table.grid.shape) // LIVE_NODES)
-        grid, table = self.table.grid, self.table
-        rows, columns = (count // step for count in grid.shape)
-
-        def reduced(nodes: NDArray[Any]) -> NDArray[np.float32]:
-            part = np.asarray(nodes[: step * rows, : step * columns], np.float32)
-            return np.asarray(cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA))
-
-        seen = reduced(table.u_px >= 0.0) == 1.0
-        u_px, v_px = (
-            np.where(seen, reduced(px), np.float32(-1.0)) for px in (table.u_px, table.v_px)
+        table, grid = self.table, self.table.grid
+        step = max(1, min(grid.shape) // LIVE_NODES)
+        every = slice(step // 2, None, step)
+        whole = cv2.erode(table.valid.astype(np.uint8), np.ones((step, step))) > 0
+        nodes = (
+            table.u_px,
+            table.v_px,
+            whole,
+            table.ray_slope,
+            cv2.blur(self.background, (step, step)),
         )
-        x_mm, y_mm = (
-            axis[: step * count].reshape(-1, step).mean(axis=1)
-            for axis, count in ((grid.x_mm, columns), (grid.y_mm, rows))
-        )
-        coarse = ResamplingTable(
-            MembraneGrid(x_mm, y_mm, step * grid.pitch_mm),
-            u_px,
-            v_px,
-            reduced(table.valid) == 1.0,
-            reduced(table.ray_slope),
-        )
-        return replace(self, table=coarse, background=reduced(self.background), step=step)
+        kept: list[Any] = [np.ascontiguousarray(values[every, every]) for values in nodes]
+        *seen, background = kept
+        coarse = MembraneGrid(grid.x_mm[every], grid.y_mm[every], step * grid.pitch_mm)
+        return replace(self, table=ResamplingTable(coarse, *seen), background=background, step=step)
 
 
 def detect_ball(
@@ -160,10 +150,8 @@ def detect_ball(
                 raise larger_contact(contact_mm, radius_mm, name)
             depth_mm = ball_depth_from_contact(contact_mm, radius_mm)
         else:
-            press = find_ball(
-                seen, setting.background, table, setting.led_positions_mm,
-                radius_mm=radius_mm, name=name,
-            )  # fmt: skip
+            known = setting.background, table, setting.led_positions_mm
+            press = find_ball(seen, *known, radius_mm=radius_mm, name=name)
             found, figures = press.indentation, press.quality.figures
             contact_mm, depth_mm = press.contact_radius_mm, press.pose.depth_mm
         handle = ball_handle(found, table) if editable else None
@@ -176,30 +164,6 @@ def detect_ball(
         return judged(marks, figures, good.format(c=contact_mm, d=depth_mm))
 
     return or_refusal(detect, marks=Overlay(markers=press_marks(done, there), lines=(circle,)))
-
-
-def next_press_mm(
-    table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[Point]
-) -> Point | None:
-    """Return the position (x, y) in the working area that is farthest from all earlier presses.
-
-    The first press is in the middle. It is always far enough from the border for the contact of the
-    ball. None if the ball is too large for the field.
-    """
-    pitch_mm = COARSER * table.grid.pitch_mm
-    valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
-    inside_mm = pitch_mm * cv2.distanceTransform(valid, cv2.DIST_L2, 5)[1:-1, 1:-1]
-    points = table.grid.points_mm()[::COARSER, ::COARSER]
-    room = inside_mm > CONTACT_OF_RADIUS * radius_mm
-    if not room.any():
-        return None
-    apart_mm = inside_mm.astype(np.float64)
-    if earlier_mm:
-        away = points[:, :, None] - np.array(earlier_mm, np.float64)
-        apart_mm = np.linalg.norm(away, axis=-1).min(axis=-1)
-    best = np.unravel_index(np.argmax(np.where(room, apart_mm, -1.0)), room.shape)
-    x_mm, y_mm = points[best]
-    return float(x_mm), float(y_mm)
 
 
 def _pixels(points_mm: Sequence[Point], table: ResamplingTable) -> list[Point]:
@@ -235,143 +199,110 @@ def ball_in_capture(rgb: Rgb, *, detect: Detector) -> Detection:
     return Detection(marks, replace(found.finding, remedy=remedy))
 
 
-class DiameterBox(DoubleSpinBox):
-    """The diameter of the ball of the next press, or of the shown one.
+class BallsStep(ImageStep):
+    """Finds the contact of each press; the user enters radii and can move a contact."""
 
-    Files and calculations use the radius.
-    """
+    of: ClassVar[Stage[Any]] = BALLS
+    task = tr("Press the ball where the ring is, and hold it still.")
+    assembly = "ball"
+    frames, wanted = 4, 10
+    advice = tr(
+        "Vary the position over the whole field, and the depth. Enter the ball diameter of "
+        "each press."
+    )
+    figure = "shading_misfit_percent"
+    _next_mm: float | None = None
 
-    def __init__(self) -> None:
-        super().__init__(
+    def build(self) -> None:
+        """Create what only this step shows."""
+        self.radius = DoubleSpinBox(
             minimum=0.1, maximum=1000.0, decimals=3, suffix=tr(" mm"), keyboardTracking=False
         )
         named(
-            self,
+            self.radius,
             "calibrate.radius",
             tr("Diameter of the ball in mm"),
             tr("Diameter for the next press, or for the shown one"),
         )
-
-    @property
-    def radius_mm(self) -> float:
-        """Half of the diameter."""
-        return 0.5 * self.value()
-
-    @property
-    def typing(self) -> bool:
-        """Whether a diameter is being typed, so that the field still has the old value."""
-        return self.valueFromText(self.text()) != self.value()
-
-
-USUAL_RADIUS_MM = 3.0
-
-
-class BallsStep(ImageStep):
-    """Finds the contact of each press; the user enters radii and can move a contact."""
-
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
-        self._next_mm: float | None = None
-        self.radius = DiameterBox()
-        self.radius.valueChanged.connect(lambda _: self._on_radius(self.radius.radius_mm))
+        self.radius.valueChanged.connect(self._on_diameter)
         self.own = (self.panel.add_extra(tr("Ball diameter"), self.radius),)
-
-    step = step_of(
-        BALLS,
-        tr("Press the ball where the ring is, and hold it still."),
-        "ball",
-        frames=4,
-        wanted=10,
-        advice=tr(
-            "Vary the position over the whole field, and the depth. Enter the ball diameter of "
-            "each press."
-        ),
-        figure="shading_misfit_percent",
-    )
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball, once the earlier stages are known."""
-        project = self.model.project
-        setting = setting_of(project.results)
+        setting, found = setting_of(self.results), self.results.get(BALLS)
         if setting is None:
             return too_early
-        radius_mm = self.radius.radius_mm
-        if not name:
-            done = (
-                [press.pose.centre_mm for press in project.results[BALLS].presses]
-                if project.results.get(BALLS)
-                else []
-            )
-            return partial(
-                detect_ball,
-                setting=setting.coarser(),
-                radius_mm=radius_mm,
-                earlier_mm=done,
-                next_mm=next_press_mm(setting.table, radius_mm, done),
-                live=True,
-            )
-        detect = partial(detect_ball, setting=setting, radius_mm=radius_mm, editable=True)
-        return self.of_capture(name, detect, Overlay(lines=(working_circle(setting.table),)))
+        detect = partial(detect_ball, radius_mm=self.radius_mm)
+        if name:
+            detect = partial(detect, setting=setting, editable=True)
+            return self.of_capture(name, detect, Overlay(lines=(working_circle(setting.table),)))
+        done = [] if found is None else [press.pose.centre_mm for press in found.presses]
+        then = next_press_mm(setting.table, self.radius_mm, done)
+        coarse = setting.coarser()
+        return partial(detect, setting=coarse, earlier_mm=done, next_mm=then, live=True)
 
     def of_capture(self, name: str, detect: Detector, marks: Overlay) -> Detector:
         """Return the detection for a capture: as placed by hand, or found and ready to be moved."""
-        placed = self.model.project.session.decisions.balls.get(name)
+        placed = self.session.decisions.balls.get(name)
         if placed is not None:
             return partial(placed_ball, circle=placed, marks=marks)
         return partial(ball_in_capture, detect=detect)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the radius of the shown or of the next press."""
-        return (self.radius.radius_mm,)
+        return (self.radius_mm,)
 
     def judge(self, path: Path) -> Finding | None:
         """Return how a press was judged."""
-        return judge_ball(path.name, self.model.project)
+        return judge_ball(path.name, self.project)
 
     def remedies(self, state: str) -> tuple[Remedy, ...]:
         """Offer the diameter that fits a press which disagrees with the others."""
-        project = self.model.project
-        for press in _presses(project) if REFLECTANCE.key in self.model.statuses else ():
-            if (odd := _agreement(press, project)) is not None and odd.fault is not None:
+        balls = self.results.get(BALLS) if REFLECTANCE.key in self.model.statuses else None
+        for press in () if balls is None else balls.presses:
+            if (odd := _agreement(press, self.project)) is not None and odd.fault is not None:
                 diameter_mm, name = 2.0 * odd.radius_mm, Path(press.name).name
                 text = tr("Set {name} to {d:.2g} mm").format(name=Path(name).stem, d=diameter_mm)
-                fit = partial(self.set_radius, name, 0.5 * float(f"{diameter_mm:.2g}"))
+                fit = partial(self.model.set_ball_diameter, name, float(f"{diameter_mm:.2g}"))
                 return (text, fit), (tr("Repeat it"), partial(self.repeat, name))
         return super().remedies(state)
 
     def note(self, name: str) -> str:
         """Return the diameter of the ball of a press."""
-        session = self.model.project.session
-        radius_mm = session.ball_radii_mm.get(name, session.ball_default_radius_mm)
+        usual = self.session.ball_default_radius_mm
+        radius_mm = self.session.ball_radii_mm.get(name, usual)
         return "" if radius_mm is None else tr("⌀ {d:g} mm").format(d=2.0 * radius_mm)
 
     # The radius
 
     @property
-    def radius_mm(self) -> float | None:
-        """Radius of the ball of the next press."""
-        self.radius.interpretText()  # a typed value counts even without Enter
-        return self.radius.radius_mm
+    def radius_mm(self) -> float:
+        """Radius of the ball of the shown or of the next press; the field has its diameter."""
+        return 0.5 * self.radius.value()
 
     @property
     def typing(self) -> bool:
-        """Whether a radius is being typed."""
-        return self.radius.typing
+        """Whether a diameter is being typed, so that the field still has the old value."""
+        return self.radius.valueFromText(self.radius.text()) != self.radius.value()
+
+    def commit(self) -> None:
+        """Use a typed diameter even without Enter: it belongs to the image shown now."""
+        self.radius.interpretText()
 
     def on_bench(self, scene: Scene) -> None:
         """Use the radius of the ball on the virtual bench."""
         self._next_mm = 0.5 * scene.size_mm
         self._show_radius()
 
-    def _on_radius(self, radius_mm: float) -> None:
-        if self.model.shown:
-            self.set_radius(self.model.shown, radius_mm)
+    def _on_diameter(self, diameter_mm: float) -> None:
+        if self.model.page.shown:
+            self.model.set_ball_diameter(self.model.page.shown, diameter_mm)
         else:
-            self._next_mm = radius_mm
+            self._next_mm = 0.5 * diameter_mm
             self.arm()
 
     def _show_radius(self) -> None:
-        session, name = self.model.project.session, self.model.shown
+        session, name = self.session, self.model.page.shown
         usual = session.ball_default_radius_mm or USUAL_RADIUS_MM
         value = self._next_mm or usual
         radius_mm = session.ball_radii_mm.get(name, usual) if name else value
@@ -380,30 +311,11 @@ class BallsStep(ImageStep):
 
     # What is shown
 
-    def leave(self) -> None:
-        """Keep a typed radius."""
-        self.radius.interpretText()
-        super().leave()
-
-    def close(self) -> None:
-        """Keep a typed radius while it can still be saved."""
-        self.radius.interpretText()
-
     def refresh(self) -> None:
         """Update to changed results, also after undo."""
-        if not self.radius.typing:
+        if not self.typing:
             self._show_radius()
         super().refresh()
-
-    def live(self) -> None:
-        """Show the live image; a typed radius belongs to the image shown before."""
-        self.radius.interpretText()
-        super().live()
-
-    def show_capture(self, name: str) -> None:
-        """Show a press with its radius; a typed one belongs to the image shown before."""
-        self.radius.interpretText()
-        super().show_capture(name)
 
     def arm(self, *, force: bool = False) -> None:
         """Set the detection, with the radius of the shown press."""
@@ -415,21 +327,15 @@ class BallsStep(ImageStep):
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
         """Move the contact of the shown press."""
-        if self.model.shown:
-            self.place_ball(self.model.shown, PlacedCircle(u, v, radius_px))
+        if self.model.page.shown:
+            self.place_ball(self.model.page.shown, PlacedCircle(u, v, radius_px))
 
     def place_ball(self, name: str, circle: PlacedCircle | None) -> None:
         """Set the contact circle in a ball image by hand; can be undone."""
-        project = self.model.project
-        act = partial(project.place_ball, name)
-        before = project.session.decisions.balls.get(name)
+        act = partial(self.project.place_ball, name)
+        before = self.session.decisions.balls.get(name)
         text = tr("Move the contact in {name}").format(name=name)
         self.model.correct(text, partial(act, circle), partial(act, before), "balls")
-
-    def set_radius(self, name: str, radius_mm: float) -> None:
-        """Set the ball radius of one image; can be undone."""
-        if radius_mm != self.model.project.session.ball_radii_mm.get(name):
-            self.model.set_ball_diameter(name, 2.0 * radius_mm)
 
 
 def setting_of(results: Results) -> BallSetting | None:
@@ -467,11 +373,6 @@ def judge_ball(name: str, project: Project) -> Finding | None:
         return replace(found, verdict=Verdict.FAIL, remedy=odd.fault.line)
     worst = worst_of(press.quality.figures)
     return found if worst is None else replace(found, verdict=worst.verdict, remedy=worst.remedy)
-
-
-def _presses(project: Project) -> tuple[BallPress, ...]:
-    balls = project.results.get(BALLS)
-    return () if balls is None else tuple(balls.presses)
 
 
 def _agreement(press: BallPress, project: Project) -> PressAgreement | None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
-import numpy as np
 from PySide6.QtCore import (
     QModelIndex,
     QPersistentModelIndex,
@@ -18,7 +15,7 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QImage, QKeyEvent, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import (
     QListView,
     QListWidget,
@@ -29,71 +26,18 @@ from PySide6.QtWidgets import (
     QStyleOptionViewItem,
 )
 
-from app.calibrate.states import state_icon, state_meaning, state_word
+from app.calibrate.page_state import Capture, state_icon, state_meaning
 from app.theme import theme
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
+from app.widgets.pixmaps import pixmap_of
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Finding, Verdict, value_text
 from gelpolight_core.image.file import decode_image
 from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
 GAP = 8
 PLATE = QColor(0, 0, 0, 170)
-
-
-@dataclass(frozen=True, slots=True)
-class Capture:
-    """One capture.
-
-    Attributes
-    ----------
-    path : Path
-        Its image file.
-    finding : Finding or None
-        How it was judged. Its value is how far it is from the result of its stage.
-    note : str
-        Short text below the name instead of the finding, such as ``⌀ 3 mm``.
-    excluded : bool
-        Whether the user excluded it.
-    """
-
-    path: Path
-    finding: Finding | None = None
-    note: str = ""
-    excluded: bool = False
-
-    @property
-    def state(self) -> str:
-        """A stage state; an excluded capture is ``empty``."""
-        if self.excluded:
-            return "empty"
-        return "waiting" if self.finding is None else self.finding.verdict.value
-
-    @property
-    def used(self) -> bool:
-        """Whether its stage can use it."""
-        return not self.excluded and self.state != Verdict.FAIL
-
-    @property
-    def word(self) -> str:
-        """The state as a text."""
-        return tr("excluded") if self.excluded else state_word(self.state)
-
-    @property
-    def residual(self) -> float:
-        """How far it is from the result of its stage; NaN if it was not compared."""
-        return math.nan if self.finding is None else self.finding.value
-
-    @property
-    def caption(self) -> str:
-        """Short text below the name."""
-        if self.finding is None:
-            return self.word
-        if math.isfinite(self.residual):
-            return self.note or value_text(self.finding)
-        return tr("not used") if self.finding.verdict is Verdict.FAIL else self.note or self.word
 
 
 class FilmStrip(QListWidget):
@@ -126,8 +70,8 @@ class FilmStrip(QListWidget):
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._on_menu)
-        self.itemClicked.connect(lambda item: self.chosen.emit(_capture_of(item).path.name))
-        self.itemActivated.connect(lambda item: self.chosen.emit(_capture_of(item).path.name))
+        for opened in (self.itemClicked, self.itemActivated):
+            opened.connect(lambda item: self.chosen.emit(_capture_of(item).path.name))
         self._thumbs: dict[tuple[Path, int], QPixmap] = {}
 
     def show_captures(self, captures: Sequence[Capture]) -> None:
@@ -261,20 +205,13 @@ def thumbnail(path: Path) -> QPixmap:
         empty = QPixmap(THUMB)
         empty.fill(Qt.GlobalColor.darkGray)
         return empty
-    rgb = np.ascontiguousarray(raw[..., ::-1])
-    rows, columns = rgb.shape[:2]
-    image = QImage(rgb.data, columns, rows, 3 * columns, QImage.Format.Format_RGB888)
-    scaled = QPixmap.fromImage(image).scaled(
-        THUMB,
-        Qt.AspectRatioMode.KeepAspectRatioByExpanding,
-        Qt.TransformationMode.SmoothTransformation,
-    )
-    return scaled.copy(
-        (scaled.width() - THUMB.width()) // 2,
-        (scaled.height() - THUMB.height()) // 2,
-        THUMB.width(),
-        THUMB.height(),
-    )
+    width, height = THUMB.toTuple()
+    factor = max(width / raw.shape[1], height / raw.shape[0])
+    size = max(round(factor * raw.shape[1]), width), max(round(factor * raw.shape[0]), height)
+    x, y = (size[0] - width) // 2, (size[1] - height) // 2
+    kind = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_LINEAR
+    scaled = cv2.resize(raw, size, interpolation=kind)
+    return pixmap_of(scaled[y : y + height, x : x + width, ::-1])
 
 
 def _capture_of(item: QListWidgetItem) -> Capture:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QFrame, QPushButton, QSizePolicy, QStackedWidget, QToolButton, QWidget
 
-from app.calibrate.film_strip import Capture, FilmStrip
-from app.calibrate.maps import MapsView, Panel
-from app.calibrate.states import state_icon, state_word
+from app.calibrate.film_strip import FilmStrip
+from app.calibrate.maps import MapsView
+from app.calibrate.page_state import Capture, PageState, state_icon, state_word
 from app.live.image_checks import Rgb
 from app.live.live_view import LiveView
 from app.sources.stream import Stream
@@ -19,7 +19,6 @@ from app.widgets.sign import Sign
 from gelpolight_core.finding import value_text
 from gelpolight_core.translation import tr
 
-IMAGE, RESULT = range(2)
 VERDICT_MS = 3000
 VERDICT_WIDTH = 320
 EDGE = 8
@@ -40,11 +39,10 @@ class ImageArea(QWidget):
         vbox(self._build_lost(), (self.stack, 1), self.strip, of=self, margins=0, spacing=0)
         self.result = self._floating("calibrate.result", tr("Result"))
         self.result.setCheckable(True)
-        self.result.toggled.connect(lambda on: self.stack.setCurrentIndex(RESULT if on else IMAGE))
+        self.result.toggled.connect(lambda on: self.stack.setCurrentIndex(int(on)))
         self.back_to_live = self._floating("calibrate.back_to_live", tr("Back to the live image"))
         self.verdict = Verdict(self.view)
         self.stack.installEventFilter(self)
-        self.show_capture_name("")
 
     def _floating(self, name: str, accessible: str) -> QToolButton:
         """Return a button at the top right corner of the image: it takes no space from it."""
@@ -75,41 +73,36 @@ class ImageArea(QWidget):
         show_meaning(self.why, "fail")
         make_bold(self.why)
         self.why.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
-        self.reconnect = named(
-            QPushButton(tr("Re&connect")), "calibrate.reconnect", tr("Open the camera again")
-        )
+        self.reconnect = QPushButton(tr("Re&connect"))
+        named(self.reconnect, "calibrate.reconnect", tr("Open the camera again"))
         hbox((self.why, 1), self.reconnect, of=self.lost, margins=(8, 4, 8, 4))
         self.lost.hide()
         return self.lost
 
-    def show_lost(self, why: str) -> None:
-        """Show why no more images arrive; hide the message if the text is empty."""
-        self.why.setText(why)
-        self.lost.setVisible(bool(why))
-
-    def show_verdict(self, capture: Capture | None) -> None:
-        """Show for a moment how a new capture was judged."""
-        self.verdict.show_capture(capture)
-
-    def show_capture_name(self, name: str) -> None:
-        """Show the name of the shown capture; an empty name means the live image."""
-        self.back_to_live.setText(
-            tr("{name}: back to live (Esc)").format(name=name) if name else ""
-        )
-        self.back_to_live.setVisible(bool(name))
-        self._place()
-
-    def show_step(self, *, strip: bool) -> None:
-        """Show the parts that a step needs: the image, and the film strip."""
-        self.strip.setVisible(strip)
-        self.verdict.hide()
-        self.result.setChecked(False)
-        self.show_result_button(False)
+    def show_page(self, page: PageState, before: PageState) -> None:
+        """Show another state of the page: captures, the shown one, and images of the result."""
+        if page.step is not before.step:
+            self.verdict.hide()
+            self.result.setChecked(False)
+        self.lost.setVisible(bool(page.lost))
+        self.why.setText(page.lost)
+        self.strip.setVisible(bool(page.step.folder))
+        if page.captures is not before.captures:
+            self.strip.show_captures(page.captures)
+        if page.panels is not before.panels:
+            self.maps.show_panels(page.panels)
+            if not page.panels:
+                self.result.setChecked(False)
+        self.result.setVisible(bool(page.panels))
+        back = tr("{name}: back to live (Esc)").format(name=page.shown)
+        self.back_to_live.setText(back if page.shown else "")
+        self.back_to_live.setVisible(bool(page.shown))
+        if page.panels is not before.panels or page.shown != before.shown:
+            self._place()
 
     def show_stream(self, stream: Stream | None) -> None:
         """Show the live image."""
         self.strip.choose("")
-        self.show_capture_name("")
         self.view.set_overlay(None)
         self.view.set_stream(stream)
         self.view.image.say(tr("Waiting for the first image of the camera."))
@@ -120,20 +113,6 @@ class ImageArea(QWidget):
         self.view.show_image(rgb)
         self.view.set_overlay(None)
         self.strip.choose(name)
-        self.show_capture_name(name)
-
-    def show_result(self, panel: Panel) -> None:
-        """Show an image of a result instead of the image."""
-        self.maps.show_panels((panel,))
-        self.show_result_button(True)
-        self.result.setChecked(True)
-
-    def show_result_button(self, there: bool) -> None:
-        """Offer the images of the result, if there are any."""
-        if not there:
-            self.result.setChecked(False)
-        self.result.setVisible(there)
-        self._place()
 
 
 class Verdict(QFrame):

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
-from app.calibrate.detection import Detector, read_raw
-from app.calibrate.film_strip import Capture
-from app.calibrate.states import OPEN
-from app.calibrate.step import Parts, StepPresenter, no_camera
-from app.calibrate.step_data import step_of
+from app.calibrate.detection import Detector, or_refusal, read_raw
+from app.calibrate.page_state import OPEN, Capture
+from app.calibrate.step import Step, no_camera
 from app.live.image_checks import Rgb
 from app.live.live_detection import Detection, Seen
 from app.live.overlay import Overlay, hold_ring
+from app.services.file_dialogs import ask_several
 from app.services.jobs import Job
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.finding import Finding, Verdict
-from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 # After an automatic capture the technician has this long to arrange the next view.
@@ -38,23 +36,15 @@ def judged_stage(status: StageStatus) -> Finding | None:
     return Finding("stage", status.sentence, verdict=Verdict(status.state.value))
 
 
-class ImageStep(StepPresenter):
-    """A step with images of its own. A step supplies its detection and its judgement of a capture.
-
-    Parameters
-    ----------
-    parts : Parts
-        What all steps share.
-    """
+class ImageStep(Step):
+    """A step with images of its own. It supplies its detection and its judgement of a capture."""
 
     uses_camera = True
     judges_focus = False
-
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
-        self._armed: tuple[Any, ...] = ()
-        self._paused_until = 0.0
-        self._fresh = ""  # a capture whose verdict is still to be shown
+    _armed: tuple[Any, ...] = ()
+    _paused_until = 0.0
+    _fresh = ""
+    """A capture whose verdict is still to be shown."""
 
     # Supplied by the step
 
@@ -89,28 +79,33 @@ class ImageStep(StepPresenter):
     @property
     def stage(self) -> str:
         """The stage of the images."""
-        return self.step.stages[0]
+        return self.stages[0]
 
     def obstacle(self) -> str:
         """Return what is missing or wrong; empty if the step is complete or being computed."""
-        state, sentence = self.model.states[self.step.key]
+        state, sentence = self.model.page.states[self.key]
         if state not in OPEN:
             return ""
         if state == StageState.EMPTY.value:
             sentence = tr("Nothing is captured yet")
         text = tr("{title} is not complete: {why}. To skip it for now, choose a step in the list.")
-        return text.format(title=self.step.title, why=sentence.rstrip("."))
+        return text.format(title=self.title, why=sentence.rstrip("."))
 
     def focus(self) -> QWidget:
         """Return the button that the user needs next."""
-        panel = self.panel
-        if panel.finished:
-            return panel.next
-        return panel.capture if panel.capture.isEnabled() else panel.more
+        if self.model.page.finished:
+            return self.panel.next
+        return self.panel.capture if self.panel.capture.isEnabled() else self.panel.more
 
     def captures(self) -> tuple[Capture, ...]:
-        """Return the images of the step with their states."""
-        return captures_of(self.model.project.session, self.step.folder, self.judge, note=self.note)
+        """Return all images of the step with their states, including the excluded ones."""
+        used = {path.name for path in self.session.found(self.folder)}
+        return tuple(
+            Capture(path, self.judge(path), note=self.note(path.name))
+            if path.name in used
+            else Capture(path, excluded=True)
+            for path in self.session.captured(self.folder)
+        )
 
     def enter(self) -> None:
         """Show the live image of the step."""
@@ -122,13 +117,10 @@ class ImageStep(StepPresenter):
 
     def refresh(self) -> None:
         """Update to changed results and corrections, also after undo."""
-        super().refresh()
-        captures = self.captures()
-        self.panel.show_captures(captures)
-        fresh = next((one for one in captures if one.path.name == self._fresh), None)
+        fresh = next((c for c in self.model.page.captures if c.path.name == self._fresh), None)
         if fresh is not None and fresh.finding is not None and not self.model.busy_with_images:
             self._fresh = ""
-            self.area.show_verdict(fresh)
+            self.area.verdict.show_capture(fresh)
         self._point_to_captures()
         self.arm()
 
@@ -140,8 +132,8 @@ class ImageStep(StepPresenter):
 
     def _point_to_captures(self) -> None:
         """Without a camera, say how to show a capture."""
-        there = self.model.live.stream is not None or self.model.shown
-        if not there and self.model.project.session.found(self.step.folder):
+        there = self.model.live.stream is not None or self.model.page.shown
+        if not there and self.session.found(self.folder):
             self.area.view.image.say(no_camera() + "\n" + tr("Click an image below to show it."))
 
     def camera_changed(self) -> None:
@@ -150,36 +142,36 @@ class ImageStep(StepPresenter):
         If the session's images are not from that camera, show the newest of them instead.
         """
         live = self.model.live
-        found = self.model.project.session.found(self.step.folder)
-        foreign = self.model.camera_fault(ask=False) or self.model.from_files()
+        found = self.session.found(self.folder)
+        foreign = self.model.camera.fault(ask=False) or self.model.camera.from_files()
         own = live.stream is not None and not foreign
-        if self.model.shown:
-            self.panel.capture.setEnabled(live.stream is not None)
-        elif found and live.page_shown and not own:
+        if self.model.page.shown:
+            return
+        if found and live.page_shown and not own:
             self.show_capture(found[-1].name)
         else:
             self.live()
 
     def show_capture(self, name: str) -> None:
         """Show a capture with its detection."""
+        self.commit()
         self.area.show_capture(name, read_raw(self._path(name)))
-        self.model.show(name)
-        self.panel.show_live("", ready=True)
+        self.model.update_page(shown=name, live=("", "pass"))
         self.arm(force=True)
 
     def _path(self, name: str) -> Path:
-        return self.model.project.session.folder / self.step.folder / name
+        return self.session.folder / self.folder / name
 
     # Detection
 
     def arm(self, *, force: bool = False) -> None:
         """Set the detection that the step needs, based on the present results."""
-        project, name = self.model.project, self.model.shown
+        project, name = self.project, self.model.page.shown
         armed = (name, self.depends_on(), project.session.decisions, project.results)
         if not force and _same(armed, self._armed):
             return
         self._armed = armed
-        foreign = self.model.camera_fault(ask=False)
+        foreign = self.model.camera.fault(ask=False)
         self.model.live_detection.set_detector(None if name or foreign else self.detector(""))
         if name:
             self._detect_again(name)
@@ -188,54 +180,51 @@ class ImageStep(StepPresenter):
         """Run the detection on the shown capture; only the newest result is shown."""
         detector, path, armed = self.detector(name), self._path(name), self._armed
 
+        def work(_progress: object) -> Detection:
+            return or_refusal(lambda: detector(read_raw(path)))
+
         def done(found: Detection) -> None:
             if self._armed is armed:
                 self._show(found)
 
-        def failed(sentence: str) -> None:
-            if self._armed is armed:
-                self.panel.show_live(sentence, ready=False)
-
-        title = tr("Analysing the image")
-        self.model.short_jobs.submit(
-            Job(title, lambda _progress: detector(read_raw(path)), done, failed)
-        )
+        self.model.short_jobs.submit(Job(tr("Analysing the image"), work, done))
 
     def _show(self, found: Detection) -> None:
         self.area.view.set_overlay(found.overlay)
-        self.panel.show_live(found.sentence, ready=found.good)
+        self.model.show_live(found.sentence, ready=found.good)
 
     def _show_seen(self, seen: Seen) -> None:
         """Show what is in the live image, and how long it must still be held."""
         found, held = seen.detection, 0.0
-        sentence, changed = found.sentence, self.model.camera_change(self.stage)
+        sentence, changed = found.sentence, self.model.camera.change(self.stage)
         if changed:
             self._show(replace(found, finding=Finding("camera", changed, verdict=Verdict.WARN)))
             return
-        if self._captures_itself and found.good and not self._has_its_image:
+        itself = self.panel.automatic.isChecked() and not self.model.busy_with_images
+        if itself and found.good and not self._has_its_image:
             if seen.moved:
                 held, sentence = seen.held, tr("Hold still: captures by itself.")
             else:
                 sentence += " " + tr("Move it for an automatic capture, or click Capture.")
-        elif self.panel.finished and found.ready:
+        elif self.model.page.finished and found.ready:
             sentence = tr("This step is complete.")
         rings = hold_ring(found.overlay, self.area.view.image.image_size, held)
         self.area.view.set_overlay(replace(found.overlay, rings=rings))
-        self.panel.show_live(sentence, ready=found.good or self.panel.finished)
+        self.model.show_live(sentence, ready=found.good or self.model.page.finished)
 
     def detected(self, item: Outcome[Any] | Failure) -> None:
         """Show what was detected in a live image, and capture a good one if that is wanted."""
-        if self.model.shown:
+        if self.model.page.shown:
             return
         if isinstance(item, Failure):
             self.area.view.set_overlay(Overlay())
-            self.panel.show_live(item.sentence, ready=False)
+            self.model.show_live(item.sentence, ready=False)
         elif isinstance(item.value, Seen):
             if item.frame.settled:
                 self._show_seen(item.value)
             else:
                 self.area.view.set_overlay(Overlay())
-                self.panel.show_live(tr("The image is changing."), ready=False)
+                self.model.show_live(tr("The image is changing."), ready=False)
             if self._is_good(item.frame, item.value):
                 self.capture_by_itself()
 
@@ -243,35 +232,30 @@ class ImageStep(StepPresenter):
         """Return whether the image can be captured automatically: never the same view twice."""
         ready = seen.still and seen.detection.good and frame.settled and seen.moved
         waiting = self.model.busy_with_images or time.monotonic() < self._paused_until
-        changed = self.model.camera_change(self.stage)
+        changed = self.model.camera.change(self.stage)
         return ready and not self._has_its_image and not waiting and not changed
-
-    @property
-    def _captures_itself(self) -> bool:
-        """Whether a good image is captured automatically now."""
-        return self.panel.automatic.isChecked() and not self.model.busy_with_images
 
     @property
     def _has_its_image(self) -> bool:
         """Whether the step needs one image and has it, and it did not fail."""
-        found = self.model.project.session.found(self.step.folder)
-        failed = self.model.states[self.step.key][0] == StageState.FAIL.value
-        return self.step.wanted == 1 and bool(found) and not failed
+        found = self.session.found(self.folder)
+        failed = self.model.page.states[self.key][0] == StageState.FAIL.value
+        return self.wanted == 1 and bool(found) and not failed
 
     # Images
 
     def capture(self) -> None:
         """Capture an image; if a capture is shown, return to the live image instead."""
-        if self.model.shown:
+        if self.model.page.shown:
             self.live()
             return
-        self.panel.show_notice("", "pass")
-        radius_mm = self.radius_mm
-        self.area.show_verdict(None)
+        self.commit()
+        self.model.show_notice("", "pass")
+        self.area.verdict.show_capture(None)
         self.model.live_detection.forget_movement()  # before the next automatic capture
         self._paused_until = time.monotonic() + PAUSE_S
         self.arm(force=True)
-        self.model.capture(self.stage, frames=self.step.frames, radius_mm=radius_mm)
+        self.model.capture(self.stage, frames=self.frames, radius_mm=self.radius_mm)
 
     def capture_by_itself(self) -> None:
         """Capture the image, if automatic capture is on."""
@@ -279,7 +263,7 @@ class ImageStep(StepPresenter):
             return
         if self.typing:  # a partly typed number is not valid
             text = tr("Press Enter after the diameter. Automatic capture waits for it.")
-            self.panel.show_notice(text, "warn")
+            self.model.show_notice(text, "warn")
             return
         self.capture()
 
@@ -293,24 +277,18 @@ class ImageStep(StepPresenter):
         self.exclude(name, True)
         self.live()
         text = tr("{name} is excluded. Capture a new image in its place.")
-        self.panel.show_notice(text.format(name=name), "warn")
+        self.model.show_notice(text.format(name=name), "warn")
 
     def choose_files(self) -> None:
         """Let the user choose image files to import."""
-        settings = self.context.settings
-        files, _ = QFileDialog.getOpenFileNames(
-            self.area,
-            tr("Import images"),
-            str(settings.folder("images")),
-            tr("Images (*.png *.tif *.tiff)"),
-        )
-        if files:
-            settings.keep_folder("images", Path(files[0]).parent)
-            self.import_files([Path(file) for file in files])
+        title, patterns = tr("Import images"), tr("Images (*.png *.tif *.tiff)")
+        if files := ask_several(self.area, self.context.settings, "images", title, patterns):
+            self.import_files(files)
 
-    def import_files(self, files: list[Path]) -> None:
+    def import_files(self, files: Sequence[Path]) -> None:
         """Import image files into the step."""
-        self.panel.show_notice("", "pass")
+        self.commit()
+        self.model.show_notice("", "pass")
         self.model.import_files(self.stage, files, radius_mm=self.radius_mm)
 
 
@@ -320,13 +298,9 @@ def plain_step(stage: Stage[Any]) -> type[ImageStep]:
     class PlainStep(ImageStep):
         """Captures the images of the stage."""
 
-        step = step_of(
-            stage,
-            stage.task or tr("Capture the images of this stage."),
-            "complete",
-            frames=16 if stage.one_image else 4,
-            wanted=1,
-        )
+        of = stage
+        task = stage.task or tr("Capture the images of this stage.")
+        frames, wanted = 16 if stage.one_image else 4, 1
 
         def detector(self, name: str) -> Detector:
             """Return what accepts every image: the stage judges it."""
@@ -337,35 +311,6 @@ def plain_step(stage: Stage[Any]) -> type[ImageStep]:
 
 def _accept(_rgb: Rgb) -> Detection:
     return Detection(Overlay(), Finding("any", tr("The image can be captured.")))
-
-
-def captures_of(
-    session: Session,
-    folder: str,
-    judge: Callable[[Path], Finding | None],
-    *,
-    note: Callable[[str], str] = lambda _name: "",
-) -> tuple[Capture, ...]:
-    """Return all captures of a stage with their states, including the excluded ones.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    folder : str
-        Folder of the stage.
-    judge : callable
-        Judges an image that is not excluded.
-    note : callable, optional
-        Text about an image, by its name.
-    """
-    used = {path.name for path in session.found(folder)}
-    return tuple(
-        Capture(path, judge(path), note=note(path.name))
-        if path.name in used
-        else Capture(path, excluded=True)
-        for path in session.captured(folder)
-    )
 
 
 def _same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:

@@ -7,10 +7,18 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, Detector, as_image, judged, or_refusal
+from app.calibrate.detection import (
+    LED_ROLES,
+    Detection,
+    Detector,
+    as_image,
+    judged,
+    mirror_positions_px,
+    or_refusal,
+    spot_markers,
+    spot_mask,
+)
 from app.calibrate.image_step import ImageStep
-from app.calibrate.marks import LED_ROLES, mirror_positions_px, spot_markers, spot_mask
-from app.calibrate.step_data import step_of
 from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Job
@@ -44,7 +52,7 @@ def detect_mirror(
     rgb : (rows, columns, 3)
         The frame.
     expected_px : (3, 2), optional
-        Expected positions of the spots, from :func:`app.calibrate.marks.mirror_positions_px`.
+        Expected positions of the spots, from :func:`app.calibrate.detection.mirror_positions_px`.
     editable : bool, optional
         Whether the spots can be dragged; their handles are mirror.0, mirror.1 and mirror.2.
     boards : tuple of BoardSpec, optional
@@ -71,11 +79,12 @@ def detect_mirror(
         figures = spots.quality.figures
         if expected_px is not None:
             off = float(np.linalg.norm(spots.centres_px - expected_px, axis=1).max())
-            figures += (
-                judge("spot_off_px", tr("Largest spot offset"), off, "px",
-                      warn=LED_OFF_OF_WIDTH * rgb.shape[1],
-                      remedy=tr("Check the channel of each LED, and that the mirror is flat")),
-            )  # fmt: skip
+            name = tr("Largest spot offset")
+            remedy = tr("Check the channel of each LED, and that the mirror is flat")
+            found = judge(
+                "spot_off_px", name, off, "px", warn=LED_OFF_OF_WIDTH * rgb.shape[1], remedy=remedy
+            )
+            figures += (found,)
         return judged(marks, figures, tr("All three LED reflections were found."))
 
     return or_refusal(detect, marks=Overlay(markers=expected))
@@ -92,25 +101,19 @@ def placed_spots(rgb: Rgb, session: Session) -> Detection:
     return or_refusal(detect)
 
 
-HANDLE = "mirror."
-
-
 class LightsStep(ImageStep):
     """Finds the spots; the user can drag each to its place."""
 
-    step = step_of(
-        LIGHTS,
-        tr("Lay the mirror on the top opening, with all LEDs on and the room dark."),
-        "mirror",
-        frames=16,
-        wanted=1,
-        advice=tr("Shorten the exposure until the three spots are small and not saturated."),
-        figure="led_sd_mm",
-    )
+    of = LIGHTS
+    task = tr("Lay the mirror on the top opening, with all LEDs on and the room dark.")
+    assembly = "mirror"
+    frames, wanted = 16, 1
+    advice = tr("Shorten the exposure until the three spots are small and not saturated.")
+    figure = "led_sd_mm"
 
     def detector(self, name: str) -> Detector:
         """Return the detection of the spots, with their positions in an earlier mirror image."""
-        session, results = self.model.project.session, self.model.project.results
+        session, results = self.session, self.results
         if name and session.decisions.spots_px:
             return partial(placed_spots, session=session)
         expected = None
@@ -123,10 +126,10 @@ class LightsStep(ImageStep):
 
     def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
         """Move an LED's spot to the spot at this point, or to the point itself."""
-        if not self.model.shown:
+        if not self.model.page.shown:
             return
-        led, path = int(handle.removeprefix(HANDLE)), self._path(self.model.shown)
-        session = self.model.project.session
+        led, path = int(handle.removeprefix("mirror.")), self._path(self.model.page.shown)
+        session = self.session
         self.model.short_jobs.submit(
             Job(
                 tr("Analysing the image"),
@@ -137,8 +140,7 @@ class LightsStep(ImageStep):
 
     def place_spot(self, led: int, position: Point | None) -> None:
         """Set the position of an LED's mirror spot by hand; can be undone."""
-        project = self.model.project
-        act = partial(project.place_spot, led)
-        before = project.session.decisions.spots_px.get(led)
+        act = partial(self.project.place_spot, led)
+        before = self.session.decisions.spots_px.get(led)
         text = tr("Move the mirror spot")
         self.model.correct(text, partial(act, position), partial(act, before), "lights")

@@ -3,75 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QUndoCommand, QUndoStack
+from PySide6.QtGui import QUndoStack
+from PySide6.QtWidgets import QWidget
 
-from app.calibrate.states import StepState
+from app.calibrate.page_state import PageState
+from app.calibrate.session_camera import SessionCamera
 from app.context.context import AppContext
 from app.live.live_detection import LiveDetection
 from app.live.session import LiveSession
 from app.services.jobs import Job, Jobs
+from app.widgets.undo import Step
+from app.workspace.entries import read_entry
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
-
-
-class Correction(QUndoCommand):
-    """One correction and its reverse; each changes only the data that it is about.
-
-    A command that cannot be written to disk has no effect and leaves the history.
-
-    Parameters
-    ----------
-    text : str
-        Text in the history list.
-    act, revert : callable
-        Written to disk before they return; raise InputError on failure.
-    done : callable
-        Called after either of them.
-    refused : callable
-        Called with the reason when the command failed.
-    is_done : bool, optional
-        Whether the change is already done when the command enters the history, as for a capture.
-    """
-
-    def __init__(
-        self,
-        text: str,
-        act: Callable[[], None],
-        revert: Callable[[], None],
-        *,
-        done: Callable[[], None],
-        refused: Callable[[str], object],
-        is_done: bool = False,
-    ) -> None:
-        super().__init__(text)
-        self._is_done = is_done
-        self._act, self._revert = act, revert
-        self._done, self._refused = done, refused
-
-    def redo(self) -> None:
-        """Apply the correction."""
-        if self._is_done:
-            self._is_done = False
-            return
-        self._run(self._act)
-
-    def undo(self) -> None:
-        """Undo the correction."""
-        self._run(self._revert)
-
-    def _run(self, change: Callable[[], None]) -> None:
-        try:
-            change()
-        except InputError as error:
-            self.setObsolete(True)
-            self._refused(str(error))
-        self._done()
 
 
 class WizardModel(QObject):
@@ -82,72 +33,63 @@ class WizardModel(QObject):
     Attributes
     ----------
     live : LiveSession
-        The camera.
+        The live images.
+    camera : SessionCamera
+        The camera of the session, compared with the selected one.
     live_detection : LiveDetection
         The detection of the open step on its images.
     undo : QUndoStack
         Every capture and manual correction, in one history.
     jobs, short_jobs : Jobs
         The computations, and the short jobs that run next to them.
-    shown : str
-        Name of the shown capture; empty for the live image.
     statuses : dict of str to StageStatus
-        Status of every stage, as of the last :meth:`update`.
-    states : dict of str to (state, message)
-        State of every step by its key, as the list of steps shows it.
+        Status of every stage, as the page shows it.
+    running : str or None
+        The stage that is being computed.
+    saved_path : Path or None
+        The newest saved calibration of this session.
+    page : PageState
+        What the page shows.
 
     Signals
     -------
     changed()
         Captures, decisions or results changed.
-    shown_changed()
-        Another capture, or the live image, is shown.
+    page_changed(object)
+        The page shows something else; with its state before.
     captured(str, str)
         Key of the stage and name of a new image.
-    photographed(str)
-        Stage of a new image from the camera; not sent for imported images.
-    progressed(str, float)
-        Title of the running computation (empty: none) and the share that is done.
+    photographed()
+        The camera has made a new image; not sent for imported images.
     refused(str)
         An error message for the user.
-    capture_aborted(str)
-        An error message: the camera was released during a capture.
-    saved_as(str)
-        Path of a calibration that was just saved.
+    step_requested(str)
+        Key of a step to go to.
     """
 
     changed = Signal()
-    shown_changed = Signal()
+    page_changed = Signal(object)
     captured = Signal(str, str)
-    photographed = Signal(str)
-    progressed = Signal(str, float)
+    photographed = Signal()
     refused = Signal(str)
-    capture_aborted = Signal(str)
-    saved_as = Signal(str)
+    step_requested = Signal(str)
 
-    def __init__(self, project: Project, *, context: AppContext, parent: QObject) -> None:
-        super().__init__(parent)
-        self.project = project
+    def __init__(self, project: Project, *, context: AppContext, window: QWidget) -> None:
+        super().__init__(window)
+        self.project, self.context = project, context
         self.undo = QUndoStack(self)
         self.live = LiveSession(context=context, name="detection", parent=self)
         self.live.use(False)  # until a step needs images
         self.live_detection = LiveDetection(self.live)
         self.jobs, self.short_jobs = Jobs("computing", self), Jobs("short jobs", self)
-        self.jobs.progressed.connect(self.progressed)
         for jobs in (self.jobs, self.short_jobs):
             jobs.refused.connect(self.refused)
-        # Returns why the present camera must not be used for this session; the session camera sets
-        # it.
-        self.camera_fault: Callable[..., str] = lambda ask=True: ""
-        # Returns whether the images are from files, and none from the present camera.
-        self.from_files: Callable[[], bool] = lambda: False
-        # Returns what was changed on it since the images with which those of a stage are compared.
-        self.camera_change: Callable[[str], str] = lambda stage: ""
-        self.shown = ""
-        self._saved = self._saved_inputs = ""
-        self.states: dict[str, StepState] = {}
-        self._running: str | None = None
-        self.update()
+        self.camera = SessionCamera(project, self.live, context=context, window=window)
+        self.saved_path: Path | None = None
+        self._saved_inputs = ""
+        self.page = PageState()
+        self.running: str | None = None
+        self.statuses = project.statuses()
 
     @property
     def busy(self) -> bool:
@@ -159,33 +101,45 @@ class WizardModel(QObject):
         """Whether an image is being captured or saved."""
         return self.live.capturing or self.short_jobs.busy
 
-    def update(self) -> None:
-        """Look at the files again and judge every stage."""
-        self.statuses = self.project.statuses()
+    # What the page shows
+
+    def show_page(self, page: PageState) -> None:
+        """Show another state of the page."""
+        before, self.page = self.page, page
+        self.page_changed.emit(before)
+
+    def update_page(self, **changes: Any) -> None:
+        """Replace some fields of what the page shows."""
+        self.show_page(replace(self.page, **changes))
+
+    def show_notice(self, sentence: str, role: str) -> None:
+        """Show how the last action ended; an empty text: nothing to read."""
+        self.update_page(notice=(sentence, role))
+
+    def show_live(self, sentence: str, *, ready: bool) -> None:
+        """Show what is in the live image, and whether it can be captured."""
+        self.update_page(live=(sentence, "pass" if ready else "warn"))
 
     @property
     def saved(self) -> str:
         """Name of the saved calibration, if it belongs to the present captures."""
-        return self._saved if self._saved_inputs == self.project.all_inputs else ""
+        path = self.saved_path
+        return path.stem if path and self._saved_inputs == self.project.all_inputs else ""
 
-    def use_saved(self, name: str, inputs: str) -> None:
-        """Remember a saved calibration and the text of its inputs."""
-        self._saved, self._saved_inputs = name, inputs
+    def use_calibration(self, path: Path) -> None:
+        """Remember the saved calibration of this session."""
+        self.saved_path, summary = path, read_entry(path).summary
+        self._saved_inputs = "" if summary is None else summary.inputs
+        self.changed.emit()
 
     # Images
-
-    def show(self, name: str) -> None:
-        """Show a capture by its name, or the live image."""
-        self.shown = name
-        self.shown_changed.emit()
 
     def capture(self, stage: str, *, frames: int, radius_mm: float | None = None) -> None:
         """Capture an image for a stage, averaged over frames; for a ball, with its radius.
 
         The image is on disk when :attr:`captured` is sent.
         """
-        fault = self.camera_fault()
-        if fault:
+        if fault := self.camera.fault():
             self.refused.emit(fault)
             return
 
@@ -196,7 +150,9 @@ class WizardModel(QObject):
             saved = partial(self._on_saved, stage, by_camera=True)
             self.short_jobs.submit(Job(tr("Saving the image"), work, saved, must=True))
 
-        self.live.capture(frames, keep, self.refused.emit, aborted=self.capture_aborted.emit)
+        # A toast, not the page: the user has already left the step.
+        aborted = partial(self.context.toasts.show, verdict="fail")
+        self.live.capture(frames, keep, self.refused.emit, aborted=aborted)
 
     def import_files(
         self, stage: str, files: Sequence[Path], *, radius_mm: float | None = None
@@ -215,27 +171,32 @@ class WizardModel(QObject):
             text = tr("Add {name}").format(name=names[0])
         restore = partial(self.project.take_again, stage, names)
         revert = partial(self.project.take_back, stage, names)
-        self.undo.push(self._command(text, restore, revert, stage, is_done=True))
+        self.correct(text, restore, revert, stage, is_done=True)
         self.changed.emit()
         for name in names:
             self.captured.emit(stage, name)
         if by_camera:
-            self.photographed.emit(stage)
+            try:
+                self.camera.note_image(stage)
+            except InputError as error:
+                self.refused.emit(str(error))
+            self.photographed.emit()
         self.compute(stage)
 
     # Manual corrections
 
     def exclude(self, stage: str, name: str, excluded: bool) -> None:
         """Exclude an image, or include it again; can be undone."""
-        text = tr("Exclude {name}") if excluded else tr("Include {name}")
+        text = (tr("Exclude {name}") if excluded else tr("Include {name}")).format(name=name)
         act = partial(self.project.exclude, stage, name)
-        self.correct(text.format(name=name), partial(act, excluded), partial(act, not excluded),
-                     stage)  # fmt: skip
+        self.correct(text, partial(act, excluded), partial(act, not excluded), stage)
 
     def set_ball_diameter(self, name: str, diameter_mm: float) -> None:
         """Set the diameter of the ball in one image; can be undone."""
         act = partial(self.project.set_ball_radius, name)
         before = self.project.session.ball_radii_mm.get(name)
+        if before == 0.5 * diameter_mm:
+            return
         text = tr("Diameter of {name}: {d:g} mm").format(name=name, d=diameter_mm)
         self.correct(text, partial(act, 0.5 * diameter_mm), partial(act, before), "balls")
 
@@ -245,6 +206,8 @@ class WizardModel(QObject):
         act: Callable[[], None],
         revert: Callable[[], None],
         stage: str | None,
+        *,
+        is_done: bool = False,
     ) -> None:
         """Run a command that can be undone, then compute the stage that it affects.
 
@@ -253,27 +216,26 @@ class WizardModel(QObject):
         text : str
             Text in the history.
         act, revert : callable
-            Written to disk before they return; raise InputError on failure.
+            Written to disk before they return; raise InputError on failure, without effect.
         stage : str or None
             Key of the stage to compute afterwards, with all that it depends on; None: all stages.
+        is_done : bool, optional
+            Whether the change is already done, as for a capture.
         """
-        self.undo.push(self._command(text, act, revert, stage))
 
-    def _command(
-        self,
-        text: str,
-        act: Callable[[], None],
-        revert: Callable[[], None],
-        stage: str | None,
-        *,
-        is_done: bool = False,
-    ) -> Correction:
-        def done() -> None:
-            self.changed.emit()
-            self.compute(stage)
+        def run(change: Callable[[], None]) -> bool:
+            try:
+                change()
+            except InputError as error:
+                self.refused.emit(str(error))
+                return False
+            finally:
+                self.changed.emit()
+                self.compute(stage)
+            return True
 
-        refused = self.refused.emit
-        return Correction(text, act, revert, done=done, refused=refused, is_done=is_done)
+        first = iter((is_done,))
+        self.undo.push(Step(text, lambda: next(first, False) or run(act), partial(run, revert)))
 
     def reload(self) -> None:
         """Read the session files again and start a new history.
@@ -290,22 +252,17 @@ class WizardModel(QObject):
 
     # Background work
 
-    @property
-    def running(self) -> str | None:
-        """The stage that is being computed."""
-        return self._running
-
     def compute(self, upto: str | None = None) -> None:
         """Compute the outdated stages, up to one stage or all of them."""
 
         def work(progress: Callable[[float], None]) -> None:
             while stale := self.project.stale(upto=upto):
                 progress(0.0)
-                self._running = stale[0]
+                self.running = stale[0]
                 try:
                     self.project.compute(stale[0], progress)
                 finally:
-                    self._running = None
+                    self.running = None
 
         if self.project.stale(upto=upto):
             self.jobs.submit(Job(tr("Computing"), work, lambda _nothing: self.changed.emit()))

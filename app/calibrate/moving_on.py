@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, QTimer
 
 from app.calibrate.model import WizardModel
-from app.calibrate.step import StepPresenter
+from app.calibrate.step import Step
 from app.calibrate.step_panel import StepPanel
 
 # Long enough to see the verdict and the figure.
@@ -29,56 +29,42 @@ class MovingOn(QTimer):
     Parameters
     ----------
     model : WizardModel
-        The shown capture, the present work, and the states of all steps. Owner of this timer.
+        What the page shows, and the present work. Owner of this timer.
     panel : StepPanel
-        Holds the switch, and shows the countdown.
-    presenters : sequence of StepPresenter
+        Holds the switch.
+    steps : sequence of Step
         The steps.
-    go_to : callable
-        Opens a step by its key.
     """
 
-    def __init__(
-        self,
-        model: WizardModel,
-        panel: StepPanel,
-        presenters: Sequence[StepPresenter],
-        *,
-        go_to: Callable[[str], None],
-    ) -> None:
-        super().__init__(model)
-        self._model, self._panel, self._presenters = model, panel, presenters
-        self._go_to = go_to
+    def __init__(self, model: WizardModel, panel: StepPanel, steps: Sequence[Step]) -> None:
+        super().__init__(model, interval=TICK_MS)
+        self._model, self._panel, self._steps = model, panel, steps
         application = QCoreApplication.instance()
         assert application is not None
         self._application = application
-        self._open = presenters[0]
         self._was_incomplete = False
-        self._left = 0
         self._moved_s = -REACTION_S
-        self.setInterval(TICK_MS)
         self.timeout.connect(self._tick)
 
-    def enter(self, step: StepPresenter) -> None:
-        """Note which step is open, and whether it is complete already."""
+    def enter(self) -> None:
+        """Note whether the open step is complete already."""
         self.stop()
-        self._open = step
-        self._was_incomplete = not self._settled
+        self._was_incomplete = not self._settled(self._place)
 
     def check(self) -> None:
         """Look whether the open step has just been completed."""
-        if self._was_incomplete and self._settled:
+        if self._was_incomplete and self._settled(self._place):
             self._was_incomplete = False
             if self._panel.automatic.isChecked():
                 self._application.installEventFilter(self)
-                self._count_from(SECONDS)
+                self._model.update_page(countdown=SECONDS)
                 self.start()
 
     def stop(self) -> None:
         """Stay at this step."""
         super().stop()
         self._application.removeEventFilter(self)
-        self._panel.show_countdown(0)
+        self._model.update_page(countdown=0)
 
     @property
     def just_moved(self) -> bool:
@@ -90,34 +76,28 @@ class MovingOn(QTimer):
         if event.type() in STOPS:
             self.stop()
         elif event.type() == QEvent.Type.MouseMove:
-            self._count_from(SECONDS)
+            self._model.update_page(countdown=SECONDS)
         return super().eventFilter(watched, event)
 
-    def _count_from(self, seconds: int) -> None:
-        self._left = seconds
-        self._panel.show_countdown(seconds)
-
     @property
-    def _settled(self) -> bool:
-        return self._open.is_settled(self._model.states[self._open.step.key][0])
+    def _place(self) -> int:
+        return self._model.page.place
+
+    def _settled(self, place: int) -> bool:
+        step = self._steps[place]
+        return step.is_settled(self._model.page.states[step.key][0])
 
     def _tick(self) -> None:
-        looks_back, following = bool(self._model.shown), self._next()
-        if looks_back or following is None or not self._settled:
+        # The first later step that is not complete and needs the user.
+        later = range(self._place + 1, len(self._steps))
+        following = next((place for place in later if not self._settled(place)), None)
+        left = self._model.page.countdown - 1
+        if self._model.page.shown or following is None or not self._settled(self._place):
             self.stop()
         elif self._model.busy_with_images:  # one more capture is in progress
-            self._count_from(SECONDS)
-        elif self._left > 1:
-            self._count_from(self._left - 1)
+            self._model.update_page(countdown=SECONDS)
+        elif left > 0:
+            self._model.update_page(countdown=left)
         else:
             self._moved_s = time.monotonic()
-            self._go_to(following.step.key)
-
-    def _next(self) -> StepPresenter | None:
-        """Return the first later step that is not complete and needs the user."""
-        later = self._presenters[self._presenters.index(self._open) + 1 :]
-        states = self._model.states
-        return next(
-            (one for one in later if not one.is_settled(states[one.step.key][0])),
-            None,
-        )
+            self._model.step_requested.emit(self._steps[following].key)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.calibrate.model import WizardModel
+from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.meaning import make_bold, show_meaning
@@ -28,25 +32,23 @@ class OutsideBar(QWidget):
         named(self, "calibrate.outside", tr("Changed by another program"))
         self._model = model
         self._refusal = ""
-        self.sentence = named(PlainLabel(), "calibrate.outside.sentence", tr("What was changed"))
-        self.sentence.setWordWrap(True)
+        self.sentence = PlainLabel(wrap=True)
+        named(self.sentence, "calibrate.outside.sentence", tr("What was changed"))
         show_meaning(self.sentence, "warn")
         make_bold(self.sentence)
         self.sentence.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
-        self.reload = named(
-            QPushButton(tr("Re&load")),
+        self.reload = push_button(
             "calibrate.outside.reload",
-            tr("Reload"),
-            tr("Read the changed files; this clears the history of corrections"),
+            tr("Re&load"),
+            partial(self._act, model.reload),
+            tip=tr("Read the changed files; this clears the history of corrections"),
         )
-        self.overwrite = named(
-            QPushButton(tr("&Keep mine")),
+        self.overwrite = push_button(
             "calibrate.outside.overwrite",
-            tr("Keep mine"),
-            tr("Overwrite the changed files with the state of this page"),
+            tr("&Keep mine"),
+            partial(self._act, model.project.overwrite),
+            tip=tr("Overwrite the changed files with the state of this page"),
         )
-        self.reload.clicked.connect(self._reload)
-        self.overwrite.clicked.connect(self._overwrite)
         hbox((self.sentence, 1), self.reload, self.overwrite, of=self, margins=(8, 4, 8, 4))
         self._timer = QTimer(self, interval=1000)
         self._timer.timeout.connect(self.check)
@@ -54,11 +56,10 @@ class OutsideBar(QWidget):
 
     def watch(self, on: bool) -> None:
         """Check regularly while the page is shown."""
+        self._timer.stop()
         if on:
             self._timer.start()
             self.check()
-        else:
-            self._timer.stop()
 
     def check(self) -> None:
         """Check whether files were changed, and say so."""
@@ -71,16 +72,9 @@ class OutsideBar(QWidget):
         self.sentence.setText(self._refusal or text)
         self.setVisible(bool(changed))
 
-    def _reload(self) -> None:
+    def _act(self, act: Callable[[], None]) -> None:
         try:
-            self._model.reload()
-        except InputError as error:
-            self._refusal = str(error)
-        self.check()
-
-    def _overwrite(self) -> None:
-        try:
-            self._model.project.overwrite()
+            act()
         except InputError as error:
             self._refusal = str(error)
         self.check()

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QStackedWidget, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QPushButton, QStackedWidget, QWidget
 
-from app.calibrate.in_place_offer import copy_images, in_place_offer
-from app.calibrate.session_camera import SetupCamera
-from app.calibrate.setup_form import SetupForm
-from app.calibrate.setup_values import new_session
-from app.calibrate.start_view import QuestionView, StartView
+from app.calibrate.setup import SetupForm
+from app.calibrate.setup_values import copy_images, in_place_offer, new_session
 from app.calibrate.wizard import Wizard
 from app.context.context import AppContext
+from app.services.file_dialogs import ask_folder
+from app.widgets.buttons import Slot, push_button
+from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.question import ask
 from app.workspace.sessions import unfinished
@@ -25,6 +29,125 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
+
+WIDTH = 460
+
+
+class StartView(QWidget):
+    """Offers the buttons to start or continue a calibration.
+
+    Parameters
+    ----------
+    page : CalibratePage
+        Does what the buttons offer.
+    """
+
+    def __init__(self, page: CalibratePage) -> None:
+        super().__init__()
+        named(self, "start", tr("Start a calibration"))
+        self._open = page.open_path
+        intro = tr(
+            "The program guides you step by step, and checks every image while you can still "
+            "repeat it."
+        )
+        self.problem = named(PlainLabel(wrap=True), "start.problem", tr("Why it was not opened"))
+        show_meaning(self.problem, "fail")
+        self.problem.hide()
+        tip = tr("Start a new session with the background and the ball presses of this folder")
+        closed = tr("Calibrate it as a &closed sensor")
+        self.closed = _choice("start.closed", closed, page.begin_closed, tip)
+        self.closed.hide()
+        self._recent = vbox()
+        _column(
+            self,
+            tr("Calibrate a sensor"),
+            intro,
+            _choice("start.new", tr("&New calibration"), page.begin),
+            _choice("start.open", tr("&Open a session folder…"), page.choose_folder),
+            _choice("start.demo", tr("&Try the virtual sensor"), page.begin_demo),
+            *(self.problem, self.closed, 12, self._recent),
+        )
+
+    def show_problem(self, sentence: str, *, closed: bool = False) -> None:
+        """Show why a session was not opened; hide the message if the text is empty.
+
+        With `closed`, offer to use the folder for a closed sensor.
+        """
+        self.closed.setVisible(closed)
+        if closed:
+            sentence += " " + tr(
+                "If the sensor cannot be opened, calibrate it from its background and ball "
+                "presses alone."
+            )
+        self.problem.setText(sentence)
+        self.problem.setVisible(bool(sentence))
+
+    def show_recent(self, folders: Sequence[Path]) -> None:
+        """Show buttons for these sessions."""
+        while self._recent.count():
+            item = self._recent.takeAt(0)
+            if item is not None and (old := item.widget()) is not None:
+                old.deleteLater()
+        if folders:
+            self._recent.addWidget(PlainLabel(tr("Continue a recent session")))
+        for number, folder in enumerate(folders[:6]):
+            text = f"{folder.parent.parent.name} / {folder.name}"
+            button = _choice(
+                f"start.recent.{number}", text, partial(self._open, folder), str(folder), height=0
+            )
+            button.setAccessibleName(tr("Continue {s}").format(s=text))
+            button.setFlat(True)
+            button.setFixedWidth(WIDTH)
+            button.setStyleSheet("text-align: left;")
+            self._recent.addWidget(button)
+
+
+class QuestionView(QWidget):
+    """Asks which route the calibration takes.
+
+    Parameters
+    ----------
+    page : CalibratePage
+        Gets the answer.
+    """
+
+    def __init__(self, page: CalibratePage) -> None:
+        super().__init__()
+        named(self, "question", tr("Can the sensor be opened?"))
+        opens, closed = partial(page.begin_form, True), partial(page.begin_form, False)
+        self.can = _choice("question.open", tr("&Yes, the membrane can be taken off"), opens)
+        opened = tr(
+            "Lens, top surface, lights and membrane are measured one by one, in nine steps. This "
+            "gives the most exact depth. You need two checkerboards, a mirror, a white board and "
+            "balls."
+        )
+        cannot = _choice("question.closed", tr("&No, the membrane is bonded"), closed)
+        bonded = tr(
+            "For GelSight Mini, DIGIT, 9DTact and most home-made sensors. A few steps: one image "
+            "of the untouched membrane and some presses of a ball of known diameter."
+        )
+        back = _choice("question.back", tr("&Back"), page.leave_session)
+        back.setFlat(True)
+        parts = self.can, opened, 10, cannot, bonded, 10, back
+        _column(self, tr("Can the sensor be opened?"), *parts)
+
+
+def _choice(name: str, text: str, slot: Slot, tip: str = "", *, height: int = 40) -> QPushButton:
+    """Return a wide button."""
+    button = push_button(name, text, slot, tip=tip)
+    button.setMinimumHeight(height)
+    return button
+
+
+def _column(view: QWidget, title: str, *parts: object) -> None:
+    """Fill a view with a title and parts of one width in its middle; a text is wrapped."""
+    heading = PlainLabel(title)
+    make_bold(heading, size=1.6)
+    made = [PlainLabel(part, wrap=True) if isinstance(part, str) else part for part in parts]
+    for part in made:
+        if isinstance(part, QWidget):
+            part.setFixedWidth(WIDTH)
+    vbox(heading, *made, of=view, spacing=10).setAlignment(Qt.AlignmentFlag.AlignCenter)
 
 
 class CalibratePage(QWidget):
@@ -44,21 +167,13 @@ class CalibratePage(QWidget):
         self._shown = False
         self._stack = QStackedWidget()
         vbox(self._stack, of=self, margins=0)
-        self.start = StartView()
-        self.question = QuestionView()
-        self.form = SetupForm()
+        self._offer: Session | None = None
+        self.start = StartView(self)
+        self.question = QuestionView(self)
+        self.form = SetupForm(context=context)
         for view in (self.start, self.question, self.form):
             self._stack.addWidget(view)
         self.form.accepted.connect(self._begin)
-        self.setup_camera = SetupCamera(self.form, context=context)
-        self.start.new.clicked.connect(self.begin)
-        self.start.open.clicked.connect(self.choose_folder)
-        self.start.demo.clicked.connect(self.begin_demo)
-        self.start.recent_wanted.connect(lambda folder: self.open_path(Path(folder)))
-        self._offer: Session | None = None
-        self.start.closed.clicked.connect(self._begin_closed)
-        self.question.answered.connect(self._on_answer)
-        self.question.back.clicked.connect(self._leave_session)
         context.source.changed.connect(self._on_source)
         self.start.show_recent(context.settings.recent("sessions"))
 
@@ -88,12 +203,9 @@ class CalibratePage(QWidget):
         try:
             project = Project(folder)
         except InputError as error:
-            self._leave_session()
-            self._offer = in_place_offer(folder)
-            if self._offer is None:
-                self.start.show_problem(str(error))
-            else:
-                self.start.show_problem(f"{error.where}: {error.found}.", closed=True)
+            offer = in_place_offer(folder)
+            problem = str(error) if offer is None else f"{error.where}: {error.found}."
+            self.leave_session(problem, offer)
             return
         self._show_wizard(project)
 
@@ -105,17 +217,16 @@ class CalibratePage(QWidget):
         self._stack.setCurrentWidget(self.question)
         self.question.can.setFocus()
 
-    def _begin_closed(self) -> None:
-        """Show the form of a closed sensor for the folder that could not be opened."""
-        if self._offer is not None:
-            self._show_form(self._offer)
-
     def begin_demo(self) -> None:
         """Start with the virtual sensor."""
         self.context.source.choose_virtual_sensor()
         self.begin()
 
-    def _on_answer(self, opens: bool) -> None:
+    def begin_closed(self) -> None:
+        """Show the form of a closed sensor for the folder that could not be opened."""
+        self._show_form(self._offer)
+
+    def begin_form(self, opens: bool) -> None:
         """Show the form for the sensor; what was typed before is kept."""
         typed, edited = self.form.values.value, self.form.edited and not self._is_virtual
         if edited and typed.optics == opens:
@@ -134,12 +245,9 @@ class CalibratePage(QWidget):
 
     def choose_folder(self) -> None:
         """Let the user choose a session folder."""
-        chosen = QFileDialog.getExistingDirectory(
-            self, tr("Open a session folder"), str(self.context.settings.folder("session"))
-        )
-        if chosen:
-            self.context.settings.keep_folder("session", Path(chosen).parent)
-            self.open_path(Path(chosen))
+        title = tr("Open a session folder")
+        if folder := ask_folder(self, self.context.settings, "session", title):
+            self.open_path(folder)
 
     @property
     def _is_virtual(self) -> bool:
@@ -193,21 +301,22 @@ class CalibratePage(QWidget):
 
     def _show_wizard(self, project: Project, *, step: str = "") -> None:
         self._close_wizard()
-        self.start.show_problem("")
         self.wizard = Wizard(project, context=self.context)
-        self.wizard.left.connect(self._leave_session)
+        self.wizard.left.connect(self.leave_session)
         self.wizard.renewed.connect(lambda step: self._show_wizard(project, step=step))
         self._stack.addWidget(self.wizard)
         self._stack.setCurrentWidget(self.wizard)
         self.context.settings.add_recent("sessions", project.session.folder)
-        known = step in [one.step.key for one in self.wizard.presenters]
+        known = step in [one.key for one in self.wizard.steps]
         self.wizard.go_to(step if known else self.wizard.first_open_step())
         if self._shown:
             self.wizard.enter()
 
-    def _leave_session(self) -> None:
+    def leave_session(self, problem: str = "", offer: Session | None = None) -> None:
+        """Show the start view, with the reason why a folder could not be opened as it is."""
         self._close_wizard()
-        self.start.show_problem("")
+        self._offer = offer
+        self.start.show_problem(problem, closed=offer is not None)
         self.start.show_recent(self.context.settings.recent("sessions"))
         self._stack.setCurrentWidget(self.start)
 

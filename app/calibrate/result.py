@@ -1,9 +1,9 @@
-"""The result of a calibration: its verdict, what to mend, saving and the report."""
+"""The result of a calibration: its verdict, the one cause, saving, and the report."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property, partial
 from pathlib import Path
@@ -11,13 +11,9 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
 
-from app.calibrate.maps import MapsView
-from app.calibrate.refraction import most_oblique_press
-from app.calibrate.remedies import Mend, mend_of
-from app.calibrate.states import RUNNING, StepState, is_done, step_state
-from app.calibrate.step import Parts, StepPresenter
-from app.calibrate.step_data import Step
-from app.calibrate.step_panel import Remedy
+from app.calibrate.maps import MapsView, most_oblique_press
+from app.calibrate.page_state import RUNNING, Remedy, StepState, is_done
+from app.calibrate.step import Step
 from app.services.file_dialogs import ask_save
 from app.services.jobs import Job
 from app.widgets.buttons import push_button
@@ -26,14 +22,73 @@ from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.meaning import make_bold, set_property, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.missing import OPEN_FOLDERS
 from gelpolight_core.calibration.open_sensor import TOP_POSE
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.status import StageState, StageStatus
-from gelpolight_core.causes import with_one_cause
+from gelpolight_core.causes import best_cause, with_one_cause
 from gelpolight_core.errors import InputError
-from gelpolight_core.finding import Finding, QualityTable, Verdict, joined_tables
+from gelpolight_core.finding import Finding, QualityTable, Verdict, joined_tables, worst_of
 from gelpolight_core.translation import tr
+
+SET_UP = "setup"
+MENDED_IN = {
+    "ball_radius": BALLS.key,
+    "press_radius_percent": BALLS.key,
+    "membrane": "radiance",
+    "focus": "lens",
+    "background_light_percent": "background",
+    "background_place_percent": "background",
+}
+"""The step where a cause is mended; a stated number is mended in the set-up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mend:
+    """What to do about poor figures.
+
+    Attributes
+    ----------
+    text : str
+        The cause with its remedy, without a full stop.
+    step : str
+        Key of the step or stage where it is mended.
+    ball : str
+        File name of the ball press whose diameter is wrong; empty for any other cause.
+    diameter_mm : float
+        The diameter that fits it, to two digits.
+    """
+
+    text: str
+    step: str
+    ball: str = ""
+    diameter_mm: float = 0.0
+
+
+def mend_of(quality: Mapping[str, QualityTable], results: Results) -> Mend | None:
+    """Return what mends the most; None if all figures pass.
+
+    Parameters
+    ----------
+    quality : mapping of str to QualityTable
+        Of every stage.
+    results : Results
+        Of every stage.
+    """
+    worst = worst_of(joined_tables(quality.values()).figures)
+    if worst is None:
+        return None
+    cause = best_cause(quality)
+    if cause is None:
+        stage = next(key for key, table in quality.items() if worst in table.figures)
+        return Mend(worst.sentence.rstrip("."), stage)
+    found, step = results.get(REFLECTANCE), MENDED_IN.get(cause.key, SET_UP)
+    if cause.key == "press_radius_percent" and found is not None:
+        odd = max(found.table.agreements, key=lambda one: one.radius_off_percent)
+        return Mend(cause.remedy, step, Path(odd.name).name, float(f"{2.0 * odd.radius_mm:.2g}"))
+    return Mend(cause.remedy, step)
+
 
 if TYPE_CHECKING:
     from app.calibrate.reflectance.curves import Curves
@@ -62,11 +117,6 @@ class Overview(QWidget):
         scroll = named(scroll_area(inside), "result.scroll", tr("Figures"))
         vbox(self.headline, (scroll, 1), of=self, margins=24, spacing=16)
 
-    def show_verdict(self, sentence: str, role: str) -> None:
-        """Show the verdict, in the colour of its role."""
-        self.headline.setText(sentence)
-        show_meaning(self.headline, role)
-
     def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
         """Show the figures of stages by their titles, the poor ones first; `cause` once only."""
         figures = joined_tables(table for _, table in tables).figures
@@ -87,20 +137,14 @@ class Overview(QWidget):
         self.more.setVisible(bool(figures))
 
 
-class ResultStep(StepPresenter):
+class ResultStep(Step):
     """Shows what all stages give together, and saves the calibration and its report."""
 
-    step = Step(
-        "result",
-        tr("Result"),
-        ("reflectance", "joint"),
-        tr("Check the verdict, then save the calibration."),
-        "complete",
-    )
+    key, title, stages = "result", tr("Result"), ("reflectance", "joint")
+    task = tr("Check the verdict, then save the calibration.")
 
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
-        self._steps = {stage: step for step in parts.steps for stage in step.stages}
+    def build(self) -> None:
+        """Create what only this step shows."""
         self.overview = Overview()
         self.save = push_button("result.save", tr("&Save the calibration"), self.store)
         self.report = push_button(
@@ -118,7 +162,6 @@ class ResultStep(StepPresenter):
             self.tabs.addTab(QWidget(), tr("Reflectance curves"))
         self.tabs.tabBar().setVisible(self.tabs.count() > 1)
         self.tabs.currentChanged.connect(lambda _: self._show_tab())
-        self._mend: Mend | None = None
 
     @cached_property
     def curves(self) -> Curves:
@@ -140,11 +183,11 @@ class ResultStep(StepPresenter):
 
     def state(self) -> StepState:
         """Return the state of the last stages; once they are done, the worst of all."""
-        statuses, running = self.model.statuses, self.model.running
-        own = self.step.stages or tuple(statuses)[-1:]
+        statuses = self.model.statuses
+        own: tuple[str, ...] = self.stages or tuple(statuses)[-1:]
         if all(_is_made(statuses[stage]) for stage in own):
             own = tuple(statuses)
-        return step_state(replace(self.step, stages=own), statuses, running, count=0)
+        return self.state_of(own)
 
     def is_finished(self, state: str) -> bool:
         """Return whether the present captures are saved as a calibration."""
@@ -161,17 +204,27 @@ class ResultStep(StepPresenter):
 
     def remedies(self, state: str) -> tuple[Remedy, ...]:
         """Return what mends the one cause: correct the number, or go where it is mended."""
-        mend = self._mend
+        mend = self._mend()
         if mend is None or state not in ("warn", "fail"):
             return super().remedies(state)
-        step = self._steps.get(mend.step)
+        step = next((step for step in self.model.page.steps if mend.step in step.stages), None)
         key = mend.step if step is None else step.key
         title = tr("Set-up") if step is None else step.title
-        go = (tr("Go to {step}").format(step=title), partial(self.step_wanted.emit, key))
+        go = (tr("Go to {step}").format(step=title), partial(self.model.step_requested.emit, key))
         if not mend.ball:
-            return () if step is self.step else (go,)
+            return () if step is self else (go,)
         text = tr("Set {ball} to {d:g} mm").format(ball=Path(mend.ball).stem, d=mend.diameter_mm)
         return ((text, partial(self.model.set_ball_diameter, mend.ball, mend.diameter_mm)),)
+
+    def explain(self, state: str, sentence: str) -> str:
+        """Return the one cause."""
+        mend = self._mend()
+        return f"{mend.text}." if mend is not None and state in ("warn", "fail") else sentence
+
+    def _mend(self) -> Mend | None:
+        """Return what mends the one cause; None if all figures pass."""
+        quality = {key: status.quality for key, status in self.model.statuses.items()}
+        return mend_of(quality, self.results)
 
     def tables(self) -> Sequence[QualityTable]:
         """Return nothing: the figures have their own place."""
@@ -192,23 +245,21 @@ class ResultStep(StepPresenter):
         model, statuses = self.model, self.model.statuses
         text = tr("Saved as {name}. Validate it next.").format(name=model.saved)
         self.saved.setText(text if model.saved else "")
-        quality = {key: status.quality for key, status in statuses.items()}
-        self._mend = mend_of(quality, model.project.results)
-        _, tables = with_one_cause(quality)
-        cause = "" if self._mend is None else self._mend.text
+        _, tables = with_one_cause({key: status.quality for key, status in statuses.items()})
+        mend = self._mend()
+        cause = "" if mend is None else mend.text
         self.overview.show_figures([(self._title(k), t) for k, t in tables.items()], cause)
-        self.overview.show_verdict(*self._verdict(statuses))
+        verdict, role = self._verdict(statuses)
+        self.overview.headline.setText(verdict)
+        show_meaning(self.overview.headline, role)
         made = all(map(_is_made, statuses.values()))
         failed = any(status.state is FAIL for status in statuses.values())
-        idle = all(state != RUNNING for state, _ in model.states.values())
+        idle = all(state != RUNNING for state, _ in model.page.states.values())
         self.save.setText(tr("&Save as a draft") if failed else tr("&Save the calibration"))
         self.save.setEnabled(made and idle)
         set_property(self.save, "primary", made and not model.saved)
         # The report waits for the stages by itself.
         self.report.setEnabled(self.save.isEnabled() or bool(model.jobs.busy and model.saved))
-        state, sentence = model.states[self.step.key]
-        wrong = self._mend is not None and state in ("warn", "fail")
-        self.show_state(state, f"{cause}." if wrong else sentence)
         set_property(self.panel.next, "primary", bool(model.saved))
         self._show_tab()
 
@@ -218,7 +269,7 @@ class ResultStep(StepPresenter):
         if shown == 1:
             why = tr("The comparison needs the ball presses. Complete the earlier steps first.")
             try:
-                panels = most_oblique_press(self.model.project)
+                panels = most_oblique_press(self.project)
             except InputError as error:
                 panels, why = (), str(error)
             self._maps.show_panels(panels, none=why)
@@ -226,7 +277,7 @@ class ResultStep(StepPresenter):
             self.curves.show_results()
 
     def _title(self, stage: str) -> str:
-        return self.model.project.recipe[stage].title
+        return self.project.recipe[stage].title
 
     def _verdict(self, statuses: dict[str, StageStatus]) -> tuple[str, str]:
         """Return the verdict in one line, and its colour."""
@@ -256,7 +307,7 @@ class ResultStep(StepPresenter):
         """Return how many stages are missing, and which of them need the sensor open."""
         open_count = sum(not is_done(status.state.value) for status in statuses.values())
         text = tr("Incomplete stages: {n}. Complete them from top to bottom.").format(n=open_count)
-        recipe, empty = self.model.project.recipe, StageState.EMPTY
+        recipe, empty = self.project.recipe, StageState.EMPTY
         closed = [
             recipe[key].title
             for key, status in statuses.items()
@@ -273,7 +324,7 @@ class ResultStep(StepPresenter):
 
     def store(self) -> None:
         """Write the calibration into the library, and use it from now on unless it failed."""
-        project, workspace = self.model.project, self.context.workspace
+        project, workspace = self.project, self.context.workspace
 
         def work(_progress: object) -> tuple[Path, Finding | None]:
             calibration = project.finish().calibration
@@ -286,14 +337,14 @@ class ResultStep(StepPresenter):
         def done(saved: tuple[Path, Finding | None]) -> None:
             path, fault = saved
             text = tr("Saved as a draft, {name}, and not in use.").format(name=path.stem)
-            self.panel.show_notice(text if fault else "", "fail")
+            self.model.show_notice(text if fault else "", "fail")
             self.context.requests.calibrations_changed.emit()
-            self.model.saved_as.emit(str(path))
+            self.model.use_calibration(path)
 
         self.model.jobs.submit(Job(tr("Saving the calibration"), work, done))
 
 
-def ask_report(step: StepPresenter) -> None:
+def ask_report(step: Step) -> None:
     """Ask for a file name and write the report of the session there."""
     name = f"{step.model.project.session.serial}-report.pdf"
     title, patterns = tr("Write the report"), tr("PDF (*.pdf)")
@@ -302,7 +353,7 @@ def ask_report(step: StepPresenter) -> None:
         write_report(path, step)
 
 
-def write_report(path: Path, step: StepPresenter) -> None:
+def write_report(path: Path, step: Step) -> None:
     """Write the report of the session in its present state; the panel shows how it ended."""
     project, workspace = step.model.project, step.context.workspace
 
@@ -317,7 +368,7 @@ def write_report(path: Path, step: StepPresenter) -> None:
         file.write_report(build.run_report(run), path)
 
     def done(_nothing: None) -> None:
-        step.panel.show_notice(tr("Report saved as {path}").format(path=path), "pass")
+        step.model.show_notice(tr("Report saved as {path}").format(path=path), "pass")
 
     step.model.jobs.submit(Job(tr("Writing the report"), work, done))
 

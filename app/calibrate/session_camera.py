@@ -1,109 +1,71 @@
-"""The camera in the set-up step; a session stores its settings and keeps the camera at them."""
+"""The selected camera: how it is set, and whether it is the one of the session."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from app.calibrate.model import WizardModel
-from app.calibrate.setup_form import SetupForm
 from app.context.context import AppContext
-from app.context.source_button import show_settings_of_source
+from app.live.session import LiveSession
 from app.sources.camera.applying import differences, is_locked
 from app.widgets.question import Question
 from app.widgets.question import ask as question
-from gelpolight_core.errors import InputError
+from gelpolight_core.calibration.project import Project
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
 
-class SetupCamera(QObject):
-    """Shows the camera settings in the set-up form, and opens the settings dialog.
-
-    Parameters
-    ----------
-    setup : SetupForm
-        The form.
-    context : AppContext
-        Context with the cameras and the selected source.
-    """
-
-    def __init__(self, setup: SetupForm, *, context: AppContext) -> None:
-        super().__init__(setup)
-        self._setup, self._context = setup, context
-        setup.camera_settings.clicked.connect(self._set)
-        context.source.changed.connect(self.show)
-        context.cameras.changed.connect(self.show)
-        self.show()
-
-    def close(self) -> None:
-        """Disconnect from the camera's signals."""
-        self._context.source.changed.disconnect(self.show)
-        self._context.cameras.changed.disconnect(self.show)
-
-    def _set(self) -> None:
-        show_settings_of_source(self._context, self._setup)
-
-    def show(self) -> None:
-        """Show the camera settings in the set-up form."""
-        info = self._context.source.info
-        camera = self._context.cameras.of(info)
-        if camera is None:
-            name = tr("No camera is selected.") if info is None else info.name
-            more = tr("Select one, or import images.") if info is None else ""
-            self._setup.show_camera(f"{name} {more}".rstrip(), "", settable=False)
-            return
-        state, name = camera.state, camera.device.name
-        _, clauses = self._context.cameras.differs(camera)
-        if clauses:
-            text, role = tr("{name} is not set as before: {how}."), "warn"
-            text = text.format(name=name, how="; ".join(clauses))
-        elif state.format is None:
-            text, role = tr("{name}: set and lock the camera before the first image."), "text"
-            text = text.format(name=name)
-        else:
-            locked = is_locked(state.controls) and bool(state.controls)
-            role = "text" if locked else "warn"
-            text = (
-                tr("{name}: {format}, locked.") if locked else tr("{name}: {format}, not locked.")
-            )
-            text = text.format(name=name, format=state.format)
-        self._setup.show_camera(text, role, settable=True)
+def camera_state(context: AppContext) -> tuple[str, str, bool]:
+    """Return how the selected camera is set, the meaning of it, and whether it can be set."""
+    info = context.source.info
+    camera = context.cameras.of(info)
+    if camera is None:
+        none = tr("No camera is selected.") + " " + tr("Select one, or import images.")
+        return none if info is None else info.name, "", False
+    state, name = camera.state, camera.device.name
+    _, clauses = context.cameras.differs(camera)
+    if clauses:
+        text = tr("{name} is not set as before: {how}.")
+        return text.format(name=name, how="; ".join(clauses)), "warn", True
+    if state.format is None:
+        text = tr("{name}: set and lock the camera before the first image.")
+        return text.format(name=name), "text", True
+    locked = is_locked(state.controls) and bool(state.controls)
+    text = tr("{name}: {format}, locked.") if locked else tr("{name}: {format}, not locked.")
+    return text.format(name=name, format=state.format), "text" if locked else "warn", True
 
 
-class SessionCamera(QObject):
+class SessionCamera:
     """Stores the camera settings with the session and keeps the camera at them.
 
     Parameters
     ----------
-    model : WizardModel
-        Model of the wizard.
+    project : Project
+        The session.
+    live : LiveSession
+        The live images.
     context : AppContext
         Context with the cameras and the selected source.
     window : QWidget
         In front of it the user is asked whether a camera is the same.
     """
 
-    def __init__(self, model: WizardModel, *, context: AppContext, window: QWidget) -> None:
-        super().__init__(model)
-        self._model, self._context, self._window = model, context, window
-        model.photographed.connect(self._on_photographed)
-        model.camera_fault = self.fault
-        model.camera_change = self.change
-        model.from_files = self.from_files
+    def __init__(
+        self, project: Project, live: LiveSession, *, context: AppContext, window: QWidget
+    ) -> None:
+        self._project, self._live, self._context, self._window = project, live, context, window
 
     def fault(self, *, ask: bool = True) -> str:
         """Return why the present camera cannot be used: the session belongs to another camera.
 
         If both are of one model, the user is asked whether it is the same one at another port.
         """
-        session, now = self._model.project.session, self._present()
+        session, now = self._project.session, self._present()
         stored = session.camera_settings
-        if not self._model.project.recipe.files(session):
+        if not self._project.recipe.files(session):
             return ""
-        serial = self._model.live.serial
+        serial = self._live.serial
         if (now is None or stored is None) and serial not in ("", session.serial):
             text = tr(
                 "This session belongs to sensor {one}, but the images are those of {other}. Select "
@@ -131,13 +93,13 @@ class SessionCamera(QObject):
 
     def from_files(self) -> bool:
         """Return whether there are images, none of them from a camera, and now there is one."""
-        session = self._model.project.session
-        found = self._model.project.recipe.files(session)
+        session = self._project.session
+        found = self._project.recipe.files(session)
         return bool(found) and session.camera_settings is None and self._present() is not None
 
     def change(self, stage: str) -> str:
         """Return what was changed on the camera since the image with which a stage is compared."""
-        session, stream = self._model.project.session, self._model.live.stream
+        session, stream = self._project.session, self._live.stream
         stored, others = session.camera_settings, self._lit_folders(other_than=stage)
         if stored is None or stream is None or not any(map(session.found, others)):
             return ""
@@ -151,7 +113,7 @@ class SessionCamera(QObject):
 
     def _lit_folders(self, *, other_than: str) -> tuple[str, ...]:
         """Return the other folders with which a stage is compared; none if it is not compared."""
-        lit = [stage for stage in self._model.project.recipe.stages if stage.lit]
+        lit = [stage for stage in self._project.recipe.stages if stage.lit]
         compared = other_than in [stage.key for stage in lit]
         return tuple(stage.folder for stage in lit if compared and stage.key != other_than)
 
@@ -164,34 +126,33 @@ class SessionCamera(QObject):
             return CameraSettings(device.name, device.identity, device.model)
         if source.info is None or source.info.kind != "virtual" or source.bench is None:
             return None
-        serial, stream = source.bench.design.serial, self._model.live.stream
+        serial, stream = source.bench.design.serial, self._live.stream
         settings = () if stream is None else stream.source.settings()
         controls = {setting.key: setting.value for setting in settings}
         return CameraSettings(serial, f"virtual:{serial}", controls=controls)
 
     def refer(self) -> None:
         """Make the settings of the session the reference of the camera."""
-        stored = self._model.project.session.camera_settings
+        stored = self._project.session.camera_settings
         self._context.cameras.refer(tr("the images of this session"), stored)
 
-    def _on_photographed(self, stage: str) -> None:
-        """Store the camera settings, as long as no capture depends on the stored ones."""
-        session, now = self._model.project.session, self._present()
+    def note_image(self, stage: str) -> None:
+        """Store the camera settings of a new image, as long as no other depends on stored ones.
+
+        Raises
+        ------
+        InputError
+            If they cannot be stored.
+        """
+        session, now = self._project.session, self._present()
         camera = self._context.cameras.of(self._context.source.info)
         if now is None or (camera is not None and camera.state.phase != "live"):
             return
         if camera is not None:
             now = camera.settings_now()
-        compared = {s.key: s.folder for s in self._model.project.recipe.stages if s.lit}
+        compared = {s.key: s.folder for s in self._project.recipe.stages if s.lit}
         lit = sum(len(session.found(folder)) for folder in compared.values())
         first = lit == 0 or (lit == 1 and stage in compared)
         if session.camera_settings is None or first:
-            self._note(now)
-
-    def _note(self, settings: CameraSettings) -> None:
-        try:
-            self._model.project.set_camera(settings)
-        except InputError as error:
-            self._model.refused.emit(str(error))
-            return
-        self.refer()
+            self._project.set_camera(now)
+            self.refer()

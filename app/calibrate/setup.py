@@ -4,37 +4,229 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QFormLayout, QFrame, QScrollArea, QWidget
 
-from app.calibrate.session_camera import SetupCamera
-from app.calibrate.setup_form import SetupForm
-from app.calibrate.states import StepState
-from app.calibrate.step import Parts, StepPresenter
-from app.calibrate.step_data import Step
-from gelpolight_core.session.session import Session
+from app.calibrate.page_state import StepState
+from app.calibrate.session_camera import camera_state
+from app.calibrate.setup_values import (
+    OTHER,
+    PRESETS,
+    SetupValues,
+    new_session,
+    preset_text,
+    session_of,
+    values_of,
+)
+from app.calibrate.step import Step
+from app.context.context import AppContext
+from app.context.source_button import show_settings_of_source
+from app.services.file_dialogs import ask_save
+from app.widgets.buttons import push_button
+from app.widgets.forms import Form
+from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
+from app.widgets.meaning import make_bold, set_property, show_meaning
+from app.widgets.naming import named
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.session import Session, serial_fault
 from gelpolight_core.set_up import judge_set_up
 from gelpolight_core.translation import tr
 
 
-class SetupStep(StepPresenter):
+class SetupForm(QScrollArea):
+    """A form for the description of a session. What it asks follows from the session.
+
+    Parameters
+    ----------
+    context : AppContext
+        Context with the cameras and the selected source.
+
+    Signals
+    -------
+    accepted(object)
+        The session with the entered values, in the folder of the session shown last.
+    """
+
+    accepted = Signal(object)
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        self._context = context
+        named(self, "setup", tr("Set-up"))
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
+        self.setWidget(inside)
+        hbox(None, (holder, 20), None, of=inside)
+        self._title, self._task = PlainLabel(), PlainLabel(wrap=True)
+        make_bold(self._title, size=1.35)
+        self.values = Form(SetupValues(), "setup", at_once=True)
+        # Rows that wrap have no height of their own in a scroll area.
+        self.values.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
+        self.values.changed.connect(self._on_changed)
+        self.serial = self.values.inputs["serial"]
+        self.facts = named(PlainLabel(wrap=True), "setup.facts", tr("About this kind of sensor"))
+        self._prints = QWidget()
+        boards = ("lens", tr("Print the board of the lens…")), ("top", tr("Print the other board…"))
+        tip = tr(
+            "Save this board as an A4 page to print at 100 % scale; measure the squares "
+            "after printing"
+        )
+        buttons = (
+            push_button(f"setup.{name}_board.print", text, partial(self._save_board, k), tip=tip)
+            for k, (name, text) in enumerate(boards)
+        )
+        vbox(*buttons, of=self._prints, margins=0, spacing=8)
+        self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
+        self.accept = push_button("setup.accept", "", lambda: self.accepted.emit(self.stated()))
+        self.accept.setAccessibleName(tr("Start the calibration"))
+        self.accept.setMinimumHeight(38)
+        set_property(self.accept, "primary", True)
+        sensor = named(QFrame(), "card", tr("Sensor"))
+        vbox(self.values, self.facts, self._prints, of=sensor, margins=16, spacing=8)
+        parts = self._title, self._task, self._build_camera(), sensor, self.problem, self.accept
+        vbox(*parts, None, of=holder, margins=(0, 16, 0, 16), spacing=16)
+        self.show_session(new_session(), new=True)
+        for changed in (context.source.changed, context.cameras.changed):
+            changed.connect(self._show_camera)
+        self._show_camera()
+
+    def show_session(self, session: Session, *, new: bool) -> None:
+        """Show the values of a session; `new`: the session is not on disk yet."""
+        self.session = session
+        values = values_of(session)
+        title = tr("Sensor data") if values.optics else tr("Closed sensor")
+        task = tr(
+            "Enter the values from the drawing of the housing and the data sheets of the parts. "
+            "Every length here scales the result. You can change the values later. Then click the "
+            "button at the bottom."
+        )
+        if not values.optics:
+            task = tr(
+                "The sensor is calibrated from one image of the untouched membrane and some "
+                "presses of a ball of known diameter. Use the same image size, crop and exposure "
+                "for all images."
+            )
+        for label, words in ((self._title, title), (self._task, task)):
+            label.setText(words)
+            label.setVisible(new)
+        self.values.show_value(values)
+        self.accept.setText(tr("&Start the calibration") if new else tr("&Apply these values"))
+        self._check()
+        self._known = self.stated()
+
+    @property
+    def first(self) -> QWidget:
+        """The first value of the sensor."""
+        return self.values.inputs["led_height_mm" if self.values.value.optics else "preset"]
+
+    def stated(self) -> Session:
+        """Return the session with the values of the form.
+
+        Raises
+        ------
+        InputError
+            If a text is not what it should be.
+        """
+        return session_of(self.session, self.values.value)
+
+    @property
+    def edited(self) -> bool:
+        """Whether the user has changed a value since the form was filled."""
+        try:
+            return bool(self.stated() != self._known)
+        except InputError:
+            return True
+
+    def show_problem(self, sentence: str) -> None:
+        """Show why the entered values were not applied."""
+        self.problem.setText(sentence)
+        show_meaning(self.problem, "fail")
+
+    def _on_changed(self, name: str, value: object) -> None:
+        """Fill in what is known about a kind of sensor."""
+        preset = PRESETS.get(str(value))
+        if name == "preset" and preset is not None:
+            percent = 100.0 * preset.mm_per_px_sd / preset.mm_per_px
+            self.values.change(scale=preset.mm_per_px, scale_y=0.0, scale_sd=percent)
+        self._check()
+
+    def _check(self) -> None:
+        values, problem = self.values.value, ""
+        self.facts.setText(preset_text(values.preset))
+        known = values.preset != OTHER and not values.optics
+        self.facts.setVisible(known or values.source == "stated")
+        self._prints.setVisible(values.optics)
+        try:
+            sensor = session_of(self.session, values).sensor
+            unusual = () if not values.optics else judge_set_up(sensor)
+        except InputError as error:
+            unusual = ()
+            problem = f"{error.found}. {error.advice}."
+        if fault := serial_fault(values.serial.strip()):
+            problem = tr("The serial number {what}").format(what=fault) + "."
+        self.problem.setText(problem or " ".join(found.sentence for found in unusual))
+        show_meaning(self.problem, "fail" if problem else "warn")
+        self.accept.setEnabled(not problem)
+
+    def _build_camera(self) -> QFrame:
+        box = named(QFrame(), "card", tr("Camera"))
+        self.camera = named(PlainLabel(wrap=True), "setup.camera", tr("Camera state"))
+        self.camera_settings = push_button(
+            "setup.camera.settings",
+            tr("&Set and lock…"),
+            lambda: show_settings_of_source(self._context, self),
+            accessible=tr("Set and lock the camera"),
+            tip=tr(
+                "Format, exposure, gain, white balance, focus, and a test of the image stability"
+            ),
+        )
+        hbox((self.camera, 1), self.camera_settings, of=box, margins=16)
+        return box
+
+    def _show_camera(self) -> None:
+        """Show how the camera is set; enable the settings button if it can be set."""
+        text, role, settable = camera_state(self._context)
+        self.camera.setText(text)
+        show_meaning(self.camera, role)
+        self.camera_settings.setEnabled(settable)
+
+    def _save_board(self, place: int) -> None:
+        """Save a page with the board where the user chooses, and open it."""
+        from gelpolight_core.export.board_page import write_board  # slow to import
+
+        board = self.values.value.boards[place]
+        across, down = board.inner_corners
+        usual = f"checkerboard-{across}x{down}-{board.square_mm:g}mm.pdf"
+        title, patterns = tr("Save a checkerboard to print"), tr("PDF (*.pdf)")
+        path = ask_save(self, self._context.settings, "board", title, usual, patterns)
+        if path is None:
+            return
+        try:
+            write_board(board, path)
+        except InputError as error:
+            self.show_problem(str(error))
+            return
+        shown = QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
+        self.problem.setText("" if shown else tr("Saved as {path}").format(path=path))
+        show_meaning(self.problem, "")
+
+
+class SetupStep(Step):
     """Shows the form, and applies it."""
 
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
-        self.form = SetupForm()
-        self.form.accepted.connect(self._on_stated)
-        self._camera = SetupCamera(self.form, context=self.context)
-
-    step = Step(
-        "setup",
-        tr("Set-up"),
-        ("response",),
-        tr(
-            "Enter what you know about the sensor, its housing and its parts. Every length "
-            "here scales the result."
-        ),
-        "complete",
+    key, title, stages = "setup", tr("Set-up"), ("response",)
+    task = tr(
+        "Enter what you know about the sensor, its housing and its parts. Every length here "
+        "scales the result."
     )
+
+    def build(self) -> None:
+        """Create the form."""
+        self.form = SetupForm(context=self.context)
+        self.form.accepted.connect(self._on_stated)
 
     @property
     def centre(self) -> QWidget:
@@ -43,8 +235,8 @@ class SetupStep(StepPresenter):
 
     def state(self) -> StepState:
         """Return whether what is stated is usual: a session is created with all values."""
-        state, text = super().state() if self.step.stages else ("pass", tr("Stated"))
-        session = self.model.project.session
+        state, text = super().state() if self.stages else ("pass", tr("Stated"))
+        session = self.session
         unusual = judge_set_up(session.sensor) if session.in_place is None else ()
         return ("warn", unusual[0].sentence) if unusual and state == "pass" else (state, text)
 
@@ -56,7 +248,7 @@ class SetupStep(StepPresenter):
         """Show the values of the session, unless there are changes that are not applied."""
         super().enter()
         if not self.form.edited:
-            self.form.show_session(self.model.project.session, new=False)
+            self.form.show_session(self.session, new=False)
 
     def leave(self) -> None:
         """Warn about changes that are not applied."""
@@ -67,13 +259,12 @@ class SetupStep(StepPresenter):
             self.context.toasts.show(text, "warn")
 
     def close(self) -> None:
-        """Release the camera's signals, and warn about changes that are lost."""
-        self._camera.close()
+        """Warn about changes that are lost."""
         if self.form.edited:
             self.context.toasts.show(tr("The set-up changes were not applied."), "warn")
 
     def _on_stated(self, stated: Session) -> None:
-        project = self.model.project
+        project = self.project
         before = project.session
         self.model.correct(
             tr("Set-up"), partial(project.describe, stated), partial(project.describe, before), None
@@ -82,4 +273,4 @@ class SetupStep(StepPresenter):
             return  # the error message is already shown
         self.form.show_session(project.session, new=False)
         text = tr("Applied. The stages that depend on these values are computed again.")
-        self.panel.show_notice(text, "pass")
+        self.model.show_notice(text, "pass")

@@ -1,66 +1,51 @@
-"""The base class of the steps of the wizard, and what they share."""
+"""The base class of the steps of the wizard, and what the page shows of them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QWidget
 
-from app.calibrate.film_strip import Capture
 from app.calibrate.image_area import ImageArea
 from app.calibrate.maps import Panel
 from app.calibrate.model import WizardModel
-from app.calibrate.states import RUNNING, StepState, is_done, step_state
-from app.calibrate.step_data import Step
-from app.calibrate.step_panel import Remedy, StepPanel
-from app.context.context import AppContext
+from app.calibrate.page_state import (
+    BEGUN,
+    OPEN,
+    ORDER,
+    RUNNING,
+    Capture,
+    PageState,
+    Remedy,
+    StepData,
+    StepState,
+    is_done,
+)
+from app.calibrate.step_panel import StepPanel
 from app.sources.bench import Scene
 from app.sources.processor import Failure, Outcome
+from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import Finding, QualityTable
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 
-@dataclass(frozen=True)
-class Parts:
-    """What all steps of one wizard share.
-
-    Attributes
-    ----------
-    model : WizardModel
-        The session, its history and its work.
-    context : AppContext
-        Context of the application.
-    area : ImageArea
-        Live image or capture, results, and film strip.
-    panel : StepPanel
-        The side panel of most steps.
-    steps : tuple of Step
-        All steps of the wizard.
-    """
-
-    model: WizardModel
-    context: AppContext
-    area: ImageArea
-    panel: StepPanel
-    steps: tuple[Step, ...]
-
-
-class StepPresenter(QObject):
+class Step(QObject, StepData):
     """One step. The wizard calls it while it is open, and knows nothing else of it.
 
     Parameters
     ----------
-    parts : Parts
-        What all steps share.
-
-    Signals
-    -------
-    step_wanted(str)
-        Key of a step to go to.
+    model : WizardModel
+        The session, its history and its work, and what the page shows.
+    area : ImageArea
+        Live image or capture, results, and film strip.
+    panel : StepPanel
+        The side panel of most steps.
 
     Attributes
     ----------
@@ -68,22 +53,33 @@ class StepPresenter(QObject):
         Parts of the side panel that only this step shows.
     """
 
-    step_wanted = Signal(str)
-    step: Step
     own: tuple[QWidget, ...] = ()
     uses_camera = False
 
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts.area)
-        described = self.describe()
-        self.step = next((s for s in parts.steps if s.key == described.key), described)
-        self.model, self.context = parts.model, parts.context
-        self.area, self.panel = parts.area, parts.panel
+    def __init__(self, model: WizardModel, area: ImageArea, panel: StepPanel) -> None:
+        super().__init__(area)
+        self.model, self.context, self.area, self.panel = model, model.context, area, panel
+        # Only those that the session has.
+        self.stages = tuple(stage for stage in self.stages if stage in model.statuses)
+        self.build()
 
-    @classmethod
-    def describe(cls) -> Step:
-        """Return the data of the step."""
-        return cls.step
+    def build(self) -> None:
+        """Create what only this step shows."""
+
+    @property
+    def project(self) -> Project:
+        """The session's project."""
+        return self.model.project
+
+    @property
+    def session(self) -> Session:
+        """The session."""
+        return self.project.session
+
+    @property
+    def results(self) -> Results:
+        """The newest result of every stage."""
+        return self.project.results
 
     # What is shown
 
@@ -95,7 +91,7 @@ class StepPresenter(QObject):
     @property
     def guide(self) -> tuple[str, str]:
         """Page and section of the guide about the step."""
-        return "guide/calibrate", self.step.title
+        return "guide/calibrate", self.title
 
     def focus(self) -> QWidget:
         """Return the widget that the user needs first."""
@@ -107,8 +103,26 @@ class StepPresenter(QObject):
 
     def state(self) -> StepState:
         """Return the state of the step, and the message about it."""
-        statuses, running = self.model.statuses, self.model.running
-        return step_state(self.step, statuses, running, count=self.count())
+        return self.state_of(self.stages)
+
+    def state_of(self, stages: Sequence[str]) -> StepState:
+        """Return state and message of the worst of some stages.
+
+        A step with too few images has not failed: it is still incomplete.
+        """
+        if self.model.running in stages:
+            return RUNNING, tr("Computing")
+        found = [self.model.statuses[stage] for stage in stages]
+        if not found:
+            return "empty", ""
+        worst = max(found, key=lambda status: ORDER.index(status.state.value))
+        if worst.state is StageState.FAIL and 0 < self.count() < self.least:
+            return BEGUN, tr("{n} of {m} captured").format(n=self.count(), m=self.wanted)
+        return worst.state.value, worst.sentence
+
+    def explain(self, state: str, sentence: str) -> str:
+        """Return the message about the state; `sentence` is that of the worst stage."""
+        return sentence
 
     def count(self) -> int:
         """Return the number of usable images."""
@@ -116,7 +130,7 @@ class StepPresenter(QObject):
 
     def is_finished(self, state: str) -> bool:
         """Return whether nothing is left to do in the step."""
-        return is_done(state) and self.count() >= self.step.wanted
+        return is_done(state) and self.count() >= self.wanted
 
     def is_settled(self, state: str) -> bool:
         """Return whether the wizard may go on by itself: complete, without anything to read."""
@@ -129,30 +143,29 @@ class StepPresenter(QObject):
     def number(self) -> Finding | None:
         """Return the one figure of the step; None without a result."""
         figures = [figure for table in self.tables() for figure in table.figures]
-        named = (figure for figure in figures if figure.key == self.step.figure)
-        return next(named, figures[0] if figures else None)
+        # The named one, or else the first.
+        return min(figures, key=lambda figure: figure.key != self.figure, default=None)
 
     def progress_line(self) -> str:
         """Return how many images there are, and how many are wanted; nothing else says it."""
-        step, count = self.step, self.count()
-        if not step.wanted:
+        count = self.count()
+        if not self.wanted:
             return ""
-        if step.wanted > 1:
-            return tr("{n} of {m} captured").format(n=count, m=max(step.wanted, count))
+        if self.wanted > 1:
+            return tr("{n} of {m} captured").format(n=count, m=max(self.wanted, count))
         return tr("Captured") if count else tr("Not captured yet")
 
     def remedies(self, state: str) -> tuple[Remedy, ...]:
         """Return the buttons that mend what is wrong, the best first."""
-        stages = self.step.stages
-        upto = stages[-1] if stages else None
+        upto = self.stages[-1] if self.stages else None
         stale = state in (StageState.STALE.value, StageState.WAITING.value)
-        if stale and not self.model.jobs.busy and self.model.project.stale(upto=upto):
+        if stale and not self.model.jobs.busy and self.project.stale(upto=upto):
             return ((tr("Recompute"), lambda: self.model.compute(upto)),)
         return ()
 
     def tables(self) -> Sequence[QualityTable]:
         """Return the quality tables of the step."""
-        return [self.model.statuses[stage].quality for stage in self.step.stages]
+        return [self.model.statuses[stage].quality for stage in self.stages]
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the images of the step's result."""
@@ -167,58 +180,33 @@ class StepPresenter(QObject):
         """Show the step."""
         for widget in self.own:
             widget.show()
-        self.area.show_step(strip=self.step.stage is not None)
         self.live()
 
     def leave(self) -> None:
         """Show another step instead."""
+        self.commit()
         for widget in self.own:
             widget.hide()
 
     def close(self) -> None:
         """Stop all work of the step."""
+        self.commit()
+
+    def commit(self) -> None:
+        """Use what is being typed."""
 
     def refresh(self) -> None:
-        """Show the present state of the session."""
-        self.area.strip.show_captures(self.captures())
-        self.show_state(*self.model.states[self.step.key])
-        self.show_result()
-
-    def show_result(self) -> None:
-        """Show the images of the result, if there are any."""
-        panels = self.result_panels()
-        self.area.maps.show_panels(panels)
-        self.area.show_result_button(bool(panels))
-
-    def show_state(self, state: str, sentence: str) -> None:
-        """Show the state in the side panel."""
-        panel = self.panel
-        panel.show_number(self.number(), self.progress_line(), waits=not is_done(state))
-        if state == RUNNING:
-            panel.show_running()
-            return
-        finished = self.is_finished(state)
-        advance = finished and not panel.finished
-        panel.show_state(
-            state,
-            sentence,
-            self.tables(),
-            remedies=self.remedies(state),
-            finished=finished,
-        )
-        # Only if the focus is on the last pressed button: never interrupt a person who is typing.
-        if advance and QApplication.focusWidget() in (None, panel.capture):
-            panel.next.setFocus()
+        """Follow a change of the session that the page shows already."""
 
     def live(self) -> None:
         """Show the live image, unless it is that of another sensor."""
-        self.model.show("")
-        fault, stream = self.model.camera_fault(ask=False), self.model.live.stream
+        self.commit()
+        self.model.update_page(shown="")
+        fault, stream = self.model.camera.fault(ask=False), self.model.live.stream
         self.area.show_stream(None if fault else stream)
         if fault or stream is None:
             self.area.view.image.say(fault or no_camera())
-        self.panel.show_live("" if stream else no_camera(), ready=stream is not None)
-        self.panel.capture.setEnabled(stream is not None)
+        self.model.show_live("" if stream else no_camera(), ready=stream is not None)
         self.model.live_detection.set_detector(None)
 
     def camera_changed(self) -> None:
@@ -236,7 +224,7 @@ class StepPresenter(QObject):
 
     def capture(self) -> None:
         """Capture an image; if a capture is shown, return to the live image instead."""
-        if self.model.shown:
+        if self.model.page.shown:
             self.live()
 
     def captured(self, name: str) -> None:
@@ -250,8 +238,7 @@ class StepPresenter(QObject):
 
     def exclude(self, name: str, excluded: bool) -> None:
         """Exclude an image, or include it again."""
-        if self.step.stage is not None:
-            self.model.exclude(self.step.stage, name, excluded)
+        self.model.exclude(self.stages[0], name, excluded)
 
     def detected(self, item: Outcome[Any] | Failure) -> None:
         """Show the detection in a live image."""
@@ -261,6 +248,45 @@ class StepPresenter(QObject):
 
     def on_bench(self, scene: Scene) -> None:
         """Use the known size of an object that was placed on the virtual bench."""
+
+
+def states_of(steps: Sequence[Step]) -> dict[str, StepState]:
+    """Return state and message of every step; a waiting step names the one it waits for."""
+    states: dict[str, StepState] = {}
+    first_open = ""
+    for step in steps:
+        state, text = step.state()
+        empty = state == StageState.EMPTY.value and not step.folder and bool(step.stages)
+        if first_open and (empty or state == StageState.WAITING.value):
+            text = tr("Waiting for {step}. Complete that step first.").format(step=first_open)
+        if not first_open and step.folder and state in OPEN:
+            first_open = step.title
+        states[step.key] = state, text
+    return states
+
+
+def resolve(now: PageState, steps: Sequence[Step], step: Step) -> PageState:
+    """Return what the page shows of the present results; during a computation also of the last."""
+    states = states_of(steps)
+    state, sentence = states[step.key]
+    found = replace(
+        now,
+        states=states,
+        state=state,
+        captures=step.captures(),
+        number=step.number(),
+        below=step.progress_line(),
+        panels=step.result_panels(),
+    )
+    if state == RUNNING:
+        return replace(found, sentence="", remedies=())
+    return replace(
+        found,
+        sentence=step.explain(state, sentence),
+        tables=step.tables(),
+        remedies=step.remedies(state),
+        finished=step.is_finished(state),
+    )
 
 
 def no_camera() -> str:

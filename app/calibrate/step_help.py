@@ -1,16 +1,82 @@
-"""The help of a step: how the sensor is assembled, and what the guide says about it."""
+"""The help of a step: a drawing of the assembled sensor, and what the guide says about it."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QFrame, QPushButton, QToolButton
+from PySide6.QtCore import QByteArray, QPoint, QSize, Qt
+from PySide6.QtGui import QPainter, QPixmap
+from PySide6.QtSvg import QSvgRenderer
+from PySide6.QtWidgets import QFrame, QPushButton, QToolButton, QWidget
 
-from app.calibrate.assembly import AssemblyDrawing
-from app.calibrate.step_data import Step
-from app.widgets.label import PlainLabel
+from app.calibrate.page_state import StepData
+from app.theme import theme
+from app.theme.icons import FOLDER
+from app.widgets.label import PlainLabel, escaped
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
+
+DRAWING = FOLDER / "drawings" / "assembly.svg"
+BOX = QSize(288, 150)
+
+SENSOR = "housing", "leds", "slab", "camera", "membrane"
+ASSEMBLIES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "camera": (
+        tr("The camera alone, with a checkerboard held in front of it"),
+        ("camera", "held_board"),
+    ),
+    "board": (
+        tr("Housing without elastomer, checkerboard on the top opening, pattern facing down"),
+        ("housing", "camera", "board"),
+    ),
+    "mirror": (
+        tr("Housing without elastomer, LEDs on, mirror on the top opening"),
+        ("housing", "leds", "camera", "mirror"),
+    ),
+    "whiteboard": (
+        tr("Elastomer without membrane, white board pressed onto it"),
+        ("housing", "leds", "slab", "camera", "whiteboard"),
+    ),
+    "membrane": (tr("Elastomer with membrane, nothing touching it"), SENSOR),
+    "ball": (tr("A ball pressed into the membrane"), (*SENSOR, "ball")),
+    "indenter": (tr("An indenter of known size pressed into the membrane"), (*SENSOR, "indenter")),
+    "complete": (tr("The complete sensor: camera, LEDs, elastomer, membrane"), SENSOR),
+}
+"""What each drawing shows, for a screen reader, and its parts."""
+PARTS = {
+    "housing": "",
+    "camera": tr("camera"),
+    "leds": tr("LEDs"),
+    "slab": tr("elastomer"),
+    "board": tr("board"),
+    "held_board": tr("board, tilted"),
+    "mirror": tr("mirror"),
+    "whiteboard": tr("white board"),
+    "membrane": tr("membrane"),
+    "ball": tr("ball"),
+    "indenter": tr("indenter"),
+}
+"""All parts with their labels."""
+
+
+def drawing_of(assembly: str, label: QWidget) -> QPixmap:
+    """Return the drawing of an assembly in the colours of the theme and the font of a label."""
+    shown = dict.fromkeys(PARTS, "none") | dict.fromkeys(ASSEMBLIES[assembly][1], "inline")
+    words = {f"{part}_word": escaped(word) for part, word in PARTS.items()}
+    colours = {name: theme.colour(name).name() for name in ("text", "button", "muted", "accent")}
+    drawn = DRAWING.read_text("utf-8").format(
+        **shown, **words, **colours, font=label.font().family()
+    )
+    drawing = QSvgRenderer(QByteArray(drawn.encode()))
+    drawing.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
+    ratio = label.devicePixelRatioF()
+    pixmap = QPixmap(BOX * ratio)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
+    drawing.render(painter)
+    painter.end()
+    pixmap.setDevicePixelRatio(ratio)
+    return pixmap
+
 
 WIDTH = 320
 
@@ -27,7 +93,8 @@ class StepHelp(QToolButton):
             QFrame(self, Qt.WindowType.Popup), "calibrate.help.sheet", tr("Help on this step")
         )
         self._sheet.setFixedWidth(WIDTH)
-        self._drawing = AssemblyDrawing()
+        self._assembly = "complete"
+        self._drawing = named(PlainLabel(), "calibrate.assembly", tr("Help on this step"))
         self._words = PlainLabel(wrap=True)
         self.guide = named(
             QPushButton(tr("Read the &guide")), "calibrate.help.guide", tr("Read about this step")
@@ -36,13 +103,16 @@ class StepHelp(QToolButton):
         self.guide.clicked.connect(self._sheet.close)
         self.clicked.connect(self._open)
 
-    def show_step(self, step: Step) -> None:
+    def show_step(self, step: StepData) -> None:
         """Show the set-up of another step."""
-        self._drawing.show_assembly(step.assembly)
+        self._assembly = step.assembly
         self._words.setText(step.advice)
         self._words.setVisible(bool(step.advice))
 
     def _open(self) -> None:
+        words = ASSEMBLIES[self._assembly][0]
+        named(self._drawing, "calibrate.assembly", words, words)
+        self._drawing.setPixmap(drawing_of(self._assembly, self._drawing))
         corner = self.mapToGlobal(self.rect().bottomRight())
         self._sheet.adjustSize()
         self._sheet.move(corner - QPoint(WIDTH, -4))

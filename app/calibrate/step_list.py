@@ -16,33 +16,123 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.bench import BenchPart
+from app.bench.bench_area import BenchArea
 from app.calibrate.model import WizardModel
-from app.calibrate.states import state_icon, state_word
-from app.calibrate.step_data import Step
+from app.calibrate.page_state import StepData, StepState, state_icon, state_word
+from app.context.context import SourceChoice
+from app.sources.bench import Scene
 from app.widgets.actions import make_action
 from app.widgets.dialog import Dialog, Kinds
+from app.widgets.fold import Fold
 from app.widgets.label import plain_tip
-from app.widgets.layout import vbox
+from app.widgets.layout import scroll_area, vbox
 from app.widgets.naming import named
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
+
+AREA_HEIGHT = 280
+
+
+class BenchPart(QWidget):
+    """Holds the bench panel, folded, and places on the bench the object that a step needs.
+
+    Parameters
+    ----------
+    source : SourceChoice
+        The source selection shared by all pages, with its bench.
+
+    Signals
+    -------
+    opened(bool)
+        The panel was opened or folded.
+    """
+
+    opened = Signal(bool)
+
+    def __init__(self, source: SourceChoice) -> None:
+        super().__init__()
+        named(self, "calibrate.bench", tr("Virtual bench"))
+        self._source = source
+        self._area = BenchArea(source)
+        self._scroll = scroll_area(self._area)
+        self._scroll.setMinimumHeight(AREA_HEIGHT)
+        fold = Fold("calibrate.bench.shown", tr("Virtual bench"), self._scroll)
+        self.toggle = fold.title
+        self.toggle.toggled.connect(self.opened)
+        vbox((fold, 100), None, of=self, margins=0)
+        self._tried = 0
+        self._grab_offset: tuple[float, float] | None = None
+        self.hide()
+
+    @property
+    def in_use(self) -> bool:
+        """Whether the virtual sensor is the camera."""
+        info = self._source.info
+        return info is not None and info.kind == "virtual" and self._source.bench is not None
+
+    @property
+    def open_width(self) -> int:
+        """Width that the open panel needs."""
+        bar = self._scroll.verticalScrollBar()
+        return self._area.minimumSizeHint().width() + bar.sizeHint().width()
+
+    def follow(self) -> None:
+        """Offer the bench only if the virtual sensor is the camera."""
+        in_use = self._area.follow()
+        self.setVisible(in_use)
+        if not in_use:
+            self.toggle.setChecked(False)
+
+    def lay(self, step: StepData, session: Session) -> Scene | None:
+        """Place the object that a step needs; each call gives the next view or press."""
+        bench = self._source.bench
+        if bench is None:
+            return None
+        folder, count = step.folder, self._tried
+        if folder:
+            count = len(session.found(folder))
+        else:
+            folder, self._tried = "presses", self._tried + 1
+        return bench.show(folder, count % bench.steps(folder))
+
+    def drag_to(self, u: float, v: float) -> None:
+        """Move the object on the bench to the clicked point of the live image."""
+        if self._source.bench is not None and self.toggle.isChecked():
+            self._source.bench.drag_to(u, v)
+
+    def drag(self, phase: str, u: float, v: float) -> None:
+        """Move the object on the bench with a drag, keeping the grabbed point under the pointer.
+
+        Parameters
+        ----------
+        phase : str
+            "begin", "move" or "end".
+        u, v : float
+            Position of the pointer, image pixels.
+        """
+        bench = self._source.bench
+        position = None if bench is None else bench.position_mm(u, v)
+        if bench is None or position is None:
+            return
+        if phase == "begin":
+            scene = bench.scene
+            self._grab_offset = scene.x_mm - position[0], scene.y_mm - position[1]
+        elif self._grab_offset is not None:
+            bench.arrange(
+                x_mm=position[0] + self._grab_offset[0], y_mm=position[1] + self._grab_offset[1]
+            )
+            if phase == "end":
+                self._grab_offset = None
+
 
 WIDTH = 208
 ROW = 36
 
 
 class StepList(QListWidget):
-    """The steps.
+    """The steps. Its `currentRowChanged` says which one the user opens."""
 
-    Signals
-    -------
-    chosen(int)
-        Index of the step that the user opens.
-    """
-
-    chosen = Signal(int)
-
-    def __init__(self, steps: Sequence[Step]) -> None:
+    def __init__(self, steps: Sequence[StepData]) -> None:
         super().__init__()
         named(self, "calibrate.steps", tr("Steps of the calibration"))
         self._steps = steps
@@ -54,7 +144,6 @@ class StepList(QListWidget):
             item = QListWidgetItem(step.title)
             item.setSizeHint(QSize(0, ROW))
             self.addItem(item)
-        self.currentRowChanged.connect(self._on_row)
 
     def sizeHint(self) -> QSize:
         """Return a size that shows all steps."""
@@ -64,8 +153,8 @@ class StepList(QListWidget):
         """Return a size that shows some steps; the others are scrolled."""
         return QSize(0, 4 * ROW)
 
-    def show_states(self, states: Mapping[str, tuple[str, str]]) -> None:
-        """Show the state of each step: (state, message) by step key."""
+    def show_states(self, states: Mapping[str, StepState], place: int) -> None:
+        """Show the state of each step by its key, and mark the open one."""
         for row, step in enumerate(self._steps):
             state, sentence = states.get(step.key, ("empty", ""))
             item = self.item(row)
@@ -76,15 +165,8 @@ class StepList(QListWidget):
             item.setData(Qt.ItemDataRole.UserRole, state)
             item.setToolTip(plain_tip(f"{step.title}: {state_word(state)}. {sentence}".strip()))
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
-
-    def go_to(self, row: int) -> None:
-        """Mark a step as the open one, without emitting `chosen`."""
         with QSignalBlocker(self):
-            self.setCurrentRow(row)
-
-    def _on_row(self, row: int) -> None:
-        if row >= 0:
-            self.chosen.emit(row)
+            self.setCurrentRow(place)
 
 
 class StepColumn(QWidget):
@@ -117,16 +199,10 @@ class StepColumn(QWidget):
         menu.setText(session.folder.name)
         menu.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         menu.setMenu(QMenu(menu))
-        self.leave = make_action(
-            window, "calibrate.leave", tr("&Sessions"), lambda: None,
-            tip=tr("Leave this session; everything is saved"),
-        )  # fmt: skip
+        tip = tr("Leave this session; everything is saved")
+        self.leave = make_action(window, "calibrate.leave", tr("&Sessions"), list, tip=tip)
         history = make_action(window, "calibrate.history", tr("&History"), self._show_history)
         menu.menu().addActions([self.leave, history])
-        # Their menu is Edit.
-        undo, redo = model.undo.undo, model.undo.redo
-        make_action(window, "calibrate.undo", tr("Undo"), undo, keys=("Ctrl+Z",))
-        make_action(window, "calibrate.redo", tr("Redo"), redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"))
         bench.opened.connect(lambda on: self.setFixedWidth(bench.open_width + 16 if on else WIDTH))
         self.setFixedWidth(WIDTH)
         vbox(menu, steps, (bench, 1), None, of=self, margins=8, spacing=8)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from math import isfinite
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
+    QApplication,
     QFrame,
     QMenu,
     QProgressBar,
@@ -19,18 +18,23 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.film_strip import Capture
-from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
-from app.calibrate.step_data import Step
+from app.calibrate.page_state import (
+    Capture,
+    PageState,
+    is_done,
+    state_icon,
+    state_meaning,
+    state_word,
+)
 from app.calibrate.step_help import StepHelp
-from app.widgets.actions import make_action
+from app.widgets.actions import add_item
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
 from app.widgets.meaning import make_bold, show_ground, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
-from gelpolight_core.finding import Finding, QualityTable, value_text
+from gelpolight_core.finding import QualityTable, value_text
 from gelpolight_core.translation import tr
 
 WIDTH = 304
@@ -42,32 +46,15 @@ REMEDIES = 3
 LEAST_CAPTURES = 2
 """With fewer captures there is nothing to compare."""
 
-Remedy = tuple[str, Callable[[], object]]
-"""Text of a button, and what it does."""
-
 
 class StepPanel(QWidget):
-    """The side panel of a step; its lower part is always visible and never moves.
-
-    Attributes
-    ----------
-    finished : bool
-        Whether the step is complete.
-    step : Step
-        The shown step.
-    worst : str
-        Name of the capture with the largest residual.
-    """
-
-    step: Step | None = None
+    """The side panel of a step; its lower part is always visible and never moves."""
 
     def __init__(self) -> None:
         super().__init__()
         named(self, "calibrate.panel", tr("This step"))
         self.setFixedWidth(WIDTH)
-        self.finished = False
-        self._following = ""
-        self._remedies: dict[str, Callable[[], object]] = {}
+        self._page = PageState()
         inside = QWidget()
         self._scroll = named(scroll_area(inside), "calibrate.panel.scroll", tr("This step"))
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -124,8 +111,8 @@ class StepPanel(QWidget):
             named(QPushButton(), f"calibrate.remedy{place}", tr("Remedy"))
             for place in range(REMEDIES)
         ]
-        for button in self.buttons:
-            button.clicked.connect(lambda _on=False, b=button: self._remedies[b.text()]())
+        for place, button in enumerate(self.buttons):
+            button.clicked.connect(lambda _on=False, k=place: self._page.remedies[k][1]())
         self._message = card(self.notice, self.sentence, *self.buttons)
         return self._message
 
@@ -168,10 +155,8 @@ class StepPanel(QWidget):
         for widget in (self.progress, self.cancel):
             widget.setFixedHeight(28)
             keep_space(widget)
-        self.capture = named(
-            QPushButton(tr("&Capture")), "calibrate.capture", tr("Capture"),
-            tr("Capture this image"), "C",
-        )  # fmt: skip
+        self.capture, tip = QPushButton(tr("&Capture")), tr("Capture this image")
+        named(self.capture, "calibrate.capture", tr("Capture"), tip, "C")
         self.more = named(
             QToolButton(popupMode=QToolButton.ToolButtonPopupMode.InstantPopup),
             "calibrate.more",
@@ -180,12 +165,9 @@ class StepPanel(QWidget):
         )
         self.more.setText("…")
         menu = QMenu(self.more)
-        self.import_files = make_action(
-            menu, "calibrate.import", tr("&Import image files…"), lambda: None
-        )
-        self.automatic = QAction(tr("&Capture and continue automatically"), menu, checkable=True)
-        self.automatic.setObjectName("calibrate.automatic")
-        menu.addAction(self.automatic)
+        self.import_files = add_item(menu, "calibrate.import", tr("&Import image files…"), list)
+        text = tr("&Capture and continue automatically")
+        self.automatic = add_item(menu, "calibrate.automatic", text, list, checkable=True)
         self.more.setMenu(menu)
         self.capturing = QWidget()
         row = hbox((self.capture, 1), self.more, margins=0, spacing=8)
@@ -196,11 +178,8 @@ class StepPanel(QWidget):
             button.setFixedHeight(36)
         self.more.setFixedSize(56, 36)
         foot = QWidget()
-        self._foot = vbox(
-            hbox((self.progress, 1), self.cancel, margins=0), self.capturing, self.next,
-            of=foot, margins=(16, 8, 16, 16), spacing=8,
-        )  # fmt: skip
-        self.show_work("", 0.0)
+        parts = hbox((self.progress, 1), self.cancel, margins=0), self.capturing, self.next
+        self._foot = vbox(*parts, of=foot, margins=(16, 8, 16, 16), spacing=8)
         return foot
 
     def add_extra(self, text: str, field: QWidget) -> QFrame:
@@ -213,150 +192,90 @@ class StepPanel(QWidget):
         made.hide()
         return made
 
-    # What is shown
-
     def add_foot(self, widget: QWidget) -> QWidget:
         """Add a step's own buttons above Next; the step shows and hides them."""
         self._foot.insertWidget(self._foot.count() - 1, widget)
         widget.hide()
         return widget
 
-    def show_step(self, step: Step, *, following: str) -> None:
-        """Show the task of another step; `following`: title of the next step, if any."""
-        if step is not self.step:
-            # The message belongs to the previous step; remove it, even during a computation.
-            self._show_figures(())
-            self.show_number(None, "")
-            self.sentence.setText("")
-            self.show_captures(())
-        self.step, self._following = step, following
-        self.finished = False
-        self.title.setText(step.title)
-        self.task.setText(step.task)
-        self.help.show_step(step)
-        self.capturing.setVisible(step.captures)
-        self.capture.setText(step.button or tr("&Capture"))
-        self.show_notice("", "pass")
-        self.next.setVisible(bool(following))
-        self.show_countdown(0)
-        self._scroll.verticalScrollBar().setValue(0)
+    # What is shown
 
-    def show_countdown(self, seconds: int) -> None:
-        """Show on Next after how many seconds the next step opens by itself; 0: it does not."""
-        text = tr("&Next: {title}").format(title=self._following)
-        self.next.setText(f"{text}  ({seconds})" if seconds else text)
-
-    def show_number(self, number: Finding | None, below: str, *, waits: bool = True) -> None:
-        """Show the one figure of the step, and a line about its captures.
-
-        `waits`: without a figure, there will be one; a step may also be complete without any.
-        """
-        text = (tr("No result yet") if waits else "") if number is None else number.text
-        self.caption.setText(text)
-        self.caption.setToolTip(plain_tip(text))
+    def show_page(self, page: PageState) -> None:
+        """Show another state of the page."""
+        before, self._page = self._page, page
+        step, number = page.step, page.number
+        if step is not before.step:
+            self.title.setText(step.title)
+            self.task.setText(step.task)
+            self.help.show_step(step)
+            self.capturing.setVisible(step.frames > 0)
+            self.capture.setText(step.button or tr("&Capture"))
+            self.next.setVisible(bool(page.following))
+            self._scroll.verticalScrollBar().setValue(0)
+        # Without a figure there will be one, unless the step is complete without any.
+        waits = "" if is_done(page.state) else tr("No result yet")
+        self.caption.setText(waits if number is None else number.text)
+        self.caption.setToolTip(plain_tip(self.caption.text()))
         self.number.setText("\u2013" if number is None else value_text(number))
-        self.below.setText(below)
-
-    def show_notice(self, sentence: str, role: str) -> None:
-        """Show why the last capture, import or correction was not done; else an empty text."""
-        self.notice.setText(sentence)
-        self._notice_role = role
+        self.below.setText(page.below)
+        self._sign.show_icon(state_icon(page.state))
+        self._word.setText(state_word(page.state).capitalize())
+        show_meaning(self._word, state_meaning(page.state))
+        figures = tuple(figure for table in page.tables for figure in table.figures)
+        self.quality.set_table(QualityTable(figures))
+        self.quality.setVisible(bool(figures))
+        self._show_residuals(page.worst_first)
         self._show_message()
-        if sentence:
+        self._show_foot()
+        if page.notice != before.notice and page.notice[0]:
             self.reveal_message()
+        # Only if the focus is on the last pressed button: never interrupt a person who is typing.
+        advance = page.finished and not before.finished
+        if advance and QApplication.focusWidget() in (None, self.capture):
+            self.next.setFocus()
 
-    def reveal_message(self) -> None:
-        """Scroll to what is wrong or comes next, once it has its place."""
-        reveal = partial(self._scroll.ensureWidgetVisible, self._message)
-        QTimer.singleShot(0, self, reveal)
-
-    def show_running(self) -> None:
-        """Show that the step is being computed; its figures stay until new ones arrive."""
-        self._show_sign(RUNNING)
-        self.sentence.setText("")
-        self._remedies = {}
-        self._show_message()
-
-    def _show_sign(self, state: str) -> None:
-        self._state = state
-        self._sign.show_icon(state_icon(state))
-        self._word.setText(state_word(state).capitalize())
-        show_meaning(self._word, state_meaning(state))
-
-    def show_live(self, sentence: str, *, ready: bool) -> None:
-        """Show the detection message of the live image."""
-        self.live.setText(sentence)
-        show_meaning(self.live, "pass" if ready else "warn")
-
-    def show_state(
-        self,
-        state: str,
-        sentence: str,
-        tables: Sequence[QualityTable],
-        *,
-        remedies: Sequence[Remedy] = (),
-        finished: bool,
-    ) -> None:
-        """Show the state of the step.
-
-        Parameters
-        ----------
-        state, sentence : str
-            State of the step, and the message about it.
-        tables : sequence of QualityTable
-            Quality tables of its stages.
-        remedies : sequence of (str, callable), optional
-            What mends it, the best first.
-        finished : bool
-            Whether the step is complete.
-        """
-        self._show_sign(state)
-        self.sentence.setText(sentence)
-        self._show_figures(tables)
-        self._remedies = dict(remedies)
-        self.finished = finished
-        self._show_message()
+    def _show_residuals(self, worst: Sequence[Capture]) -> None:
+        """Show the residuals of captures, the worst first."""
+        found = [(c.path.stem, c.finding) for c in worst if c.finding is not None]
+        self.residual.setText(found[0][1].text if found else "")
+        self.residuals.set_table(QualityTable(tuple(replace(f, text=name) for name, f in found)))
+        for widget in (self.residual, self.residuals, self.repeat):
+            widget.setVisible(len(found) >= LEAST_CAPTURES)
 
     def _show_message(self) -> None:
         """Show what is wrong: an action that was not done, or else the state of the step."""
-        said = self.notice.text()
-        wrong = self._state in ("warn", "fail", "stale", "waiting") and self.sentence.text()
+        page, (said, role) = self._page, self._page.notice
+        wrong = page.state in ("warn", "fail", "stale", "waiting") and page.sentence
+        self.notice.setText(said)
         self.notice.setVisible(bool(said))
+        self.sentence.setText(page.sentence)
         self.sentence.setVisible(bool(wrong) and not said)
-        texts = [] if said else list(self._remedies)[: len(self.buttons)]
-        for place, button in enumerate(self.buttons):
-            button.setVisible(place < len(texts))
-            button.setText(texts[place] if place < len(texts) else "")
-        role = self._notice_role if said else self._state
+        texts = [] if said else [text for text, _ in page.remedies[: len(self.buttons)]]
+        for button, text in zip(self.buttons, (*texts, *[""] * REMEDIES), strict=False):
+            button.setVisible(bool(text))
+            button.setText(text)
+        role = role if said else page.state
         show_ground(self._message, role if role in ("warn", "fail") else "")
         self._message.setVisible(bool(said or wrong or texts))
 
-    _state, _notice_role = "empty", "pass"
-
-    def _show_figures(self, tables: Sequence[QualityTable]) -> None:
-        figures = tuple(figure for table in tables for figure in table.figures)
-        self.quality.set_table(QualityTable(figures))
-        self.quality.setVisible(bool(figures))
-
-    def show_captures(self, captures: Sequence[Capture]) -> None:
-        """Show the captures that have a residual, the worst first."""
-        judged = {c.path: c.finding for c in captures if c.finding and isfinite(c.residual)}
-        worst = sorted(judged.items(), key=lambda one: one[1].value, reverse=True)
-        self.worst = worst[0][0].name if worst else ""
-        self.residual.setText(worst[0][1].text if worst else "")
-        self.residuals.set_table(
-            QualityTable(tuple(replace(found, text=path.stem) for path, found in worst))
-        )
-        for widget in (self.residual, self.residuals, self.repeat):
-            widget.setVisible(len(worst) >= LEAST_CAPTURES)
-
-    def show_work(self, title: str, share: float) -> None:
-        """Show the running work; an empty title means none."""
+    def _show_foot(self) -> None:
+        """Show what is in the live image, the running work, and the countdown."""
+        page, (title, share) = self._page, self._page.work
+        self.live.setText(page.live[0])
+        show_meaning(self.live, page.live[1])
+        self.capture.setEnabled(page.camera)
         self.progress.setVisible(bool(title))
         self.cancel.setVisible(bool(title))
         self.progress.setFormat(f"{title}  %p %" if title else "")
         self.progress.setRange(0, 100 if share > 0.0 else 0)
         self.progress.setValue(round(100 * share))
+        text = tr("&Next: {title}").format(title=page.following)
+        self.next.setText(f"{text}  ({page.countdown})" if page.countdown else text)
+
+    def reveal_message(self) -> None:
+        """Scroll to what is wrong or comes next, once it has its place."""
+        reveal = partial(self._scroll.ensureWidgetVisible, self._message)
+        QTimer.singleShot(0, self, reveal)
 
 
 def card(*parts: object) -> QFrame:

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from itertools import chain
 from typing import Any
 
-from app.calibrate.background import BackgroundStep
 from app.calibrate.balls import BallsStep
+from app.calibrate.boards import LensStep, TopPoseStep
+from app.calibrate.illumination import BackgroundStep, RadianceStep
 from app.calibrate.image_step import plain_step
-from app.calibrate.in_place_balls import InPlaceBallsStep
-from app.calibrate.lens import LensStep
+from app.calibrate.in_place import InPlaceBallsStep, ScaleStep
 from app.calibrate.lights import LightsStep
-from app.calibrate.radiance import RadianceStep
 from app.calibrate.result import ResultStep
-from app.calibrate.scale import ScaleStep
 from app.calibrate.setup import SetupStep
-from app.calibrate.step import StepPresenter
-from app.calibrate.step_data import Step
-from app.calibrate.top_pose import TopPoseStep
+from app.calibrate.step import Step
 from app.calibrate.validation import ValidationStep
 from gelpolight_core.calibration import ball_stage, in_place, open_sensor
 from gelpolight_core.calibration.recipe import Stage
 
-Route = tuple[type[StepPresenter], ...]
+Route = tuple[type[Step], ...]
 
 FIRST: Route = (SetupStep,)
 LAST: Route = (ResultStep, ValidationStep)
@@ -47,11 +42,3 @@ def route_of(stages: Iterable[Stage[Any]]) -> Route:
     """Return the route through stages of a recipe: what is known, the stages, and the result."""
     made = [PANELS.get(stage, (plain_step(stage),) if stage.folder else ()) for stage in stages]
     return (*FIRST, *chain.from_iterable(made), *LAST)
-
-
-def steps_of(route: Route, having: Container[str] | None = None) -> tuple[Step, ...]:
-    """Return the data of the steps of a route, with those of their stages that a session has."""
-    steps = (presenter.describe() for presenter in route)
-    if having is None:
-        return tuple(steps)
-    return tuple(replace(s, stages=tuple(x for x in s.stages if x in having)) for s in steps)

@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.calibrate.detection import read_raw
 from app.calibrate.maps import Panel, depth_panel
+from app.calibrate.page_state import Remedy, StepState
 from app.calibrate.result import ask_report
-from app.calibrate.states import StepState
-from app.calibrate.step import Parts, StepPresenter
-from app.calibrate.step_data import Step
-from app.calibrate.step_panel import Remedy
+from app.calibrate.step import Step
 from app.context.calibration_status import put_into_use
+from app.services.file_dialogs import ask_open
 from app.services.jobs import Job
 from app.sources.bench import Scene
 from app.widgets.buttons import push_button
@@ -42,12 +41,12 @@ from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.trust import judged
-from gelpolight_core.quantity import COVERAGE, Quantity
+from gelpolight_core.quantity import COVERAGE
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
-from gelpolight_core.validation import Validation, decided
+from gelpolight_core.validation import Validation
 
 FRAMES = 4
 TRUTH = "truth.csv"
@@ -78,36 +77,31 @@ class Trial:
     ----------
     known : Truth
         The pressed object.
+    validation : Validation
+        The lengths with their true values and limits.
     measurement : Measurement
         Measurement of the object.
-    comparisons : tuple of Quantity
-        The lengths with their true values and limits.
     heightmap : HeightMap
         The depth it was measured in.
     """
 
     known: Truth
+    validation: Validation
     measurement: Measurement
-    comparisons: tuple[Quantity, ...]
     heightmap: HeightMap
-
-    @property
-    def verdict(self) -> Verdict:
-        """The worst decision on a length."""
-        return decided(self.comparisons)
 
     @property
     def recordable(self) -> bool:
         """Whether it says something: a failed trial does, but nothing doubtful validates."""
-        return self.measurement.verdict == "ok" or self.verdict is Verdict.FAIL
+        return self.measurement.verdict == "ok" or self.validation.verdict is Verdict.FAIL
 
     def shown(self) -> tuple[str, str]:
         """Return the result as text, and its role."""
-        lines = [quantity.sentence for quantity in self.comparisons]
+        lines = [quantity.sentence for quantity in self.validation.comparisons]
         rows = [line[:1].upper() + line[1:] for line in lines]
         rows += [finding.line for finding in self.known.findings()]
         if self.measurement.verdict == "ok":
-            return "\n".join(rows), self.verdict.value
+            return "\n".join(rows), self.validation.verdict.value
         rows.append(tr("Low confidence: {reason}").format(reason=self.measurement.reason))
         if not self.recordable:
             rows.append(tr("It cannot be recorded. Correct this, then press again."))
@@ -140,30 +134,39 @@ def run_trial(
         for quantity, name in zip(compare(measured, known, limits_percent), names, strict=True)
         if quantity.truth is not None
     )
-    return Trial(known, judged(measured, heightmap), comparisons, heightmap)
+    validation = Validation(
+        reconstructor.calibration.identity,
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        user_name(),
+        tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm),
+        comparisons,
+    )
+    return Trial(known, validation, judged(measured, heightmap), heightmap)
 
 
-class ValidationStep(StepPresenter):
+class ValidationStep(Step):
     """Measures presses with the saved calibration, and records the result."""
 
     uses_camera = True
     guide = ("guide/validate", "Validate")
 
-    step = Step(
-        "validation",
-        tr("Validation"),
-        (),
-        tr(
-            "Press an indenter of known size into the membrane. The calibration is validated "
-            "only if the measured size conforms to the tolerance."
-        ),
-        "indenter",
-        frames=FRAMES,
-        button=tr("&Measure the press"),
+    key, title, stages = "validation", tr("Validation"), ()
+    task = tr(
+        "Press an indenter of known size into the membrane. The calibration is validated "
+        "only if the measured size conforms to the tolerance."
     )
+    assembly = "indenter"
+    frames = FRAMES
+    button = tr("&Measure the press")
 
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
+    _trial: Trial | None = None
+    _asked: object = None
+    """Identifies the newest trial; results of older ones are dropped."""
+    _reconstructor: tuple[Path | None, Reconstructor | None] = None, None
+    """Of the calibration at this path."""
+
+    def build(self) -> None:
+        """Create the form of the pressed object and the button that records."""
         self.form = Form(Asked(), "validation", at_once=True)
         self.calibration = named(
             PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
@@ -173,13 +176,7 @@ class ValidationStep(StepPresenter):
         self.keep = push_button("validation.keep", tr("&Record this validation"), self.record)
         set_property(self.keep, "primary", True)
         self.own = self.panel.add_extra(tr("Pressed object"), asked), self.panel.add_foot(self.keep)
-        self._path: Path | None = None
-        self._reconstructor: Reconstructor | None = None
-        self._trial: Trial | None = None
-        self._panels: tuple[Panel, ...] = ()
-        self._asked = object()  # identifies the newest trial; results of older ones are dropped
         self.context.requests.calibrations_changed.connect(self.model.changed)
-        self.model.saved_as.connect(self.use_calibration)
         self._find_earlier()
 
     def focus(self) -> QWidget:
@@ -212,8 +209,8 @@ class ValidationStep(StepPresenter):
         """Return what follows a validation."""
         if state != "pass":
             return ()
-        if self.context.workspace.in_use != self._path:
-            use = partial(put_into_use, self._path, self.area, context=self.context)
+        if self.context.workspace.in_use != self.model.saved_path:
+            use = partial(put_into_use, self.model.saved_path, self.area, context=self.context)
             return ((tr("&Use it now"), use),)
         page = self.context.requests.page
         return (
@@ -224,16 +221,16 @@ class ValidationStep(StepPresenter):
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the measured depth."""
-        return self._panels
+        if self._trial is None:
+            return ()
+        outline_mm = self._trial.measurement.outline_mm
+        return (depth_panel(tr("Measured depth"), self._trial.heightmap, outline_mm),)
 
     def refresh(self) -> None:
-        """Show the state, and which calibration is validated."""
-        super().refresh()
-        present, text = (
-            bool(self.model.saved),
-            tr("Calibration: {name}, computed from the present captures."),
-        )
-        if self._path is None:
+        """Show which calibration is validated; a trial belongs to one of them."""
+        path, present = self.model.saved_path, bool(self.model.saved)
+        text = tr("Calibration: {name}, computed from the present captures.")
+        if path is None:
             text = tr("Save the calibration first. A validation belongs to a saved calibration.")
         elif not present:
             text = tr(
@@ -241,9 +238,11 @@ class ValidationStep(StepPresenter):
                 "again."
             )
         self.calibration.setVisible(not present)
-        self.calibration.setText(text.format(name=self._path and self._path.stem))
+        self.calibration.setText(text.format(name=path and path.stem))
         show_meaning(self.calibration, "" if present else "warn")
-        self.keep.setEnabled(self._trial is not None and self._trial.recordable)
+        if path != self._reconstructor[0]:
+            self._reconstructor = path, None
+            self._show(None)
 
     def on_bench(self, scene: Scene) -> None:
         """Fill in the object on the virtual bench."""
@@ -267,17 +266,9 @@ class ValidationStep(StepPresenter):
 
     # The calibration
 
-    def use_calibration(self, path: str) -> None:
-        """Use this saved calibration for the next trials."""
-        self._path, self._reconstructor = Path(path), None
-        summary = read_entry(self._path).summary
-        self.model.use_saved(self._path.stem, "" if summary is None else summary.inputs)
-        self._drop_trial()
-        self.model.changed.emit()
-
     def _find_earlier(self) -> None:
         """Select the calibration of the present captures, or the newest one of the session."""
-        project = self.model.project
+        project = self.project
         session, present = project.session, project.all_inputs
         try:
             entries = self.context.workspace.entries()
@@ -292,37 +283,33 @@ class ValidationStep(StepPresenter):
             and entry.serial == session.serial
         ]
         if found:
-            self.use_calibration(str(min(found, key=lambda one: one[0])[1]))
+            self.model.use_calibration(min(found, key=lambda one: one[0])[1])
 
     def _recorded(self) -> Validation | None:
-        return None if self._path is None else read_entry(self._path).validation
+        path = self.model.saved_path
+        return None if path is None else read_entry(path).validation
 
     # Trials
 
     def capture(self) -> None:
         """Capture the press, then measure it."""
-        live, fault = self.model.live, self.model.camera_fault()
+        live, fault = self.model.live, self.model.camera.fault()
         if fault:
             self._refuse(fault)
         elif live.stream is not None and not live.capturing:
-            self._drop_trial()
-            self.panel.show_live(tr("Capturing: hold the object still."), ready=True)
+            self._show(None)
+            self.model.show_live(tr("Capturing: hold the object still."), ready=True)
             live.capture(FRAMES, self._measure, self._refuse)
 
     def choose_files(self) -> None:
         """Let the user choose the image of a press, and measure it."""
-        presses = self.model.project.session.folder / "presses"
-        settings = self.context.settings
-        folder = presses if presses.is_dir() else settings.folder("press")
-        chosen, _ = QFileDialog.getOpenFileName(
-            self.area,
-            tr("Import an image of a press"),
-            str(folder),
-            tr("Images (*.png *.tif *.tiff)"),
-        )
-        if chosen:
-            settings.keep_folder("press", Path(chosen).parent)
-            self.import_press(Path(chosen))
+        presses, settings = self.session.folder / "presses", self.context.settings
+        if presses.is_dir():
+            settings.keep_folder("press", presses)
+        title, patterns = tr("Import an image of a press"), tr("Images (*.png *.tif *.tiff)")
+        path = ask_open(self.area, settings, "press", title, patterns)
+        if path is not None:
+            self.import_press(path)
 
     def import_press(self, path: Path) -> None:
         """Measure a press from an image file, with the true size from its folder, if given."""
@@ -336,16 +323,10 @@ class ValidationStep(StepPresenter):
             self.show_known(known)
         self._measure([frame])
 
-    def _drop_trial(self) -> None:
-        """Drop the shown trial, and one that is still running."""
-        self._asked, self._trial, self._panels = object(), None, ()
-        self.keep.setEnabled(False)
-        self._say("")
-
     def _measure(self, frames: list[NDArray[Any]]) -> None:
-        self._drop_trial()
+        self._show(None)
         known, asked = self.form.value.truth(self.form.value.shape), self._asked
-        path, present = self._path, self._reconstructor
+        path, present = self.model.saved_path, self._reconstructor[1]
         if path is None:
             self._refuse(self.calibration.text())
             return
@@ -357,57 +338,47 @@ class ValidationStep(StepPresenter):
 
         def done(found: tuple[Reconstructor, Trial]) -> None:
             if self._asked is asked:
-                self._reconstructor = found[0]
+                self._reconstructor = path, found[0]
                 self.show_trial(found[1])
 
         def failed(sentence: str) -> None:
             if self._asked is asked:
                 self._refuse(sentence)
 
-        self.panel.show_live(tr("Measuring."), ready=True)
+        self.model.show_live(tr("Measuring."), ready=True)
         # Beside the computations: a press can be measured while the stages are computed again.
         self.model.short_jobs.submit(Job(tr("Measuring the press"), work, done, failed))
 
     def show_trial(self, trial: Trial) -> None:
         """Show the result of a trial."""
-        outline_mm = trial.measurement.outline_mm
-        self._trial = trial
-        self._panels = (depth_panel(tr("Measured depth"), trial.heightmap, outline_mm),)
-        self.keep.setEnabled(trial.recordable)
-        self._say(*trial.shown())
+        self._show(trial, *trial.shown())
 
     def _refuse(self, sentence: str) -> None:
-        self._drop_trial()
-        self._say(sentence, "warn")
+        self._show(None, sentence, "warn")
 
-    def _say(self, sentence: str, role: str = "pass") -> None:
-        """Show how a trial ended, with its depth, unless another step is open."""
-        if self.panel.step is self.step:
-            self.panel.show_notice(sentence, role)
-            self.panel.show_live("", ready=True)
-            self.show_result()
-            self.area.result.setChecked(bool(self._panels))
+    def _show(self, trial: Trial | None, sentence: str = "", role: str = "pass") -> None:
+        """Show how the newest trial ended, with its depth, unless another step is open."""
+        self._trial, self._asked = trial, object()
+        self.keep.setEnabled(trial is not None and trial.recordable)
+        if self.model.page.step is self:
+            panels = self.result_panels()
+            self.model.update_page(notice=(sentence, role), live=("", "pass"), panels=panels)
+            self.area.result.setChecked(bool(panels))
 
     def record(self) -> None:
         """Store the trial as the validation of the calibration."""
-        if self._trial is None or self._path is None or self._reconstructor is None:
+        path = self._reconstructor[0]
+        if self._trial is None or path is None:
             return
-        known = self._trial.known
-        validation = Validation(
-            self._reconstructor.calibration.identity,
-            datetime.now(UTC).isoformat(timespec="seconds"),
-            user_name(),
-            tr("{shape}, {size:g} mm").format(shape=SHAPES[known.shape], size=known.size_mm),
-            self._trial.comparisons,
-        )
+        validation = self._trial.validation
+        folder = self.context.workspace.sensor_folder(self.session.serial)
         try:
-            write_validation(validation, self._path)
-            folder = self.context.workspace.sensor_folder(self._reconstructor.calibration.serial)
+            write_validation(validation, path)
             keep_sample(sample_of_validation(validation), folder)
         except InputError as error:
-            self._say(str(error), "fail")
+            self.model.show_notice(str(error), "fail")
             return
-        self.panel.show_notice("", "pass")
+        self.model.show_notice("", "pass")
         self.context.requests.calibrations_changed.emit()
         self.panel.reveal_message()
 

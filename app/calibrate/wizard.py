@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
 from PySide6.QtCore import QEvent, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QStackedWidget, QWidget
 
-from app.calibrate.bench import BenchPart
 from app.calibrate.image_area import ImageArea
 from app.calibrate.model import WizardModel
 from app.calibrate.moving_on import MovingOn
 from app.calibrate.outside_changes import OutsideBar
-from app.calibrate.session_camera import SessionCamera
-from app.calibrate.states import OPEN, StepState
-from app.calibrate.step import Parts, StepPresenter
-from app.calibrate.step_list import StepColumn, StepList
+from app.calibrate.page_state import OPEN, PageState
+from app.calibrate.step import Step, resolve
+from app.calibrate.step_list import BenchPart, StepColumn, StepList
 from app.calibrate.step_panel import StepPanel
-from app.calibrate.steps import route_of, steps_of
+from app.calibrate.steps import route_of
 from app.context.context import AppContext
-from app.widgets.actions import make_action
+from app.widgets.actions import make_action, undo_actions
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.project import Project
@@ -51,64 +53,58 @@ class Wizard(QWidget):
         super().__init__()
         named(self, "wizard", tr("Calibration wizard"))
         self.context = context
-        self.model = WizardModel(project, context=context, parent=self)
+        self.model = WizardModel(project, context=context, window=self)
         self.live = self.model.live
         self.outside = OutsideBar(self.model)
         self.area, self.panel = ImageArea(), StepPanel()
         route = route_of(project.recipe.of(project.session))
-        steps = steps_of(route, self.model.statuses)
-        self.step_list = StepList(steps)
+        self.steps = tuple(make(self.model, self.area, self.panel) for make in route)
+        self.open: Step = self.steps[0]
+        self.model.page = PageState(self.steps, self.open)
+        self.step_list = StepList(self.steps)
         self.bench = BenchPart(context.source)
-        self.column = StepColumn(self.step_list, self.bench, model=self.model, window=self)
-        self.column.leave.triggered.connect(self.left)
-        self._lay_out()
-        parts = Parts(self.model, context, self.area, self.panel, steps)
-        self.presenters: tuple[StepPresenter, ...] = tuple(make(parts) for make in route)
-        self.open = self.presenters[0]
-        for presenter in self.presenters:
-            if self.centre.indexOf(presenter.centre) < 0:
-                self.centre.addWidget(presenter.centre)
+        column = StepColumn(self.step_list, self.bench, model=self.model, window=self)
+        column.leave.triggered.connect(self.left)
+        self.centre = QStackedWidget()
+        self.centre.addWidget(self.area)
+        row = hbox(column, (self.centre, 1), self.panel, margins=0, spacing=0)
+        vbox(self.outside, (row, 1), of=self, margins=0, spacing=0)
+        for step in self.steps:
+            if self.centre.indexOf(step.centre) < 0:
+                self.centre.addWidget(step.centre)
         self._running: object = None
         # Not at once: the history may ask for it, and is closed then.
         self._renewal = QTimer(self, singleShot=True, interval=0)
-        self._renewal.timeout.connect(lambda: self.renewed.emit(self.open.step.key))
+        self._renewal.timeout.connect(lambda: self.renewed.emit(self.open.key))
         self._build_keys()
-        self.session_camera = SessionCamera(self.model, context=context, window=self)
-        self.moving_on = MovingOn(self.model, self.panel, self.presenters, go_to=self.go_to)
+        self.moving_on = MovingOn(self.model, self.panel, self.steps)
         self._connect()
         self.refresh()
-        for presenter in self.presenters:
-            presenter.start()
+        for step in self.steps:
+            step.start()
         self.model.compute()
 
-    def _lay_out(self) -> None:
-        self.centre = QStackedWidget()
-        self.centre.addWidget(self.area)
-        row = hbox(self.column, (self.centre, 1), self.panel, margins=0, spacing=0)
-        vbox(self.outside, (row, 1), of=self, margins=0, spacing=0)
-
     def _build_keys(self) -> None:
-        self._capture_key = make_action(
-            self, "calibrate.capture_now", tr("Capture"), lambda: self.open.capture(),
-            keys=("C", "F5"),
-        )  # fmt: skip
-        self._live_key = make_action(
-            self, "calibrate.live_again", tr("Back to the live image"), lambda: self.open.live(),
-            keys=("Escape",),
-        )  # fmt: skip
-        make_action(self, "calibrate.next_step", tr("Next step"), self._next, keys=("Alt+Right",))
-        make_action(
-            self, "calibrate.previous_step", tr("Previous step"), lambda: self._go_by(-1),
-            keys=("Alt+Left",),
-        )  # fmt: skip
+        undo_actions(self, "calibrate", self.model.undo)
+        keys: dict[str, tuple[str, Callable[[], object], tuple[str, ...]]] = {
+            "capture_now": (tr("Capture"), lambda: self.open.capture(), ("C", "F5")),
+            "live_again": (tr("Back to the live image"), lambda: self.open.live(), ("Escape",)),
+            "next_step": (tr("Next step"), self._next, ("Alt+Right",)),
+            "previous_step": (tr("Previous step"), lambda: self._go_by(-1), ("Alt+Left",)),
+        }
+        self._keys = {
+            name: make_action(self, f"calibrate.{name}", text, act, keys=keys)
+            for name, (text, act, keys) in keys.items()
+        }
 
     def _connect(self) -> None:
-        self.step_list.chosen.connect(lambda row: self.go_to(self.presenters[row].step.key))
+        self.step_list.currentRowChanged.connect(lambda row: self.go_to(self.steps[row].key))
         self._connect_open_step()
         panel, area, model = self.panel, self.area, self.model
         panel.next.clicked.connect(self._next)
         panel.automatic.setChecked(self.context.settings.preferences.captures_automatically)
-        panel.automatic.toggled.connect(self._set_automatic)
+        prefer = self.context.settings.prefer
+        panel.automatic.toggled.connect(lambda on: prefer(captures_automatically=on))
         panel.cancel.clicked.connect(model.jobs.cancel)
         guide = self.context.requests.guide
         panel.help.guide.clicked.connect(lambda: guide.emit(*self.open.guide))
@@ -117,32 +113,29 @@ class Wizard(QWidget):
         area.view.dragged.connect(self.bench.drag)
         area.view.refused.connect(self._refuse)
         area.view.saved.connect(
-            lambda path: panel.show_notice(tr("Saved as {p}").format(p=path), "pass")
+            lambda path: model.show_notice(tr("Saved as {p}").format(p=path), "pass")
         )
         self.bench.opened.connect(self._follow_bench)
-        for presenter in self.presenters:
-            presenter.step_wanted.connect(self.go_to)
-        model.shown_changed.connect(self._on_shown)
+        model.step_requested.connect(self.go_to)
+        model.page_changed.connect(self._render)
         model.changed.connect(self.refresh)
         model.changed.connect(self.outside.check)
-        model.progressed.connect(self._show_progress)
+        model.jobs.progressed.connect(self._show_progress)
         model.refused.connect(self._refuse)
         model.captured.connect(self._on_captured)
         model.photographed.connect(self._signal_capture)
-        # A toast, not the panel: the user has already left the step.
-        model.capture_aborted.connect(lambda text: self.context.toasts.show(text, "fail"))
         self.live.switched.connect(self._on_camera)
-        self.live.lost.connect(area.show_lost)
+        self.live.lost.connect(lambda why: model.update_page(lost=why))
 
     def _connect_open_step(self) -> None:
         """Pass on to the open step what the user does with the shared widgets."""
-        panel, area = self.panel, self.area
+        panel, area, model = self.panel, self.area, self.model
         panel.capture.clicked.connect(lambda: self.open.capture())
         panel.import_files.triggered.connect(lambda: self.open.choose_files())
         panel.lay.clicked.connect(self._lay_on_bench)
         area.back_to_live.clicked.connect(lambda: self.open.live())
         area.strip.chosen.connect(self.show_capture)
-        panel.repeat.clicked.connect(lambda: self.open.repeat(panel.worst))
+        panel.repeat.clicked.connect(lambda: self.open.repeat(model.page.worst_first[0].path.name))
         area.strip.excluded.connect(lambda name, out: self.open.exclude(name, out))
         area.view.moved.connect(lambda *at: self.open.moved(*at))
         self.live.processed.connect(lambda item: self.open.detected(item))
@@ -152,14 +145,14 @@ class Wizard(QWidget):
     def changeEvent(self, event: QEvent) -> None:
         """Redraw the icons in another theme."""
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "presenters"):
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "moving_on"):
             # Not at once: Qt is iterating over all widgets, and none may be created or deleted
             # meanwhile. A zero timer would wait until there is nothing else to paint.
             QTimer.singleShot(1, self, self.refresh)
 
     def enter(self) -> None:
         """Open the camera when the wizard is shown."""
-        self.session_camera.refer()
+        self.model.camera.refer()
         self.live.enter(True)
         self.outside.watch(True)
         self._show_task()
@@ -175,13 +168,12 @@ class Wizard(QWidget):
     def close_session(self) -> None:
         """Stop all work; all captures and decisions are on disk."""
         self._renewal.stop()
-        for presenter in self.presenters:
-            presenter.close()
+        for step in self.steps:
+            step.close()
         self.leave()
         # Later errors appear as toasts, because this page is gone.
         self.model.refused.disconnect(self._refuse)
-        toasts = self.context.toasts
-        self.model.refused.connect(lambda text: toasts.show(text, "fail"))
+        self.model.refused.connect(partial(self.context.toasts.show, verdict="fail"))
         self.model.close()
 
     # Steps
@@ -191,35 +183,33 @@ class Wizard(QWidget):
         """The session's project."""
         return self.model.project
 
-    def at(self, key: str) -> StepPresenter:
+    def at(self, key: str) -> Step:
         """Return a step by its key."""
-        return next(one for one in self.presenters if one.step.key == key)
+        return next(step for step in self.steps if step.key == key)
 
     def go_to(self, key: str) -> None:
         """Show a step."""
         left, self.open = self.open, self.at(key)
         if left is not self.open:
             left.leave()
-        row = self.presenters.index(self.open)
-        self.step_list.go_to(row)
-        following = self.presenters[row + 1 : row + 2]
-        self.panel.show_step(self.open.step, following=following[0].step.title if following else "")
-        self._capture_key.setEnabled(self.open.step.captures)
+        page = self.model.page
+        # The messages belong to the step before; they are removed, even during a computation.
+        now = PageState(self.steps, self.open, page.states)
+        self.model.show_page(replace(now, camera=page.camera, lost=page.lost, work=page.work))
+        self._keys["capture_now"].setEnabled(self.open.frames > 0)
         self.live.use(self.open.uses_camera)
         self.open.enter()
         self._compute_what_never_was()
-        self.moving_on.enter(self.open)
+        self.moving_on.enter()
         self._show_task()
         self.refresh()
 
     def _show_task(self) -> None:
         """Show in the state bar which sensor is calibrated, and which step is open."""
         if self.live.page_shown:
-            n, count = self.presenters.index(self.open) + 1, len(self.presenters)
-            self.context.status.update(
-                sensor=self.model.project.session.serial,
-                task=tr("Calibrating: {n} of {count}").format(n=n, count=count),
-            )
+            n, count = self.model.page.place + 1, len(self.steps)
+            task = tr("Calibrating: {n} of {count}").format(n=n, count=count)
+            self.context.status.update(sensor=self.project.session.serial, task=task)
         self.centre.setCurrentWidget(self.open.centre)
         self._focus_on_what_comes_next()
 
@@ -227,35 +217,28 @@ class Wizard(QWidget):
         """Show the next step, or say what is missing in this one."""
         if self.moving_on.just_moved:
             return
-        obstacle = self.open.obstacle()
-        if obstacle:
+        if obstacle := self.open.obstacle():
             self._refuse(obstacle)
         else:
             self._go_by(1)
 
-    def _set_automatic(self, on: bool) -> None:
-        self.context.settings.prefer(captures_automatically=on)
-
     def _go_by(self, steps: int) -> None:
-        row = self.presenters.index(self.open) + steps
-        if 0 <= row < len(self.presenters):
-            self.go_to(self.presenters[row].step.key)
+        row = self.model.page.place + steps
+        if 0 <= row < len(self.steps):
+            self.go_to(self.steps[row].key)
 
     def first_open_step(self) -> str:
         """Return the first step that is not complete."""
-        states = self.model.states
-        for presenter in self.presenters:
-            step = presenter.step
-            if step.stage is not None and states[step.key][0] in OPEN:
+        states = self.model.page.states
+        for step in self.steps:
+            if step.folder and states[step.key][0] in OPEN:
                 return step.key
-        last = [one.step.key for one in self.presenters if one.step.key in ("result", "validation")]
-        tried = states[last[-1]][0] != StageState.EMPTY.value
-        return last[-1] if self.model.saved and not tried else last[0]
+        tried = states["validation"][0] != StageState.EMPTY.value
+        return "validation" if self.model.saved and not tried else "result"
 
     def _compute_what_never_was(self) -> None:
         """Compute a step's first result automatically; an outdated one waits for Recompute."""
-        stages = self.open.step.stages
-        if stages:
+        if stages := self.open.stages:
             ready = self.project.stale(upto=stages[-1])
             statuses = self.project.statuses()
             if not any(statuses[stage].state is StageState.STALE for stage in ready):
@@ -269,31 +252,28 @@ class Wizard(QWidget):
 
     def refresh(self) -> None:
         """Show the present state of everything."""
-        if self.project.statuses().keys() != self.model.statuses.keys():
+        statuses = self.project.statuses()
+        if statuses.keys() != self.model.statuses.keys():
             self._renewal.start()
             return
-        self.model.update()
-        self.model.states = self._states()
-        self.step_list.show_states(self.model.states)
+        self.model.statuses = statuses
+        self.model.show_page(resolve(self.model.page, self.steps, self.open))
         self.open.refresh()
         self.moving_on.check()
 
-    def _states(self) -> dict[str, StepState]:
-        """Return state and message of every step; a waiting step names the one it waits for."""
-        states: dict[str, StepState] = {}
-        first_open = ""
-        for presenter in self.presenters:
-            step, (state, text) = presenter.step, presenter.state()
-            empty = state == StageState.EMPTY.value and step.stage is None and bool(step.stages)
-            if first_open and (empty or state == StageState.WAITING.value):
-                text = tr("Waiting for {step}. Complete that step first.").format(step=first_open)
-            if not first_open and step.stage is not None and state in OPEN:
-                first_open = step.title
-            states[step.key] = state, text
-        return states
+    def _render(self, before: PageState) -> None:
+        """Draw what the page shows."""
+        page = self.model.page
+        if page.states is not before.states or page.step is not before.step:
+            self.step_list.show_states(page.states, page.place)
+        self.area.show_page(page, before)
+        self.panel.show_page(page)
+        self._keys["live_again"].setEnabled(bool(page.shown))
+        if page.shown != before.shown:
+            self._follow_bench()
 
     def _show_progress(self, title: str, share: float) -> None:
-        self.panel.show_work(title, share)
+        self.model.update_page(work=(title, share))
         running = self.model.running
         if not title or running is not self._running:
             self._running = running
@@ -303,7 +283,7 @@ class Wizard(QWidget):
         """Show an error message on the page."""
         self.outside.check()
         if self.isVisible():
-            self.panel.show_notice(sentence, "fail")
+            self.model.show_notice(sentence, "fail")
         else:
             self.context.toasts.show(sentence, "fail")
 
@@ -316,16 +296,12 @@ class Wizard(QWidget):
         except InputError as error:
             self._refuse(str(error))
 
-    def _on_shown(self) -> None:
-        self._live_key.setEnabled(bool(self.model.shown))
-        self._follow_bench()
-
     def _on_captured(self, stage: str, name: str) -> None:
-        if self.open.step.stage == stage:
+        if self.open.folder and self.open.stages[0] == stage:
             self.open.captured(name)
             self.area.strip.show_newest()
 
-    def _signal_capture(self, _stage: str) -> None:
+    def _signal_capture(self) -> None:
         """Flash and beep: the user looks at the sensor and may now move it."""
         self.area.view.image.flash()
         if self.panel.automatic.isChecked():
@@ -334,12 +310,13 @@ class Wizard(QWidget):
     def _on_camera(self) -> None:
         self.bench.follow()
         self.panel.lay.setVisible(self.bench.in_use)
+        self.model.update_page(camera=self.live.stream is not None)
         self.open.camera_changed()
 
     # The virtual bench
 
     def _lay_on_bench(self) -> None:
-        scene = self.bench.lay(self.open.step, self.project.session)
+        scene = self.bench.lay(self.open, self.project.session)
         if scene is not None:
             self.open.on_bench(scene)
             self.model.live_detection.count_movement()
@@ -347,9 +324,9 @@ class Wizard(QWidget):
 
     def _follow_bench(self) -> None:
         """Let drags move the object on the bench, if it is visible next to the live image."""
-        live = not self.model.shown and self.bench.in_use
+        live = not self.model.page.shown and self.bench.in_use
         self.area.view.image.hand_drags_on(live and self.bench.toggle.isChecked())
 
     def _on_clicked(self, u: float, v: float) -> None:
-        if not self.model.shown:
+        if not self.model.page.shown:
             self.bench.drag_to(u, v)

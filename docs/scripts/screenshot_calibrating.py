@@ -170,7 +170,7 @@ def lay(operator: Operator) -> None:
 def captures(operator: Operator, step: str, count: int, *, laid: bool = False) -> None:
     """Capture so many images for a step; `laid`: the first one lies on the bench already."""
     shown = wizard(operator)
-    if shown.open.step.key != step:
+    if shown.open.key != step:
         shown.go_to(step)
     for number in range(count):
         if number or not laid:

@@ -53,9 +53,9 @@ def _wizard(
     folder = context.workspace.sessions_folder("A-001") / "2026-01-02"
     create_session(replace(virtual_session(), folder=folder))
     page.open_path(folder)
-    for presenter in page.wizard.presenters:
-        page.wizard.go_to(presenter.step.key)
-        yield from _at_sizes(window, f"step {presenter.step.key}", sizes[:1])
+    for step in page.wizard.steps:
+        page.wizard.go_to(step.key)
+        yield from _at_sizes(window, f"step {step.key}", sizes[:1])
 
 
 def _at_sizes(window: MainWindow, name: str, sizes: tuple[tuple[int, int], ...]) -> Iterator[str]:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from app.calibrate.balls import judge_ball
-from app.calibrate.lens import judge_view
-from app.calibrate.top_pose import judge_top_view
+from app.calibrate.boards import judge_top_view, judge_view
 from gelpolight_core.calibration.open_sensor import LENS
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from app.calibrate.background import detect_background
 from app.calibrate.detection import read_raw
+from app.calibrate.illumination import detect_background
 from gelpolight_core.calibration.open_sensor import TOP_POSE
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState, StageStatus

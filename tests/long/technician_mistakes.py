@@ -84,7 +84,7 @@ class MistakenTrial(Trial):
     def _moved_centroid(self) -> None:
         """Go back, drag the first LED's spot to a dark place, and undo it."""
         hand, wizard = self.hand, self.wizard
-        keys = [one.step.key for one in wizard.presenters]
+        keys = [one.key for one in wizard.steps]
         hand.click_item(wizard.step_list, keys.index("lights"))
         hand.until(lambda: wizard.area.strip.count(), "the captured mirror")
         hand.click_item(wizard.area.strip, 0)
@@ -101,7 +101,7 @@ class MistakenTrial(Trial):
         model = wizard.model
         hand.until(lambda: model.undo.canUndo() and not model.busy, "the moved spot")
         hand.pause(2.0)
-        state, sentence = model.states["lights"]
+        state, sentence = model.page.states["lights"]
         self._note("moved centroid", held=state in ("warn", "fail"), answer=f"{state}: {sentence}")
         hand.window.activateWindow()  # without a window manager no window may be active
         hand.pause()

@@ -63,7 +63,7 @@ class Trial:
     @property
     def step(self) -> str:
         """Key of the open step."""
-        return "" if self.wizard is None else self.wizard.open.step.key
+        return "" if self.wizard is None else self.wizard.open.key
 
     def run(self) -> None:
         """Do everything."""
@@ -91,7 +91,7 @@ class Trial:
         hand.begin(key)
         wizard = self.wizard
         wizard.panel.automatic.setChecked(not self.by_hand)
-        for number in range(wizard.open.step.wanted):
+        for number in range(wizard.open.wanted):
             hand.click("calibrate.lay")
             if self.by_hand:
                 hand.pause()
@@ -99,7 +99,7 @@ class Trial:
                 hand.click("calibrate.capture")
             hand.until(lambda n=number: wizard.at(key).count() > n, f"image {number} of {key}")
         if self.by_hand:
-            hand.until(lambda: wizard.panel.finished, f"{key} is finished")
+            hand.until(lambda: wizard.model.page.finished, f"{key} is finished")
             hand.click("calibrate.next")
         else:
             hand.until(lambda: self.step != key, f"the step after {key}", GOES_ON_S)
@@ -167,7 +167,7 @@ def run(*, by_hand: bool, mistakes: bool) -> bool:
             trials[0].run()
         except (LookupError, TimeoutError) as error:
             wizard = trials[0].wizard
-            states = {} if wizard is None else wizard.model.states
+            states = {} if wizard is None else wizard.model.page.states
             print(f"{type(error).__name__}: {error}; states: {states}", flush=True)
         except Exception:  # the program itself would only log it
             traceback.print_exc()

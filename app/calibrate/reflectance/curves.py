@@ -1,4 +1,4 @@
-"""The curve editor with the data of the session's ball presses."""
+"""The editor of the reflectance curves (LUT), with the data of the session's ball presses."""
 
 from __future__ import annotations
 
@@ -6,26 +6,260 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from operator import is_
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QTimer
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QBoxLayout,
+    QButtonGroup,
+    QHeaderView,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
 
 from app.calibrate.model import WizardModel
-from app.calibrate.reflectance.lut_editor import LutEditor
-from app.calibrate.reflectance.lut_effect import Effect, ball_effect
-from app.calibrate.reflectance.lut_model import CurveSet, fitted_curves, with_nodes
+from app.calibrate.reflectance import lut_model as model
+from app.calibrate.reflectance.lut_model import Curve, CurveSet
+from app.calibrate.reflectance.lut_plot import CurvePlot, Preview
 from app.services.jobs import Job
+from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
+from gelpolight_core.calibration.edit_effect import EffectOf, ball_effect
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import JOINT, PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.status import StageState
+from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.translation import tr
 
-Material = tuple[ReflectanceTable, ReflectanceScatter, Callable[[CurveSet, str], Effect]]
+# Below this width, neither the plot nor the table can be read beside the other.
+NARROW = 600
+
+
+class LutEditor(QWidget):
+    """Edits the three reflectance curves.
+
+    Parameters
+    ----------
+    table : ReflectanceTable
+        The fit to the ball presses, to which Reset returns.
+    curves : CurveSet
+        The present curves.
+    scatter : ReflectanceScatter
+        The ball pixels that the curves were fitted to.
+    effect : callable
+        See :func:`~gelpolight_core.calibration.edit_effect.ball_effect`.
+    history : callable
+        Called with the text of an edit and the curves after it. It must call :meth:`show_curves`
+        with the new curves, and again after each undo or redo.
+    """
+
+    def __init__(
+        self,
+        table: ReflectanceTable,
+        curves: CurveSet,
+        scatter: ReflectanceScatter,
+        *,
+        effect: EffectOf,
+        history: Callable[[str, CurveSet], None],
+    ) -> None:
+        super().__init__()
+        self.fitted, self._coverage = model.fitted_curves(table), table.coverage.tolist()
+        self.curves, self._history = curves, history
+        self.channel = 0
+        self.chosen: int | None = None
+        self.plot = CurvePlot(
+            scatter, moved=self._on_moved, chosen=self.choose_node, added=self._on_added
+        )
+        named(self.plot, "lut.plot", tr("Reflectance curve"))
+        self.preview = Preview(self.fitted, scatter.names, effect)
+        self.nodes = self._build_table()
+        self._group = QButtonGroup(self)
+        for k, key in enumerate(CHANNEL_KEYS):
+            text, choose = channel_name(k).capitalize(), partial(self.choose_channel, k)
+            button = push_button(f"lut.channel.{key}", text, choose)
+            button.setCheckable(True)
+            self._group.addButton(button, k)
+        tools = [
+            push_button(
+                "lut.thin",
+                tr("Fewer nodes"),
+                partial(self._apply, tr("fewer nodes"), model.thin_nodes),
+                tip=tr("Keep only the nodes that are needed to draw the same curve"),
+            ),
+            push_button(
+                "lut.smooth",
+                tr("Smooth"),
+                partial(self._apply, tr("smooth"), model.smooth),
+                tip=tr("Reduce the bumps of the curve by half"),
+            ),
+        ]
+        self._remove = push_button(
+            "lut.remove",
+            tr("Remove node"),
+            self._on_removed,
+            tip=tr("Remove the selected node (Del)"),
+        )
+        self._reset = push_button(
+            "lut.reset",
+            tr("Reset"),
+            lambda: self._commit(tr("reset channel"), self.fitted[self.channel]),
+            tip=tr("Return to the curve that was fitted to the ball presses"),
+        )
+        delete = QShortcut(QKeySequence.StandardKey.Delete, self)
+        delete.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        delete.activated.connect(self._on_removed)
+        hint = PlainLabel(
+            tr("Drag a node, or type its position. A double click adds one."), wrap=True
+        )
+        side = QWidget()
+        self._side = hbox((self.nodes, 1), (self.preview, 1), of=side, margins=0, spacing=16)
+        self._split = hbox((self.plot, 3), (side, 2), spacing=16)
+        vbox(
+            hbox(*self._group.buttons(), None, self._reset, spacing=8),
+            (self._split, 1),
+            hbox(*tools, self._remove, None, spacing=8),
+            hint,
+            of=self,
+            margins=16,
+            spacing=8,
+        )
+        self.choose_channel(0)
+
+    @property
+    def curve(self) -> Curve:
+        """The curve of the shown channel."""
+        return self.curves[self.channel]
+
+    def choose_channel(self, channel: int) -> None:
+        """Show the curve of another channel."""
+        self.channel, self.chosen = channel, None
+        self._group.button(channel).setChecked(True)
+        self.plot.show_channel(channel, self.fitted[channel], tuple(self._coverage[channel]))
+        self._refresh()
+
+    def choose_node(self, index: int | None) -> None:
+        """Select a node."""
+        self.chosen = index
+        self._refresh()
+
+    def show_curves(self, curves: CurveSet) -> None:
+        """Show other curves: after an edit, an undo or a redo."""
+        self.curves = curves
+        if self.chosen is not None and self.chosen >= len(self.curve.cosines):
+            self.chosen = None
+        self._refresh()
+
+    def stop(self) -> bool:
+        """Stop the preview's thread; return whether it has stopped."""
+        return self.preview.stop()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Where there is little width, put table and effect below the plot."""
+        super().resizeEvent(event)
+        narrow, way = self.width() < NARROW, QBoxLayout.Direction
+        self._split.setDirection(way.TopToBottom if narrow else way.LeftToRight)
+        self._side.setDirection(way.LeftToRight if narrow else way.TopToBottom)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Apply a changed theme."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_split"):
+            # Not at once: Qt is iterating over all widgets, and none may be created or deleted
+            # meanwhile.
+            QTimer.singleShot(1, self, self._apply_theme)
+
+    def _apply_theme(self) -> None:
+        self.preview.apply_theme()
+        self.choose_channel(self.channel)
+
+    def _build_table(self) -> QTableWidget:
+        table = named(QTableWidget(0, 2), "lut.nodes", tr("Nodes of the curve"))
+        table.setHorizontalHeaderLabels([tr("Cosine"), tr("Value")])
+        table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        table.verticalHeader().hide()
+        table.verticalHeader().setDefaultSectionSize(24)
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setShowGrid(False)
+        table.setMinimumWidth(120)
+        table.setMinimumHeight(96)
+        table.currentCellChanged.connect(
+            lambda row, *_: self.choose_node(row if row >= 0 else None)
+        )
+        table.cellChanged.connect(self._on_typed)
+        return table
+
+    def _refresh(self, shown: Curve | None = None) -> None:
+        """Show the present curve, or one that is being dragged."""
+        curve = shown or self.curve
+        self.plot.show_curve(curve, self.channel, self.chosen)
+        self.preview.show_curves(model.with_curve(self.curves, self.channel, curve))
+        with QSignalBlocker(self.nodes):
+            self.nodes.setRowCount(len(curve.cosines))
+            for row, point in enumerate(curve.points):
+                for column, number in enumerate(point):
+                    self._show_number(row, column, number)
+            if self.chosen is None:
+                self.nodes.clearSelection()
+            else:
+                self.nodes.selectRow(self.chosen)
+        self._remove.setEnabled(model.is_removable(curve, self.chosen))
+        self._reset.setEnabled(self.curve != self.fitted[self.channel])
+
+    def _show_number(self, row: int, column: int, number: float) -> None:
+        item = self.nodes.item(row, column)
+        if item is None:
+            item = QTableWidgetItem()
+            item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.nodes.setItem(row, column, item)
+        item.setText(f"{number:.4f}")
+
+    def _apply(self, text: str, edit: Callable[[Curve], Curve]) -> None:
+        self.chosen = None
+        self._commit(text, edit(self.curve))
+
+    def _commit(self, text: str, curve: Curve) -> None:
+        """Enter an edit into the history, which shows it."""
+        if curve == self.curve:
+            self._refresh()
+            return
+        after = model.with_curve(self.curves, self.channel, curve)
+        self._history(f"{text} ({channel_name(self.channel)})", after)
+
+    def _on_moved(self, index: int, cosine: float, value: float, end: bool) -> None:
+        self.chosen = index
+        moved = model.move_node(self.curve, index, cosine, value)
+        if end:
+            self._commit(tr("move node"), moved)
+        else:
+            self._refresh(moved)
+
+    def _on_typed(self, row: int, column: int) -> None:
+        point, item = list(self.curve.points[row]), self.nodes.item(row, column)
+        try:
+            point[column] = float("" if item is None else item.text().replace(",", "."))
+        except ValueError:
+            self._refresh()
+            return
+        self._on_moved(row, point[0], point[1], True)
+
+    def _on_added(self, cosine: float) -> None:
+        curve, self.chosen = model.add_node(self.curve, cosine)
+        self._commit(tr("add node"), curve)
+
+    def _on_removed(self) -> None:
+        index = self.chosen
+        if index is not None and model.is_removable(self.curve, index):
+            self._apply(tr("remove node"), partial(model.remove_node, index=index))
+
+
+Material = tuple[ReflectanceTable, ReflectanceScatter, EffectOf]
 
 
 class Curves(QWidget):
@@ -45,14 +279,11 @@ class Curves(QWidget):
         named(self, "curves", tr("Reflectance curves"))
         self._model = model
         self.editor: LutEditor | None = None
-        self._fitted: CurveSet | None = None
         self._made_of: tuple[object, object] | None = None
-        self._column = QVBoxLayout(self)
-        self._column.setContentsMargins(0, 0, 0, 0)
-        self._message = named(PlainLabel(), "curves.message", tr("Why there are no curves"))
+        self._message = PlainLabel(wrap=True)
+        named(self._message, "curves.message", tr("Why there are no curves"))
         self._message.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._message.setWordWrap(True)
-        self._column.addWidget(self._message, 1)
+        self._column = vbox((self._message, 1), of=self, margins=0)
 
     def show_results(self) -> None:
         """Show the present curves, or explain why there are none yet."""
@@ -61,14 +292,8 @@ class Curves(QWidget):
         if present is None or REFLECTANCE.key in project.stale():
             self.close_editor()
             self._made_of = None
-            waits = self._model.jobs.busy
-            self._show_message(
-                tr("Fitting the curves.")
-                if waits
-                else tr(
-                    "The curves are fitted to the ball presses. Complete the earlier steps first."
-                )
-            )
+            why = tr("The curves are fitted to the ball presses. Complete the earlier steps first.")
+            self._show_message(tr("Fitting the curves.") if self._model.jobs.busy else why)
             return
         made_of = present, project.results.get(BALLS)
         if self._made_of is not None and all(map(is_, made_of, self._made_of)):
@@ -76,15 +301,9 @@ class Curves(QWidget):
         self._made_of = made_of
         self.close_editor()
         self._show_message(tr("Collecting the pixels of the ball presses."))
-        self._model.jobs.submit(
-            Job(
-                tr("Collecting the pixels"),
-                lambda _progress: _gather(project),
-                self._show,
-                self._show_message,
-                stopped=self._on_stopped,
-            )
-        )
+        title, stopped = tr("Collecting the pixels"), self._on_stopped
+        work = partial(_gather, project)
+        self._model.jobs.submit(Job(title, work, self._show, self._show_message, stopped))
 
     def close_editor(self) -> None:
         """Close the editor and its thread."""
@@ -106,15 +325,16 @@ class Curves(QWidget):
         table, scatter, effect = material
         self.close_editor()
         self._message.hide()
-        self._fitted = fitted_curves(table)
         stored = self._model.project.session.decisions.curves
-        present = with_nodes(self._fitted, stored)
+        present = model.with_nodes(model.fitted_curves(table), stored)
         self.editor = LutEditor(table, present, scatter, effect=effect, history=self._on_edit)
         self._column.addWidget(self.editor, 1)
 
     def _on_edit(self, text: str, after: CurveSet) -> None:
-        fitted, before = self._fitted, self._model.project.session.decisions.curves
-        nodes = {k: c.points for k, c in enumerate(after) if fitted and c != fitted[k]}
+        assert self.editor is not None
+        before = self._model.project.session.decisions.curves
+        pairs = enumerate(zip(after, self.editor.fitted, strict=True))
+        nodes = {k: curve.points for k, (curve, fitted) in pairs if curve != fitted}
         self._model.correct(
             text, partial(self._put, nodes), partial(self._put, dict(before)), REFLECTANCE.key
         )
@@ -122,11 +342,11 @@ class Curves(QWidget):
     def _put(self, nodes: Mapping[int, tuple[Point, ...]]) -> None:
         """Store the nodes of edited curves and show them."""
         self._model.project.edit_curves(nodes)
-        if self.editor is not None and self._fitted is not None:
-            self.editor.show_curves(with_nodes(self._fitted, nodes))
+        if self.editor is not None:
+            self.editor.show_curves(model.with_nodes(self.editor.fitted, nodes))
 
 
-def _gather(project: Project) -> Material:
+def _gather(project: Project, _progress: object) -> Material:
     known = project.statuses()[JOINT.key].state in (StageState.PASS, StageState.WARN)
     run = project.finish(None if known else PAPER)
     return run.results[REFLECTANCE].table.table, gather_scatter(run), ball_effect(run)

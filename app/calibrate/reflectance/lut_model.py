@@ -5,7 +5,7 @@ Every curve stays strictly increasing from no light to full light, so that it ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,65 +29,53 @@ class Curve:
 
     Attributes
     ----------
-    cosines, values : tuple of float
-        Strictly increasing; cosines from 0 to 1, values from 0 or above.
-
-    Raises
-    ------
-    ValueError
-        If the nodes break these rules.
+    points : tuple of (cosine, value)
+        Both increase strictly; cosines from 0 to 1, values from 0 or above.
     """
 
-    cosines: tuple[float, ...]
-    values: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        """Reject nodes that are not a reflectance curve."""
-        cosines, values = np.asarray(self.cosines), np.asarray(self.values)
-        if cosines.shape != values.shape or cosines.size < LEAST_NODES:
-            raise ValueError(f"{cosines.size} cosines and {values.size} values")
-        if not (np.isfinite(cosines).all() and np.isfinite(values).all()):
-            raise ValueError("a node is not finite")
-        if cosines[0] != 0.0 or cosines[-1] != 1.0 or values[0] < 0.0:
-            raise ValueError("the curve does not run from cosine 0 to cosine 1")
-        if (np.diff(cosines) <= 0.0).any() or (np.diff(values) <= 0.0).any():
-            raise ValueError("the curve does not increase strictly")
+    points: tuple[Point, ...]
 
     @property
-    def points(self) -> tuple[Point, ...]:
-        """The nodes (cosine, value)."""
-        return tuple(zip(self.cosines, self.values, strict=True))
+    def cosines(self) -> tuple[float, ...]:
+        """Of the nodes."""
+        return tuple(cosine for cosine, _ in self.points)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Of the nodes."""
+        return tuple(value for _, value in self.points)
 
     def at(self, cosine: Array | float) -> Array:
         """Return the values at cosines between 0 and 1."""
         return np.asarray(PchipInterpolator(self.cosines, self.values)(cosine))
 
 
-CurveSet = tuple[Curve, Curve, Curve]
+CurveSet = tuple[Curve, ...]
 """The curves of red, green and blue."""
+
+
+def _curve(cosines: Iterable[float], values: Iterable[float]) -> Curve:
+    return Curve(tuple((float(c), float(v)) for c, v in zip(cosines, values, strict=True)))
 
 
 def fitted_curves(table: ReflectanceTable) -> CurveSet:
     """Return the curves of a calibration's table."""
-    red, green, blue = (
-        Curve(tuple(cosines.tolist()), tuple(values.tolist()))
-        for cosines, values in zip(table.cosines, table.values, strict=True)
-    )
-    return red, green, blue
+    return tuple(map(_curve, table.cosines, table.values))
 
 
 def with_nodes(curves: CurveSet, nodes: Mapping[int, tuple[Point, ...]]) -> CurveSet:
     """Return curves in which those of some channels are replaced by stored nodes."""
-    red, green, blue = (
-        Curve(tuple(c for c, _ in nodes[k]), tuple(v for _, v in nodes[k])) if k in nodes else curve
-        for k, curve in enumerate(curves)
-    )
-    return red, green, blue
+    return tuple(Curve(nodes[k]) if k in nodes else curve for k, curve in enumerate(curves))
 
 
 def with_curve(curves: CurveSet, channel: int, curve: Curve) -> CurveSet:
     """Return curves in which that of one channel is replaced."""
     return with_nodes(curves, {channel: curve.points})
+
+
+def nodes_of(curves: CurveSet) -> dict[int, tuple[Array, Array]]:
+    """Return the nodes (cosines, values) of curves by channel."""
+    return {k: (np.array(c.cosines), np.array(c.values)) for k, c in enumerate(curves)}
 
 
 def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
@@ -99,7 +87,7 @@ def move_node(curve: Curve, index: int, cosine: float, value: float) -> Curve:
     low = values[index - 1] if index > 0 else -gap
     high = values[index + 1] if index < last else np.inf
     values[index] = _between(value, low, high, gap)
-    return Curve(tuple(cosines), tuple(values))
+    return _curve(cosines, values)
 
 
 def add_node(curve: Curve, cosine: float) -> tuple[Curve, int]:
@@ -107,14 +95,11 @@ def add_node(curve: Curve, cosine: float) -> tuple[Curve, int]:
 
     Where there is no room, the curve stays, and the index is that of the nearest node.
     """
-    cosines, values = list(curve.cosines), list(curve.values)
-    nearest = int(np.abs(np.subtract(cosines, cosine)).argmin())
-    if not 0.0 < cosine < 1.0 or abs(cosines[nearest] - cosine) < LEAST_GAP:
+    nearest = int(np.abs(np.subtract(curve.cosines, cosine)).argmin())
+    if not 0.0 < cosine < 1.0 or abs(curve.cosines[nearest] - cosine) < LEAST_GAP:
         return curve, nearest
-    index = int(np.searchsorted(cosines, cosine))
-    cosines.insert(index, cosine)
-    values.insert(index, float(curve.at(cosine)))
-    return Curve(tuple(cosines), tuple(values)), index
+    index, node = int(np.searchsorted(curve.cosines, cosine)), (cosine, float(curve.at(cosine)))
+    return Curve((*curve.points[:index], node, *curve.points[index:])), index
 
 
 def is_removable(curve: Curve, index: int | None) -> bool:
@@ -125,8 +110,7 @@ def is_removable(curve: Curve, index: int | None) -> bool:
 
 def remove_node(curve: Curve, index: int) -> Curve:
     """Remove a node."""
-    points = curve.points[:index] + curve.points[index + 1 :]
-    return Curve(tuple(c for c, _ in points), tuple(v for _, v in points))
+    return Curve(curve.points[:index] + curve.points[index + 1 :])
 
 
 def smooth(curve: Curve) -> Curve:
@@ -139,7 +123,7 @@ def smooth(curve: Curve) -> Curve:
     share = (c[1:-1] - c[:-2]) / (c[2:] - c[:-2])
     line = v[:-2] + share * (v[2:] - v[:-2])
     v[1:-1] = 0.5 * (v[1:-1] + line)
-    return Curve(curve.cosines, tuple(v.tolist()))
+    return _curve(c, v)
 
 
 def thin_nodes(curve: Curve) -> Curve:
@@ -151,7 +135,7 @@ def thin_nodes(curve: Curve) -> Curve:
         if off.max() <= TOLERANCE * v[-1]:
             break
         kept = sorted({*kept, int(off.argmax())})
-    return Curve(tuple(c[kept].tolist()), tuple(v[kept].tolist()))
+    return _curve(c[kept], v[kept])
 
 
 def _between(value: float, low: float, high: float, gap: float) -> float:

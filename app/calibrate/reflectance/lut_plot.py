@@ -1,20 +1,28 @@
-"""The plot of the curve editor: pixels of the ball presses, the curve, and nodes to drag."""
+"""The plots of the curve editor: the curve over the pixels, and its effect on a ball press."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QShowEvent
+from PySide6.QtWidgets import QWidget
 
-from app.calibrate.reflectance.lut_model import Curve
+from app.calibrate.reflectance.lut_model import Curve, CurveSet, nodes_of
+from app.services.jobs import Job, Jobs
 from app.theme import theme
-from app.widgets.plots import CHANNEL_COLOURS, apply_theme, without_menus
+from app.widgets.inputs import ComboBox
+from app.widgets.label import PlainLabel
+from app.widgets.layout import hbox, vbox
+from app.widgets.naming import named
+from app.widgets.plots import CHANNEL_COLOURS, apply_theme, bare_plot, without_menus
+from gelpolight_core.calibration.edit_effect import Effect, EffectOf
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.translation import tr
 
@@ -131,3 +139,120 @@ def _density(counts: NDArray[np.float64]) -> NDArray[np.uint8]:
     image[..., :3] = (colour.red(), colour.green(), colour.blue())
     image[..., 3] = np.where(counts > 0.0, 30.0 + 150.0 * share, 0.0).astype(np.uint8)
     return image
+
+
+Array = NDArray[np.float64]
+UM = 1000.0
+
+
+class Preview(QWidget):
+    """Shows the error of a press with the fitted and with the present curves.
+
+    Parameters
+    ----------
+    fitted : CurveSet
+        The curves to compare with.
+    presses : sequence of str
+        Names of the presses to choose from.
+    effect : callable
+        From nodes of curves by channel, and name of a press, to its effect; called in a thread.
+    """
+
+    def __init__(
+        self,
+        fitted: CurveSet,
+        presses: Sequence[str],
+        effect: EffectOf,
+    ) -> None:
+        super().__init__()
+        self._curves = fitted
+        known: dict[str, Effect] = {}
+
+        def both(curves: CurveSet, press: str, _progress: object) -> tuple[Effect, Effect]:
+            """Return the effects of the fitted curves and of these; runs in the thread."""
+            if press not in known:
+                known[press] = effect(nodes_of(fitted), press)
+            before = known[press]
+            return before, before if curves == fitted else effect(nodes_of(curves), press)
+
+        self._work = both
+        self._jobs = Jobs("lut-effect", self)
+        self.press = named(ComboBox(), "lut.press", tr("Ball press to show"))
+        for name in presses:
+            self.press.addItem(PurePath(name).stem, name)
+        self.press.currentIndexChanged.connect(self._ask)
+        self.words = named(PlainLabel(wrap=True), "lut.effect", tr("Effect on the press"))
+        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.words.setMinimumHeight(4 * self.fontMetrics().lineSpacing())
+        self._plot = named(bare_plot(), "lut.residual", tr("Depth minus ball"))
+        self._plot.setMouseEnabled(False, False)
+        self._plot.setLabel("left", tr("depth minus ball (\N{MICRO SIGN}m)"))
+        self._plot.setLabel("bottom", tr("x (mm)"))
+        self._lines = self._plot.plot(), self._plot.plot()
+        head = hbox(PlainLabel(tr("Effect on")), (self.press, 1))
+        vbox(head, self.words, (self._plot, 1), of=self, margins=0, spacing=8)
+        self.apply_theme()
+
+    def show_curves(self, curves: CurveSet) -> None:
+        """Request the effect of curves; an older request without a result is dropped."""
+        self._curves = curves
+        self._ask()
+
+    def stop(self) -> bool:
+        """Stop the thread; return whether it has stopped."""
+        return self._jobs.close()
+
+    def apply_theme(self) -> None:
+        """Apply the colours of the present theme."""
+        apply_theme(self._plot)
+        stale = pg.mkPen(theme.colour("stale"), width=2, style=Qt.PenStyle.DashDotLine)
+        for line, pen in zip(
+            self._lines, (stale, pg.mkPen(theme.colour("accent"), width=2.5)), strict=True
+        ):
+            line.setPen(pen)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Request the effect: none is computed while hidden."""
+        super().showEvent(event)
+        self._ask()
+
+    def _ask(self) -> None:
+        name = self.press.currentData()
+        if name is not None and self.isVisible():
+            if not self.words.text():
+                self.words.setText(tr("Reconstructing the press."))
+            work, show = partial(self._work, self._curves, name), partial(self._show, name)
+            self._jobs.cancel()
+            self._jobs.submit(Job(tr("Effect on the press"), work, show, self.words.setText))
+
+    def _show(self, name: str, effects: tuple[Effect, Effect]) -> None:
+        if name == self.press.currentData():
+            for effect, line in zip(effects, self._lines, strict=True):
+                line.setData(effect.position_mm, UM * effect.residual_mm, connect="finite")
+            self.words.setText(effect_sentence(*effects))
+
+
+def effect_sentence(before: Effect, after: Effect) -> str:
+    """Return the effect on the press as a sentence with numbers."""
+    if before is after:
+        return tr(
+            "Unchanged: error {rms:.1f} \N{MICRO SIGN}m RMS over the contact, {low:+.1f} "
+            "\N{MICRO SIGN}m at the deepest point."
+        ).format(rms=UM * before.rms_mm, low=UM * before.lowest_mm)
+    change = after.rms_mm - before.rms_mm
+    if abs(change) < 0.005 * max(before.rms_mm, 1e-9):
+        verdict = tr("No significant change")
+    else:
+        verdict = tr("Better") if change < 0.0 else tr("Worse")
+    moved = UM * float(np.abs(after.profile_mm - before.profile_mm).max())
+    return tr(
+        "{verdict}: RMS error {a:.1f} to {b:.1f} \N{MICRO SIGN}m, at the deepest point {c:+.1f} "
+        "to {d:+.1f} \N{MICRO SIGN}m. The depth changed by up to {moved:.1f} \N{MICRO SIGN}m."
+    ).format(
+        verdict=verdict,
+        a=UM * before.rms_mm,
+        b=UM * after.rms_mm,
+        c=UM * before.lowest_mm,
+        d=UM * after.lowest_mm,
+        moved=moved,
+    )

@@ -123,7 +123,7 @@ class Technician:
 
     def state(self, key: str) -> str:
         """Return the state that the step list shows for a step."""
-        row = [one.step.key for one in self.wizard.presenters].index(key)
+        row = [one.key for one in self.wizard.steps].index(key)
         return str(self.wizard.step_list.item(row).data(Qt.ItemDataRole.UserRole))
 
     def capture(self) -> str:
@@ -132,5 +132,5 @@ class Technician:
         self.wizard.model.captured.connect(lambda _stage, name: reported.append(name))
         self.click("calibrate.capture")
         self.until(lambda: reported)
-        assert (self.session / self.wizard.open.step.folder / reported[0]).is_file()
+        assert (self.session / self.wizard.open.folder / reported[0]).is_file()
         return reported[0]

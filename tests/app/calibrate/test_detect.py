@@ -11,14 +11,11 @@ import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board, true_corners
 
-from app.calibrate.background import detect_background
 from app.calibrate.balls import BallSetting, detect_ball
-from app.calibrate.detection import as_image
-from app.calibrate.lens import detect_board
+from app.calibrate.boards import detect_board, detect_top_pose
+from app.calibrate.detection import as_image, mirror_positions_px
+from app.calibrate.illumination import detect_background, detect_whiteboard
 from app.calibrate.lights import detect_mirror
-from app.calibrate.marks import mirror_positions_px
-from app.calibrate.radiance import detect_whiteboard
-from app.calibrate.top_pose import detect_top_pose
 from app.live.live_detection import Detection
 from gelpolight_core.calibration.image_checks import require_lit_colours
 from gelpolight_core.errors import InputError

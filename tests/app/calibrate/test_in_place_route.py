@@ -15,10 +15,11 @@ from pytestqt.qtbot import QtBot
 from technician import Technician
 
 from app.calibrate.detection import as_image, read_raw
-from app.calibrate.in_place_balls import Progress
+from app.calibrate.in_place import Progress
 from app.calibrate.result import write_report
-from app.calibrate.setup_form import SetupForm
+from app.calibrate.setup import SetupForm
 from app.calibrate.setup_values import new_session
+from app.context.context import AppContext
 from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.in_place_session import SETTLED
@@ -45,10 +46,10 @@ def test_from_the_first_question_to_a_validated_calibration(
     form.values.inputs["scale"].setValue(MM_PER_PX)
     technician.click("setup.accept")
     wizard = technician.wizard
-    assert [one.step.key for one in wizard.presenters] == [
+    assert [one.key for one in wizard.steps] == [
         "setup", "background", "balls", "result", "validation",
     ]  # fmt: skip
-    assert wizard.open.step.key == "background"
+    assert wizard.open.key == "background"
     wizard.open.import_files([*opened.files("background")])
     technician.rest()
     assert technician.state("background") in ("pass", "warn")
@@ -73,7 +74,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     (refused,) = [capture for capture in captures if capture.state == "fail"]
     assert refused.finding.sentence, "an image that shows no ball keeps its reason"
     assert sum(capture.residual < 180.0 for capture in captures) == len(files) - 1
-    assert wizard.panel.finished is progress.settled
+    assert wizard.model.page.finished is progress.settled
 
     wizard.go_to("result")
     technician.click("result.save")
@@ -107,7 +108,7 @@ def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
     technician.begin(project, "balls")
     wizard = technician.wizard
     name = project.session.found("balls")[-1].name
-    assert wizard.model.shown == name, "without a camera the session shows its own images"
+    assert wizard.model.page.shown == name, "without a camera the session shows its own images"
     contact = wizard.area.view.image.overlay
     technician.until(lambda: contact.handles)
     (found,) = contact.handles
@@ -128,9 +129,9 @@ def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician.page.context.source.choose_virtual_sensor()
     project = closed_project(small_session, tmp_path, balls=1)
     technician.begin(project, "background")
-    technician.until(lambda: technician.wizard.model.shown)
+    technician.until(lambda: technician.wizard.model.page.shown)
     technician.wizard.go_to("balls")
-    assert technician.wizard.model.shown == project.session.found("balls")[0].name
+    assert technician.wizard.model.page.shown == project.session.found("balls")[0].name
     technician.wizard.open.live()
     technician.until(lambda: technician.see("calibrate.capture").isEnabled())
     technician.click("calibrate.capture")
@@ -147,8 +148,8 @@ def test_a_session_from_files_shows_its_own_images_beside_a_sensor_of_its_serial
     description.write_text(text, "utf-8")
     project.reload()
     technician.begin(project, "balls")
-    assert not technician.wizard.model.camera_fault()
-    assert technician.wizard.model.shown == project.session.found("balls")[0].name
+    assert not technician.wizard.model.camera.fault()
+    assert technician.wizard.model.page.shown == project.session.found("balls")[0].name
 
 
 def test_the_scale_is_measured_on_a_pressed_pin_grid(
@@ -188,7 +189,7 @@ def test_the_scale_is_measured_on_a_pressed_pin_grid(
     technician.click("setup.accept")
     technician.until(lambda: technician.wizard is not second)
     technician.rest()
-    assert "scale" not in [one.step.key for one in technician.wizard.presenters]
+    assert "scale" not in [one.key for one in technician.wizard.steps]
 
 
 PINS_PX = 16.0
@@ -247,8 +248,8 @@ def test_a_change_makes_the_calibration_outdated_and_undo_restores_it(
     assert kept.ball_radii_mm == session.ball_radii_mm
 
 
-def test_a_preset_fills_in_the_scale_and_its_uncertainty(qtbot: QtBot) -> None:
-    form = SetupForm()
+def test_a_preset_fills_in_the_scale_and_its_uncertainty(context: AppContext, qtbot: QtBot) -> None:
+    form = SetupForm(context=context)
     qtbot.addWidget(form)
     form.show_session(new_session(optics=False), new=True)
     digit = preset_named("digit")
@@ -264,7 +265,7 @@ def test_a_preset_fills_in_the_scale_and_its_uncertainty(qtbot: QtBot) -> None:
 
 @pytest.mark.parametrize(("gain", "asks"), [(None, True), (2.0 * SETTLED, True), (0.0, False)])
 def test_it_stops_asking_when_more_presses_do_not_help(gain: float | None, asks: bool) -> None:
-    progress = Progress(2.0, gain, None)
+    progress = Progress(2.0, gain)
     assert progress.settled is not asks
     assert ("ring" in progress.sentence()) is asks
 

@@ -50,8 +50,8 @@ def test_a_completed_step_leads_to_the_next_one_that_needs_the_user_and_back(
     wizard = technician.wizard
     technician.until(lambda: wizard.panel.live.text())
     camera.show(image)
-    technician.until(lambda: wizard.open.step.key != "background")
-    assert wizard.open.step.key == "balls", "they must be compared with the new background"
+    technician.until(lambda: wizard.open.key != "background")
+    assert wizard.open.key == "balls", "they must be compared with the new background"
     assert len(project.session.found("background")) == 1
     technician.rest()
     wizard.go_to("background")
@@ -67,7 +67,7 @@ def test_what_needs_reading_or_nothing_new_does_not_lead_on(
     wizard.moving_on.setInterval(60_000)
     for state, leads_on in ((StageState.WARN.value, False), (StageState.PASS.value, True)):
         wizard.moving_on._was_incomplete = True
-        wizard.model.states["background"] = (state, "")
+        wizard.model.page.states["background"] = (state, "")
         assert step.is_settled(state) is leads_on
         wizard.moving_on.check()
         assert wizard.moving_on.isActive() is leads_on
@@ -82,8 +82,8 @@ def test_any_action_stops_the_countdown_and_a_moving_mouse_delays_it(
     wizard = technician.wizard
     moving = wizard.moving_on
     moving.setInterval(60_000)
-    wizard.model.states["background"] = (StageState.PASS.value, "")
-    wizard.model.shown = ""  # without a camera, the newest capture is shown
+    wizard.model.page.states["background"] = (StageState.PASS.value, "")
+    wizard.model.update_page(shown="")  # without a camera, the newest capture is shown
     for stop in (
         lambda: qtbot.mouseClick(wizard.panel.title, Qt.MouseButton.LeftButton),
         lambda: qtbot.keyClick(wizard, Qt.Key.Key_Shift),
@@ -97,7 +97,7 @@ def test_any_action_stops_the_countdown_and_a_moving_mouse_delays_it(
         technician.until(lambda: "(3)" in wizard.panel.next.text())
         stop()
         assert not moving.isActive() and "(" not in wizard.panel.next.text()
-        assert wizard.open.step.key == "background"
+        assert wizard.open.key == "background"
     technician.rest()
 
 
@@ -109,12 +109,12 @@ def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
         project.exclude("lights", path.name)
     technician.begin(project, "lights")
     technician.click("calibrate.next")
-    assert technician.wizard.open.step.key == "lights"
+    assert technician.wizard.open.key == "lights"
     assert technician.wizard.panel.notice.text() == technician.wizard.open.obstacle() != ""
     project.exclude("lights", project.session.captured("mirror")[0].name, False)
     technician.wizard.model.changed.emit()
     technician.click("calibrate.next")
-    assert technician.wizard.open.step.key == "radiance"
+    assert technician.wizard.open.key == "radiance"
     technician.rest()
 
 

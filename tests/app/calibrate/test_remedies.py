@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from app.calibrate.remedies import mend_of
+from app.calibrate.result import mend_of
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.causes import MODEL

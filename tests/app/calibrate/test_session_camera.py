@@ -172,5 +172,5 @@ def test_a_recording_of_another_sensor_is_rejected(
     wizard = technician.wizard
     for serial, refused in (("virtual-1", False), ("", False), ("A-002", True)):
         monkeypatch.setattr(type(wizard.live), "serial", property(lambda _, s=serial: s))
-        assert ("A-002" in wizard.session_camera.fault()) is refused
+        assert ("A-002" in wizard.model.camera.fault()) is refused
     technician.rest()

@@ -197,7 +197,7 @@ def test_a_radius_corrected_on_a_capture_can_be_undone(
     assert read_session(technician.session).ball_radius_mm(name) == before + 0.5
     technician.wizard.model.undo.undo()
     assert read_session(technician.session).ball_radius_mm(name) == before
-    assert technician.wizard.at("balls").radius.radius_mm == before
+    assert technician.wizard.at("balls").radius_mm == before
 
 
 def test_automatic_capture_waits_for_a_still_good_image_and_a_new_view(
@@ -284,7 +284,7 @@ def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_agai
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
     folder = technician.session
-    technician.page._leave_session()
+    technician.page.leave_session()
     technician.page.open_path(folder)
     technician.rest()
     assert technician.state("validation") == "pass"
@@ -361,8 +361,7 @@ def test_a_file_changed_by_another_program_is_reported_and_reloaded(
     path.write_text(
         'format = "gelpolight-decisions"\nversion = 1\nexcluded = ["balls/ball_01.png"]'
     )
-    stage = wizard.open.step.stage
-    assert stage is not None
+    (stage,) = wizard.open.stages
     wizard.model.exclude(stage, "ball_02.png", True)
     technician.until(lambda: "decisions.toml" in wizard.outside.sentence.text())
     technician.click("calibrate.outside.reload")
@@ -409,7 +408,7 @@ def test_a_waiting_step_names_the_step_it_waits_for(technician: Technician, fres
     tabs = technician.wizard.at("result").tabs
     tabs.setCurrentIndex(1)
     assert "earlier steps" in technician.see("calibrate.maps.none").text()
-    assert "Lens" in technician.wizard.model.states["result"][1]
+    assert "Lens" in technician.wizard.model.page.states["result"][1]
 
 
 def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
@@ -420,7 +419,7 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
     technician.click("result.save")
     technician.rest()
     folder, hold = technician.session, threading.Event()
-    technician.page._leave_session()
+    technician.page.leave_session()
     compute = Project.compute
     with monkeypatch.context() as slow:
         slow.setattr(
@@ -429,7 +428,7 @@ def test_a_saved_calibration_is_validated_while_stages_are_recomputed(
         )  # fmt: skip
         technician.page.open_path(folder)
         wizard = technician.wizard
-        assert wizard.open.step.key == "validation"
+        assert wizard.open.key == "validation"
         step = wizard.at("validation")
         assert "present captures" in step.calibration.text()
         wizard.go_to("result")

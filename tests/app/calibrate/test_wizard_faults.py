@@ -42,7 +42,7 @@ def test_a_stopped_camera_is_reported_and_can_be_reconnected(
     [
         pytest.param(lambda one: one.wizard.go_to("result"), id="step"),
         pytest.param(lambda one: one.page.leave(), id="page"),
-        pytest.param(lambda one: one.page._leave_session(), id="session"),
+        pytest.param(lambda one: one.page.leave_session(), id="session"),
     ],
 )
 def test_an_aborted_capture_is_reported(
@@ -91,7 +91,9 @@ def test_a_wrong_image_fails_with_advice_and_can_be_captured_again(
     assert expected_text.lower() in sentence.lower()
     assert len(sentence.split(". ")) >= 2, "it says what was found and what to do"
     opened = technician.wizard.open
-    assert panel.finished is (state == "warn" and opened.count() >= opened.step.wanted)
+    assert technician.wizard.model.page.finished is (
+        state == "warn" and opened.count() >= opened.wanted
+    )
     assert panel.capture.isEnabled()
 
 
@@ -202,7 +204,7 @@ def test_an_unsaved_image_is_reported_after_the_session_is_closed(
     cv2.imwrite(str(tmp_path / "press.png"), np.roll(press, 1, axis=0))
     full_disk(monkeypatch)
     technician.wizard.model.import_files("balls", [tmp_path / "press.png"])
-    technician.page._leave_session()
+    technician.page.leave_session()
     assert "disk is full" in caplog.text
     monkeypatch.undo()
     technician.begin(project, "balls")

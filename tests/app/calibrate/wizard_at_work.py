@@ -40,7 +40,7 @@ class Work:
 
     def _on_step(self, key: str) -> None:
         self._wizard.go_to(key)
-        folder = self._wizard.open.step.folder
+        folder = self._wizard.open.folder
         files = sorted((self._images / folder).glob("*.png"))
         self._camera.show(read_rgb(self._random.choice(files)))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.calibrate.steps import route_of, steps_of
+from app.calibrate.steps import route_of
 from app.context.context import AppContext
 from app.shell import documentation
 from app.shell import main_window as main_window_module
@@ -42,7 +42,7 @@ def test_every_step_and_page_has_its_section(qtbot: QtBot) -> None:
     known = {name for name, _ in PAGES}
     assert set(OF_PAGE.values()) <= known
     window.show_page("guide/calibrate")
-    for step in steps_of(route_of(FULL.stages)):
+    for step in route_of(FULL.stages):
         page = "guide/validate" if step.key == "validation" else "guide/calibrate"
         window.show_page(page)
         title = "Validate" if step.key == "validation" else step.title

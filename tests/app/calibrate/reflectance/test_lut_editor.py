@@ -15,21 +15,21 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from test_lut_model import fitted, scatter
 
-from app.calibrate.model import Correction
 from app.calibrate.reflectance import lut_model as model
-from app.calibrate.reflectance.lut_editor import LutEditor
-from app.calibrate.reflectance.lut_effect import Effect
+from app.calibrate.reflectance.curves import LutEditor
 from app.calibrate.reflectance.lut_model import CurveSet
+from app.widgets.undo import Step
+from gelpolight_core.calibration.edit_effect import Effect
 
 MOVE_MS = 12
 """The plot processes at most 100 mouse moves per second."""
 
 
-def effect(curves: CurveSet, press: str) -> Effect:
+def effect(nodes: dict[int, tuple[np.ndarray, np.ndarray]], press: str) -> Effect:
     """Return an artificial effect whose depth is the middle value of the red curve."""
     position = np.linspace(-3.0, 3.0, 61)
     ball = np.where(np.abs(position) < 1.5, 1.0 - 0.1 * position**2, np.nan)
-    depth = np.full(61, float(curves[0].at(0.5)))
+    depth = np.full(61, float(np.interp(0.5, *nodes[0])))
     return Effect(press, position, depth, ball, float(depth[0]), 0.0)
 
 
@@ -40,7 +40,7 @@ def editor(qtbot: QtBot) -> Iterator[LutEditor]:
 
     def history(text: str, after: CurveSet) -> None:
         act, revert = partial(widget.show_curves, after), partial(widget.show_curves, widget.curves)
-        stack.push(Correction(text, act, revert, done=list, refused=pytest.fail))
+        stack.push(Step(text, act, revert))
 
     curves = model.fitted_curves(fitted())
     thin = model.with_curve(curves, 0, model.thin_nodes(curves[0]))

@@ -83,7 +83,9 @@ def test_every_edit_keeps_the_table_invertible(operations: list[tuple]) -> None:
     for operation in operations:
         curve = apply(curve, operation)
     cosines, values = np.array(curve.cosines), np.array(curve.values)
+    assert (cosines[0], cosines[-1]) == (0.0, 1.0) and values[0] >= 0.0
     table = ReflectanceTable((cosines,) * 3, (values,) * 3, fitted().coverage)
+    table.check()
     there_and_back = table.cosine(0, table.response(0, cosines))
     np.testing.assert_allclose(there_and_back, cosines, atol=1e-6)
     table.lookup(512)

@@ -62,10 +62,10 @@ def test_a_trial_of_an_earlier_calibration_is_dropped(
     monkeypatch.setattr(validating, "read_calibration", held)
     step.import_press(small_session / PRESS)
     technician.until(held.begun.is_set)
-    step.use_calibration(str(shutil.copy(path, path.with_name("newer.gplcal"))))
+    wizard.model.use_calibration(Path(shutil.copy(path, path.with_name("newer.gplcal"))))
     held.go.set()
     technician.until(lambda: not wizard.model.short_jobs.busy)
-    assert step._reconstructor is None
+    assert step._reconstructor[1] is None
     assert not step.keep.isEnabled()
     assert not panel.notice.text()
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from app.calibrate.lens import TILT_DEG, next_view, uncovered_ninth
 from gelpolight_core.optics.board_grid import foreshortening_tilt_deg
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.lens_quality import coverage_counts
+from gelpolight_core.optics.next_view import TILT_DEG, next_view, uncovered_ninth
 from gelpolight_core.session.board import BoardSpec
 
 BOARD, SIZE = BoardSpec((9, 6), 3.0), (1280, 960)

@@ -1,4 +1,4 @@
-"""The lens step: views of a checkerboard in front of the camera, and which view to show next."""
+"""The steps of a checkerboard: views in front of the camera, then the board on the top opening."""
 
 from __future__ import annotations
 
@@ -13,15 +13,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, Detector, as_image, or_refusal
-from app.calibrate.image_step import ImageStep
-from app.calibrate.marks import board_corners, board_outline
-from app.calibrate.step import Parts
-from app.calibrate.step_data import step_of
+from app.calibrate.detection import (
+    Detection,
+    Detector,
+    as_image,
+    board_corners,
+    board_outline,
+    foot_point,
+    judged,
+    or_refusal,
+    too_early,
+)
+from app.calibrate.image_step import ImageStep, judged_stage
 from app.live.image_checks import Rgb
 from app.live.overlay import Line, Marker, Overlay
 from app.services.jobs import Job
-from gelpolight_core.calibration.open_sensor import LENS
+from gelpolight_core.calibration.open_sensor import LENS, TOP_POSE
+from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.status import StageStatus
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.image.linear import LinearImage
@@ -32,8 +41,8 @@ from gelpolight_core.optics.board_exposure import (
     sharpest_edge_px,
 )
 from gelpolight_core.optics.board_search import find_rough_corners, search_rough_corners
+from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView, find_board
-from gelpolight_core.optics.lens_quality import coverage_counts
 from gelpolight_core.optics.lens_views import (
     MIN_VIEWS,
     LensRefusal,
@@ -41,76 +50,12 @@ from gelpolight_core.optics.lens_views import (
     find_view,
     refused_view,
 )
+from gelpolight_core.optics.next_view import next_view, uncovered_ninth
+from gelpolight_core.optics.pose import estimate_top_pose
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
-Ninth = tuple[int, int]
-
-ORDER: tuple[Ninth, ...] = (
-    (0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0), (1, 1),
-)  # fmt: skip
-"""(row, column) of the ninths of the image, the outer ones first."""
-BOARD_OF_WIDTH = 0.45
-FOCAL_OF_WIDTH = 1.0
-TILT_DEG = 25.0
-# The golden angle: any number of successive directions is spread evenly.
-TURN_DEG = 137.5
-MARGIN_OF_WIDTH = 0.02
-
-
-def uncovered_ninth(views: Sequence[BoardView]) -> Ninth | None:
-    """Return (row, column) of a ninth of the image without any corner, outer ninths first."""
-    if not views:
-        return ORDER[0]
-    counts = coverage_counts(views, views[0].image_size)
-    rows = [part.sum(axis=0) for part in np.array_split(counts, 3, axis=0)]
-    ninths = np.array([[p.sum() for p in np.array_split(row, 3)] for row in rows])
-    return next((ninth for ninth in ORDER if ninths[ninth] == 0), None)
-
-
-def next_view(board: BoardSpec, size: tuple[int, int], earlier: Sequence[BoardView]) -> Array:
-    """Return the outermost inner corners (4, 2) of a board in the suggested pose, in pixels.
-
-    Each view has another tilt direction; it is placed where no view has corners yet.
-
-    Parameters
-    ----------
-    board : BoardSpec
-        The board.
-    size : (width, height)
-        Of the image, in pixels.
-    earlier : sequence of BoardView
-        Views captured before.
-    """
-    width, height = size
-    across, down = (count - 1 for count in board.inner_corners)
-    x, y = 0.5 * across, 0.5 * down
-    corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
-    turn = math.radians(TURN_DEG * len(earlier))
-    axis = np.array([math.cos(turn), math.sin(turn), 0.0])
-    tilted = _rotated(corners, axis, math.radians(TILT_DEG))
-    focal = FOCAL_OF_WIDTH * width
-    tilted[:, 2] += focal * across / (BOARD_OF_WIDTH * width)
-    quad = focal * tilted[:, :2] / tilted[:, 2:]
-    row, column = uncovered_ninth(earlier) or ORDER[len(earlier) % len(ORDER)]
-    quad += [(column + 0.5) * width / 3.0, (row + 0.5) * height / 3.0]
-    return _moved_inside(quad, np.array(size, np.float64), MARGIN_OF_WIDTH * width)
-
-
-def _rotated(points: Array, axis: Array, angle: float) -> Array:
-    along = np.outer(points @ axis, axis)
-    turned = np.cross(axis, points) * math.sin(angle)
-    return np.asarray(along + (points - along) * math.cos(angle) + turned)
-
-
-def _moved_inside(quad: Array, size: Array, margin: float) -> Array:
-    """Return a quadrilateral shifted into the image."""
-    low = np.maximum(margin - quad.min(axis=0), 0.0)
-    high = np.minimum(size - 1.0 - margin - quad.max(axis=0), 0.0)
-    return np.asarray(quad + low + high)
-
-
 # The slow search uses a small copy, so that a frame without a board stays quick. Below 400 pixels
 # it begins to miss boards that the image border cuts off, and then takes longer.
 GLANCE_PX = 480
@@ -237,26 +182,21 @@ class LensStep(ImageStep):
 
     judges_focus = True
 
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts)
+    of = LENS
+    task = tr(
+        "Hold the checkerboard in front of the camera, tilted in a new direction for each image."
+    )
+    assembly = "camera"
+    frames, wanted, least = 1, 12, MIN_VIEWS
+    advice = tr(
+        "Use the camera alone. Tilt the board by 15 to 40 degrees, until its corners have "
+        "covered the whole image."
+    )
+
+    def build(self) -> None:
+        """Note each new view."""
         self._views: dict[str, LensView] = {}
         self.model.captured.connect(self._on_captured)
-
-    step = step_of(
-        LENS,
-        tr(
-            "Hold the checkerboard in front of the camera, tilted in a new direction for each "
-            "image."
-        ),
-        "camera",
-        frames=1,
-        wanted=12,
-        least=MIN_VIEWS,
-        advice=tr(
-            "Use the camera alone. Tilt the board by 15 to 40 degrees, until its corners have "
-            "covered the whole image."
-        ),
-    )
 
     def start(self) -> None:
         """Analyse the views that the session has."""
@@ -264,8 +204,7 @@ class LensStep(ImageStep):
 
     def views(self) -> dict[str, LensView]:
         """Return what was found in each analysed view, by image name."""
-        project = self.model.project
-        fault, lens = project.fault("lens"), project.results.get(LENS)
+        fault, lens = self.project.fault("lens"), self.results.get(LENS)
         views = () if lens is None else lens.views
         if isinstance(fault, LensRefusal):
             views = fault.views  # the reasons survive a refusal
@@ -273,13 +212,10 @@ class LensStep(ImageStep):
 
     def detector(self, name: str) -> Detector:
         """Return the detection of the board, with the earlier views."""
-        session = self.model.project.session
-        used = {path.name for path in session.found(self.step.folder)} - {name}
+        used = {path.name for path in self.session.found(self.folder)} - {name}
         found = [view.board for n, view in self.views().items() if n in used]
-        earlier = [board for board in found if board is not None]
-        return partial(
-            detect_board, board=session.checkerboard, earlier=earlier, patient=bool(name)
-        )
+        earlier, board = [one for one in found if one is not None], self.session.checkerboard
+        return partial(detect_board, board=board, earlier=earlier, patient=bool(name))
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the names of the analysed views."""
@@ -290,13 +226,13 @@ class LensStep(ImageStep):
         return judge_view(self.views().get(path.name))
 
     def _on_captured(self, stage: str, _name: str) -> None:
-        if stage == "lens":
+        if stage == self.key:
             self._find_boards()
 
     def _find_boards(self) -> None:
         def work(_progress: Callable[[float], None]) -> None:
-            session, known = self.model.project.session, self.views()
-            for path in session.found(self.step.folder):
+            session, known = self.session, self.views()
+            for path in session.found(self.folder):
                 if path.name not in known:
                     try:
                         view = find_view(session.image(path), session.checkerboard)
@@ -318,3 +254,71 @@ def judge_view(view: LensView | None) -> Finding | None:
     if math.isnan(view.rms_px):
         return Finding("view", tr("Board found"))
     return Finding("corner_error_px", tr("Corner error"), view.rms_px, "px")
+
+
+def detect_top_pose(
+    rgb: Rgb, board: BoardSpec, camera: Camera, *, patient: bool = False
+) -> Detection:
+    """Find the board on the top surface and return the pose of the surface.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    board : BoardSpec
+        The board on the surface.
+    camera : Camera
+        Result of the lens stage.
+    patient : bool, optional
+        As for :func:`~app.calibrate.boards.detect_board`.
+    """
+
+    def detect() -> Detection:
+        image = as_image(rgb, tr("Image"))
+        if not patient:
+            glance(image, board)
+        pose = estimate_top_pose([image], board, camera)
+        view = pose.views[0].board
+        markers = () if view is None else board_corners(view)
+        lines = () if view is None else (board_outline(view, "good"),)
+        marks = Overlay(markers=(*markers, foot_point(camera, pose.plane)), lines=lines)
+        good = tr("Board found. The top surface is at {d:.2f} mm and tilted by {t:.2f} degrees.")
+        return judged(
+            marks,
+            pose.quality.figures,
+            good.format(d=pose.plane.distance_mm, t=pose.tilt_deg),
+        )
+
+    return or_refusal(detect)
+
+
+class TopPoseStep(ImageStep):
+    """Finds the board with the lens of the step before."""
+
+    of = TOP_POSE
+    task = tr("Lay the small checkerboard flat on the top opening, pattern facing down.")
+    assembly = "board"
+    frames, wanted = 8, 1
+    advice = tr("Mount the housing without the elastomer.")
+    figure = "reprojection_rms"
+
+    def detector(self, name: str) -> Detector:
+        """Return the detection of the board, once the lens is known."""
+        lens, board = self.results.get(LENS), self.session.top_pose
+        if lens is None:
+            return too_early
+        return partial(detect_top_pose, board=board, camera=lens.camera, patient=bool(name))
+
+    def judge(self, path: Path) -> Finding | None:
+        """Return whether a view is used."""
+        return judge_top_view(path.name, self.project, self.model.statuses[self.stage])
+
+
+def judge_top_view(name: str, project: Project, status: StageStatus) -> Finding | None:
+    """Return how a view of the top surface was judged."""
+    found, top = judged_stage(status), project.results.get(TOP_POSE)
+    if found is not None and status.quality.figures and top is not None:
+        for view in top.pose.views:
+            if view.name == name and not view.used:
+                return Finding("view", view.reason, verdict=Verdict.FAIL)
+    return found

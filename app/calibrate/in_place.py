@@ -1,4 +1,4 @@
-"""The step of the ball presses on a closed sensor, with the benefit of one more press."""
+"""The steps of a closed sensor: the scale of its images, and presses of a ball."""
 
 from __future__ import annotations
 
@@ -9,17 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from app.calibrate.balls import BallsStep, Point, press_marks
+from app.calibrate.balls import BallsStep, press_marks
 from app.calibrate.detection import (
     Detection,
     Detector,
+    beside,
     or_refusal,
     read_raw,
+    refuse_grey,
     refuse_size,
     too_early,
 )
-from app.calibrate.states import is_done
-from app.calibrate.step_data import step_of
+from app.calibrate.image_step import ImageStep
+from app.calibrate.page_state import is_done
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from gelpolight_core.calibration.in_place import BALLS, SCALE
@@ -35,10 +37,83 @@ from gelpolight_core.finding import Finding, QualityTable, refused
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.calibrate import LEAST_PRESSES, contact_in
+from gelpolight_core.in_place.scale import find_pins, find_punch
 from gelpolight_core.reconstruction.in_place.change import Reference, reference
 from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.session.session import InPlace
 from gelpolight_core.translation import tr
+
+
+def detect_scale(
+    rgb: Rgb, background: Rgb, *, stated: InPlace, response: CameraResponse | None = None
+) -> Detection:
+    """Find the pressed object, and show what it says about the size of a pixel.
+
+    Parameters
+    ----------
+    rgb, background : (rows, columns, 3)
+        The frame, and the untouched membrane.
+    stated : InPlace
+        Size of the object, and the membrane's part of the image.
+    response : CameraResponse, optional
+        Response of the camera.
+    """
+
+    def detect() -> Detection:
+        refuse_grey(rgb)
+        refuse_size(rgb, (background.shape[1], background.shape[0]))
+        images = [linear_image(raw, "", response=response) for raw in (rgb, background)]
+        grid, pressed = stated_grid(stated, images[1].size), stated.pressed_scale
+        seen, bare = (grid.cut(image.rgb) for image in images)
+        left, top = grid.region[:2]
+        if pressed.pin_spacing_mm is not None:
+            pins = find_pins(seen, bare, where=tr("Image"))
+            at = pins.pins_px + np.array([left, top])
+            marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in at))
+            x, y = pressed.pin_spacing_mm / pins.spacing_px
+            text = tr("{n} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high.")
+            said = text.format(n=len(at), x=x, y=y)
+        else:
+            disc = find_punch(seen, bare, where=tr("Image"))
+            circle = Circle(left + disc.x, top + disc.y, disc.radius, "good")
+            marks = Overlay(circles=(circle,))
+            wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
+            said = tr("Contact of the punch found: a pixel is {s:.4f} mm wide.").format(s=wide)
+        return Detection(marks, Finding("found", said))
+
+    return or_refusal(detect)
+
+
+class ScaleStep(ImageStep):
+    """Measures the size of a pixel on images of a pressed pin grid or flat punch."""
+
+    of = SCALE
+    task = tr(
+        "Press the pin grid or the flat punch straight into the membrane, at a new place for "
+        "each image."
+    )
+    assembly = "indenter"
+    frames, wanted = 4, 3
+    advice = tr("The size of a pixel is measured on it. Its own size is stated in the set-up.")
+
+    def detector(self, name: str) -> Detector:
+        """Return the detection of the pressed object beside the background."""
+        session = self.session
+        files = session.found("background")
+        if not files:
+            return too_early
+        stated, response = session.in_place or InPlace(), session.response
+
+        def detect(rgb: Rgb, bare: Rgb | None) -> Detection:
+            assert bare is not None  # there is a file
+            return detect_scale(rgb, bare, stated=stated, response=response)
+
+        return beside(files, detect)
+
+    def depends_on(self) -> tuple[Any, ...]:
+        """Return the size of the pressed object, and the background."""
+        session = self.session
+        return session.in_place, session.found("background")
 
 
 @dataclass(frozen=True)
@@ -129,13 +204,10 @@ class Progress:
         Mean error of the normals of presses that were left out.
     gain : float or None
         Relative decrease of the error by one more press; None with too few presses.
-    next_mm : (x, y) or None
-        Where the next press helps most; None if more presses do not help.
     """
 
     error_deg: float
     gain: float | None
-    next_mm: Point | None
 
     @property
     def settled(self) -> bool:
@@ -154,14 +226,8 @@ class Progress:
 
 def progress_of(run: Slopes) -> Progress:
     """Return the progress of an in-place calibration."""
-    result, gain = run.result, expected_gain(run.result)
-    errors = [press.held_out.normal_deg for press in result.presses]
-    settled = gain is not None and gain < SETTLED
-    return Progress(
-        float(np.mean(errors)),
-        gain,
-        None if settled else result.next_position_mm,
-    )
+    errors = [press.held_out.normal_deg for press in run.result.presses]
+    return Progress(float(np.mean(errors)), expected_gain(run.result))
 
 
 ASKED = ("next_ball_gain_percent", "balls_used")
@@ -171,47 +237,43 @@ ASKED = ("next_ball_gain_percent", "balls_used")
 class InPlaceBallsStep(BallsStep):
     """Asks for presses until more do not help."""
 
-    step = step_of(
-        BALLS,
-        tr("Press the ball where the ring is, and hold it still."),
-        "ball",
-        frames=4,
-        wanted=ENOUGH_BALLS,
-        least=LEAST_PRESSES,
-        advice=tr("Its slopes must be as steep as what you want to measure."),
-    )
+    of = BALLS
+    task = tr("Press the ball where the ring is, and hold it still.")
+    assembly = "ball"
+    frames, wanted, least = 4, ENOUGH_BALLS, LEAST_PRESSES
+    advice = tr("Its slopes must be as steep as what you want to measure.")
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball beside the background."""
-        session = self.model.project.session
+        session = self.session
         files = session.found("background")
         if not files:
             return too_early
         run, stated = self._run(), session.in_place or InPlace()
         if stated.mm_per_px is None:
-            scale = self.model.project.results.get(SCALE)
+            scale = self.results.get(SCALE)
             if scale is None:
                 return too_early
             stated = replace(stated, mm_per_px=scale.mm_per_px)
         detect = partial(
             detect_ball_in_place,
             untouched=Untouched(files[-1], stated, session.response),
-            radius_mm=self.radius.radius_mm,
+            radius_mm=self.radius_mm,
         )
         if name:
             return self.of_capture(name, partial(detect, editable=True), Overlay())
         if run is None:
             return detect
-        pixels, next_mm = run.result.model.grid.to_pixels, progress_of(run).next_mm
+        pixels, next_mm = run.result.model.grid.to_pixels, run.result.next_position_mm
         earlier = pixels(np.array([(x, y) for _name, x, y, *_ in run.balls]))
-        there = () if next_mm is None else pixels(np.array([next_mm]))
+        there = () if progress_of(run).settled else pixels(np.array([next_mm]))
         return partial(detect, marks=press_marks(earlier, there))
 
     def _run(self) -> Slopes | None:
         """Return the calibration of the present presses."""
         state = self.model.statuses["balls"].state
         stale = state in (StageState.EMPTY, StageState.WAITING, StageState.FAIL)
-        return None if stale else self.model.project.results.get(BALLS)
+        return None if stale else self.results.get(BALLS)
 
     @property
     def progress(self) -> Progress | None:
@@ -255,15 +317,15 @@ class InPlaceBallsStep(BallsStep):
             return super().progress_line()
         return tr("{n} captured.").format(n=self.count()) + " " + progress.sentence()
 
-    def show_state(self, state: str, sentence: str) -> None:
-        """Show the state; the effect of one more press is shown beside the number."""
-        if self.progress is not None:
-            figures = self.model.statuses["balls"].quality.figures
-            others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
-            sentence = " ".join(f"{advice}." for advice in others)
-        super().show_state(state, sentence)
+    def explain(self, state: str, sentence: str) -> str:
+        """Return the message; the effect of one more press is shown beside the number."""
+        if self.progress is None:
+            return sentence
+        figures = self.model.statuses["balls"].quality.figures
+        others = QualityTable(tuple(f for f in figures if f.key not in ASKED)).remedies
+        return " ".join(f"{advice}." for advice in others)
 
     def depends_on(self) -> tuple[Any, ...]:
         """Return the radius, the scale and the background."""
-        session = self.model.project.session
+        session = self.session
         return (*super().depends_on(), session.in_place, session.found("background"))

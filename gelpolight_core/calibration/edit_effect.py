@@ -5,16 +5,15 @@ It uses the model of the calibration: the full model once the joint refinement i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.reflectance.lut_model import CurveSet
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
-from gelpolight_core.calibration.edit import edited
+from gelpolight_core.calibration.edit import Curve, edited
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.recipes import JOINT
 from gelpolight_core.reconstruction.reconstructor import SOLVERS
@@ -60,8 +59,12 @@ class Effect:
         return self.profile_mm - self.sphere_mm
 
 
-def ball_effect(run: Run) -> Callable[[CurveSet, str], Effect]:
-    """Return a function of (curves, name of press) that reconstructs the press with those curves.
+EffectOf = Callable[[Mapping[int, Curve], str], Effect]
+"""From nodes (cosines, values) of curves by channel, and the name of a press."""
+
+
+def ball_effect(run: Run) -> EffectOf:
+    """Return what reconstructs a press with other reflectance curves.
 
     Parameters
     ----------
@@ -75,8 +78,7 @@ def ball_effect(run: Run) -> Callable[[CurveSet, str], Effect]:
     def frame(name: str) -> NDArray[np.float32]:
         return read_image(run.session.folder / name, response=calibration.response).rgb
 
-    def effect(edited_curves: CurveSet, name: str) -> Effect:
-        curves = {k: (np.array(c.cosines), np.array(c.values)) for k, c in enumerate(edited_curves)}
+    def effect(curves: Mapping[int, Curve], name: str) -> Effect:
         changed = edited(calibration, curves, operator="", made="")
         solver = SOLVERS[calibration.model](changed.data, workers=1)
         return _compare(solver.depth(frame(name), wanted).depth_mm.astype(np.float64), name, run)

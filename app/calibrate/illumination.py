@@ -1,0 +1,209 @@
+"""The steps whose images are all light: a white board, then the bare membrane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.calibrate.detection import (
+    Detection,
+    Detector,
+    Mask2,
+    beside,
+    enlarged,
+    judged,
+    marked,
+    or_refusal,
+    refuse_grey,
+    share,
+    table_of,
+    working_circle,
+)
+from app.calibrate.image_step import ImageStep
+from app.calibrate.maps import Panel, three_maps
+from app.live.image_checks import Rgb, saturated
+from app.live.overlay import Overlay
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.open_sensor import BACKGROUND, RADIANCE
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.factors.bare_membrane import (
+    CHANGE,
+    area_of,
+    brightness_figure,
+    check_bare_membrane,
+    is_same,
+    local_change,
+    saturated_percent,
+    shrunk,
+)
+from gelpolight_core.finding import Verdict, judge
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
+from gelpolight_core.translation import tr
+
+Float = NDArray[np.float32]
+
+# Specks and squares change the brightness within a fiftieth of the image; light does not.
+SPECK_OF_WIDTH = 0.02
+
+
+def detect_whiteboard(
+    rgb: Rgb, *, table: ResamplingTable | None = None, background: Rgb | None = None
+) -> Detection:
+    """Check the light on the whiteboard.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    table : ResamplingTable, optional
+        Gives the working area; without it the whole image is checked.
+    background : (rows, columns, 3), optional
+        Image of the background stage, if captured; it shows whether the membrane is still mounted.
+    """
+    circle = Overlay(lines=() if table is None else (working_circle(table),))
+
+    def detect() -> Detection:
+        refuse_grey(rgb)
+        area, small = area_of(rgb.shape, table), shrunk(rgb)
+        if background is not None and background.shape == rgb.shape:
+            if is_same(small, shrunk(background), area):  # of the known bare membrane
+                raise InputError(
+                    tr("the image looks the same as the background image"),
+                    where=tr("Image"),
+                    advice=Remedy.WITH_MEMBRANE,
+                )
+        unlit = area & (small.min(axis=2) < LEAST_LIGHT)
+        lit = area & ~unlit
+        inner = _without_edge(lit)
+        change = local_change(small, inner, SPECK_OF_WIDTH * small.shape[1])
+        specks = inner & (change > CHANGE)
+        full = saturated(rgb) > 0
+        marks = Overlay(lines=circle.lines, masks=marked(full, enlarged(specks, rgb)))
+        less = tr("Shorten the exposure until nothing is saturated")
+        flat = tr("Press the board flat onto the surface, or lengthen the exposure")
+        clean = tr("Use a white board without pattern; clean it and the elastomer")
+        even = tr("Dim or move the LEDs to get more even light")
+        # In percent of the area.
+        burnt, spread = saturated_percent(rgb, area), _light_range(small, lit)
+        dark, dirty = (100.0 * share(found, area) for found in (unlit, specks))
+        ratio = tr("Ratio of brightest to darkest area")
+        figures = (
+            brightness_figure(small, area),
+            judge("saturated", tr("Saturated share"), burnt, "%", warn=0.1, fail=10.0, remedy=less),
+            judge("unlit", tr("Unlit share"), dark, "%", warn=10.0, fail=40.0, remedy=flat),
+            judge("specks", tr("Specks and edges"), dirty, "%", warn=3.0, fail=20.0, remedy=clean),
+            judge("light_range", ratio, spread, warn=40.0, remedy=even),
+        )
+        return judged(marks, figures, tr("The whiteboard is well lit."))
+
+    return or_refusal(detect, marks=circle)
+
+
+def _without_edge(lit: Mask2) -> Mask2:
+    """Return the lit area without the mixed pixels at the edge of the board; specks stay in it."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    whole = cv2.morphologyEx(lit.astype(np.uint8), cv2.MORPH_CLOSE, disc)
+    return np.asarray(cv2.erode(whole, disc, borderType=cv2.BORDER_REPLICATE)) > 0
+
+
+def _light_range(small: Float, lit: Mask2) -> float:
+    if not lit.any():
+        return float("inf")
+    inside = small[lit]
+    return float((inside.max(axis=0) / np.percentile(inside, 1.0, axis=0)).max())
+
+
+class LightStep(ImageStep):
+    """Checks the light in an image, beside that of the other such step."""
+
+    other: str
+    """Folder of the other image, and name of the argument of `detect`."""
+    detect: Callable[..., Detection]
+    frames, wanted = 16, 1
+
+    def detector(self, name: str) -> Detector:
+        """Return the check of the light."""
+        # The processing thread must not hold the step.
+        detect, other, table = type(self).detect, self.other, table_of(self.results)
+        return beside(
+            self.session.found(other), lambda rgb, image: detect(rgb, table=table, **{other: image})
+        )
+
+
+class RadianceStep(LightStep):
+    """Checks the light on the white board."""
+
+    other, detect = "background", staticmethod(detect_whiteboard)
+    of = RADIANCE
+    task = tr("Press the white board onto the elastomer, without membrane and without air bubbles.")
+    assembly = "whiteboard"
+    advice = tr("Set the exposure so that nothing is saturated, and do not change it afterwards.")
+    figure = "whiteboard_unlit_percent"
+
+    def result_panels(self) -> tuple[Panel, ...]:
+        """Return the light intensity of each LED."""
+        found, table = self.results.get(RADIANCE), table_of(self.results)
+        if found is None or table is None:
+            return ()
+        text = tr("Light intensity in percent of full scale")
+        return three_maps(found.radiance, found.usable, table.grid, text, unit="%", factor=100.0)
+
+
+def detect_background(
+    rgb: Rgb, *, table: ResamplingTable | None = None, whiteboard: Rgb | None = None
+) -> Detection:
+    """Check the bare membrane: well lit, not saturated, no contact.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    table : ResamplingTable, optional
+        As for :func:`~app.calibrate.illumination.detect_whiteboard`.
+    whiteboard : (rows, columns, 3), optional
+        Image of the whiteboard stage; a press differs from it. Without it, contact is not checked.
+    """
+    circle = Overlay(lines=() if table is None else (working_circle(table),))
+
+    def detect() -> Detection:
+        refuse_grey(rgb)
+        found = check_bare_membrane(rgb, table=table, whiteboard=whiteboard)
+        compared = whiteboard is not None and whiteboard.shape == rgb.shape
+        good = tr("The membrane is well lit and nothing touches it.")
+        if not compared:
+            good = tr("The membrane is well lit. Make sure nothing touches it, then click Capture.")
+        marks = Overlay(
+            lines=circle.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
+        )
+        result = judged(marks, found.quality.figures, good)
+        if result.good and not compared:  # nothing shows whether something touches it
+            return replace(result, finding=replace(result.finding, verdict=Verdict.WARN))
+        return result
+
+    return or_refusal(detect, marks=circle)
+
+
+class BackgroundStep(LightStep):
+    """Checks that the membrane is well lit and untouched."""
+
+    other, detect = "whiteboard", staticmethod(detect_background)
+    of = BACKGROUND
+    task = tr("Mount the membrane, and let nothing touch it.")
+    assembly = "membrane"
+    advice = tr(
+        "Switch automatic exposure and white balance off, and do not change the exposure or "
+        "the light afterwards."
+    )
+
+    def result_panels(self) -> tuple[Panel, ...]:
+        """Return the reflectance factor of each LED."""
+        made, table = self.results.get(REFLECTANCE), table_of(self.results)
+        if made is None or table is None:
+            return ()
+        found = made.factors
+        return three_maps(found.factors, found.usable, table.grid, tr("Reflectance factor"))

@@ -1,0 +1,40 @@
+"""Where the next press of a ball helps most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from gelpolight_core.optics.resampling import ResamplingTable
+
+Point = tuple[float, float]
+
+# A ball pressed in by half its radius has a contact of this radius.
+CONTACT_OF_RADIUS = 0.87
+COARSER = 8
+
+
+def next_press_mm(
+    table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[Point]
+) -> Point | None:
+    """Return the position (x, y) in the working area that is farthest from all earlier presses.
+
+    The first press is in the middle. It is always far enough from the border for the contact of the
+    ball. None if the ball is too large for the field.
+    """
+    pitch_mm = COARSER * table.grid.pitch_mm
+    valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
+    inside_mm = pitch_mm * cv2.distanceTransform(valid, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    points = table.grid.points_mm()[::COARSER, ::COARSER]
+    room = inside_mm > CONTACT_OF_RADIUS * radius_mm
+    if not room.any():
+        return None
+    apart_mm = inside_mm.astype(np.float64)
+    if earlier_mm:
+        away = points[:, :, None] - np.array(earlier_mm, np.float64)
+        apart_mm = np.linalg.norm(away, axis=-1).min(axis=-1)
+    best = np.unravel_index(np.argmax(np.where(room, apart_mm, -1.0)), room.shape)
+    x_mm, y_mm = points[best]
+    return float(x_mm), float(y_mm)
