@@ -2,6 +2,11 @@
 
 ``python -m tests.studies.drift [YEARS]`` simulates the daily light of three LEDs of a sensor. Its
 scatter from day to day is :data:`SCATTER_PERCENT` for each, or wanders (autocorrelation 0.5).
+
+1,000 years: 6 false alarms, at most one in a year; 74 and at most two where the light wanders. A
+drift of 1 % a month after a week or more without one is reported after 8 to 11 days in the median,
+in 99.5 % of 200 trials within two weeks; one that begins with the calibration after 14 days, in
+65 % within two weeks, at the latest after 20.
 """
 
 from __future__ import annotations
