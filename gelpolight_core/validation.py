@@ -65,15 +65,10 @@ class Validation:
 
     def lines(self) -> list[str]:
         """Return it in words: its verdict, object and origin, then each length."""
-        word = {
-            Verdict.PASS: tr("Validated"),
-            Verdict.WARN: tr("Not validated, the uncertainty is too large"),
-            Verdict.FAIL: tr("Validation failed"),
-        }[self.verdict]
         time = parse_time(self.when)
         day = self.when if time is None else f"{time.astimezone():%Y-%m-%d %H:%M}"
         by = tr("by {name}").format(name=self.who) if self.who else ""
-        head = f"{word}: {self.indenter}, {day} {by}".rstrip()
+        head = f"{validation_word(self.verdict)}: {self.indenter}, {day} {by}".rstrip()
         return [head, *(quantity.sentence for quantity in self.comparisons)]
 
     def as_json(self) -> dict[str, Any]:
@@ -92,6 +87,15 @@ class Validation:
             for c in self.comparisons
         ]
         return {**asdict(self), "comparisons": rows, "passed": self.passed}
+
+
+def validation_word(verdict: Verdict) -> str:
+    """Return whether a calibration is validated, from the worst decision on a length."""
+    return {
+        Verdict.PASS: tr("Validated"),
+        Verdict.WARN: tr("Not validated"),
+        Verdict.FAIL: tr("Validation failed"),
+    }[verdict]
 
 
 def decided(comparisons: Sequence[Quantity]) -> Verdict:

@@ -38,7 +38,8 @@ from gelpolight_core.report.evaluation_figure import paint_evaluation
 from gelpolight_core.report.facts import head_facts
 from gelpolight_core.report.file import report_pdf
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, tr
+from gelpolight_core.validation import validation_word
 
 EM_DASH = "\N{EM DASH}"
 
@@ -104,13 +105,12 @@ def validation_of(evaluation: Evaluation) -> Validated:
     evaluation : Evaluation
         Made with the calibration.
     """
-    verdict, word = evaluation_errors(evaluation).verdict, tr("Validated")
-    if len(evaluation.failed) == len(evaluation.results):
-        verdict, word = Verdict.WARN, tr("Not validated")
-    elif verdict is Verdict.FAIL:
-        word = tr("Validation failed")
+    errors = evaluation_errors(evaluation)
+    nothing = len(evaluation.failed) == len(evaluation.results)
+    verdict = Verdict.WARN if nothing else errors.verdict
+    reasons = () if nothing else errors.remedies
     return Validated(
-        f"{word}: {evaluation_sentence(evaluation)}",
+        f"{validation_word(verdict)}: {joined('; ', (evaluation_sentence(evaluation), *reasons))}",
         verdict,
         known_objects(evaluation, tr("Objects of known size")),
         evaluation_json(evaluation),
