@@ -190,14 +190,18 @@ class Interactor(QtInteractor):  # type: ignore[misc]
 
     def paintGL(self) -> None:
         """Draw the scene once, unless its graphics memory is released."""
-        if self._finished:
+        window = self.render_window
+        if self._finished or not window.GetReadyForRendering():
             return
         self.drawings += 1
-        self.iren.interactor.EnableRenderOn()
+        self._in_paint = True
         try:
-            super().paintGL()
+            window.GetState().Reset()  # Qt has drawn since
+            # The interactor would hold Python's lock while it draws, and every other thread.
+            window.Render()
         finally:
-            self.iren.interactor.EnableRenderOff()
+            self._in_paint = False
+        super().paintGL()  # copies the image into the widget
 
     def _on_render(self, *_: object) -> None:
         if not self._in_paint:
