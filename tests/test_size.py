@@ -42,7 +42,7 @@ MOST = {
     "app/theme": 279,
     "app/tools": 334,
     "app/view2d": 1082,
-    "app/view3d": 1536,
+    "app/view3d": 1539,
     "app/widgets": 1017,
     "app/workspace": 621,
     "gelpolight_core/.": 1536,
