@@ -71,7 +71,7 @@ MOST = {
     "gelpolight_core/simulation": 2122,
     "gelpolight_core/studies": 1143,
     "tests/.": 1452,
-    "tests/app": 10792,
+    "tests/app": 10795,
     "tests/batch": 408,
     "tests/calibration": 1735,
     "tests/command_line": 1089,

@@ -124,5 +124,8 @@ def test_the_real_pages_offer_their_exports(context: AppContext, qtbot: QtBot) -
     names = {}
     for name in ("sensors", "measure"):
         names[name] = {action.objectName() for action in window.page(name).export_actions()}
-    assert names == {"sensors": {"sensors.report"}, "measure": {"measure.certify", "records.export"}}
+    assert names == {
+        "sensors": {"sensors.report"},
+        "measure": {"measure.certify", "records.export"},
+    }
     window.close()
