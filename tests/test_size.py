@@ -43,7 +43,7 @@ MOST = {
     "app/tools": 334,
     "app/view2d": 1082,
     "app/view3d": 1539,
-    "app/widgets": 1017,
+    "app/widgets": 1019,
     "app/workspace": 621,
     "gelpolight_core/.": 1536,
     "gelpolight_core/batch": 591,

@@ -15,6 +15,8 @@ from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.plots import apply_theme, bare_plot
 
+DAY_S = 86400.0
+
 
 @dataclass(frozen=True, slots=True)
 class Series:
@@ -68,6 +70,7 @@ class TimeChart(QWidget):
         self.shown: tuple[Series, ...] = ()
         self._unit = ""
         self._plot = bare_plot(bottom=pg.DateAxisItem())
+        self._plot.setLimits(minXRange=DAY_S)  # one value alone shows its day
         self._legend = self._plot.addLegend(offset=(8, 8))
         vbox(self._plot, of=self, margins=0)
         self._draw()

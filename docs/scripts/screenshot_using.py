@@ -137,7 +137,7 @@ def evaluation(operator: Operator) -> None:
     operator.shot("evaluation-press")
     operator.until(lambda: work.run.next() is None, "all presses")
     operator.until(lambda: view._stack.currentWidget() is result, "the result")
-    operator.until(lambda: "presses" in result.verdict.text(), "the evaluation")
+    operator.until(lambda: "(" in result.verdict.text(), "the evaluation")
     operator.window.context.toasts.clear()
     operator.shot("evaluation-result")
 
