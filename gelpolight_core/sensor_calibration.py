@@ -562,8 +562,8 @@ class Calibration:
                 tr("The calibration is of another kind of sensor (model {model})").format(
                     model=self.model
                 ),
-                where=self.identity,
-                advice=Remedy.OTHER_MODEL,
+                self.identity,
+                Remedy.OTHER_MODEL,
             )
         return self.data
 

@@ -131,8 +131,8 @@ def glance(image: LinearImage, board: BoardSpec) -> Array:
         tr("no board with {w} x {h} inner corners was found").format(
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
-        where=image.name,
-        advice=Remedy.SHOW_BOARD,
+        image.name,
+        Remedy.SHOW_BOARD,
     )
 
 

@@ -59,8 +59,8 @@ def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
             tr("the image has {a} x {b} pixels, but the earlier stages used {c} x {d}").format(
                 a=rgb.shape[1], b=rgb.shape[0], c=size[0], d=size[1]
             ),
-            where=tr("Image"),
-            advice=Remedy.SAME_CAMERA,
+            tr("Image"),
+            Remedy.SAME_CAMERA,
         )
 
 

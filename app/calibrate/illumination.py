@@ -74,8 +74,8 @@ def detect_whiteboard(
             if is_same(small, shrunk(background), area):  # of the known bare membrane
                 raise InputError(
                     tr("the image looks the same as the background image"),
-                    where=tr("Image"),
-                    advice=Remedy.WITH_MEMBRANE,
+                    tr("Image"),
+                    Remedy.WITH_MEMBRANE,
                 )
         unlit = area & (small.min(axis=2) < LEAST_LIGHT)
         lit = area & ~unlit

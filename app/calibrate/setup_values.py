@@ -289,8 +289,8 @@ def _region(words: str) -> tuple[int, int, int, int] | None:
         return x, y, width, height
     raise InputError(
         tr("This is not a region (x, y, width, height in pixels): {text}").format(text=words),
-        where=tr("Membrane's region"),
-        advice=Remedy.CORRECT_VALUE,
+        tr("Membrane's region"),
+        Remedy.CORRECT_VALUE,
     )
 
 

@@ -130,8 +130,8 @@ def plan_batch(
     if not len(plan):
         raise InputError(
             tr("There are no frames to reconstruct"),
-            where=", ".join(map(str, inputs)),
-            advice=Remedy.CHOOSE_IMAGES,
+            ", ".join(map(str, inputs)),
+            Remedy.CHOOSE_IMAGES,
         )
     used: set[str] = set()
     for job in plan:
@@ -139,8 +139,8 @@ def plan_batch(
         if name in used:
             raise InputError(
                 tr("Two inputs would have results named {name}").format(name=job.output),
-                where=tr("INPUT"),
-                advice=Remedy.SEPARATE_FOLDERS,
+                tr("INPUT"),
+                Remedy.SEPARATE_FOLDERS,
             )
         used.add(name)
     return plan
@@ -159,14 +159,10 @@ class _Finder:
         """Add an input given by the user."""
         resolved = path.resolve()
         if not resolved.exists():
-            raise InputError(
-                tr("The file or folder does not exist"), where=path, advice=Remedy.CHECK_NAME
-            )
+            raise InputError(tr("The file or folder does not exist"), path, Remedy.CHECK_NAME)
         if resolved.is_relative_to(self._out):
             raise InputError(
-                tr("The input is inside the folder of the results"),
-                where=path,
-                advice=Remedy.CHOOSE_FOLDER,
+                tr("The input is inside the folder of the results"), path, Remedy.CHOOSE_FOLDER
             )
         if resolved.is_dir():
             self._add_folder(path, resolved.name)

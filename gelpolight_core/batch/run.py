@@ -129,8 +129,8 @@ def run_batch(
                     tr("{found}; {n} of {total} frames are done").format(
                         found=error.found, n=progress.before + progress.done, total=progress.total
                     ),
-                    where=error.where,
-                    advice=tr("{advice}. Run the same command again to continue").format(
+                    error.where,
+                    tr("{advice}. Run the same command again to continue").format(
                         advice=error.advice
                     ),
                 ) from error

@@ -77,9 +77,7 @@ def require_same(settings: BatchSettings, out: Path) -> None:
         begun = dict(parse_json(read_file(out / FILE)))
     except (FileNotFoundError, ValueError, TypeError) as error:
         raise InputError(
-            tr("The settings of the run are missing or damaged"),
-            where=out / FILE,
-            advice=Remedy.CLUSTER,
+            tr("The settings of the run are missing or damaged"), out / FILE, Remedy.CLUSTER
         ) from error
     for key, value in settings.as_json().items():
         if begun.get(key) != value:
@@ -87,6 +85,6 @@ def require_same(settings: BatchSettings, out: Path) -> None:
                 tr("The run in this folder was started with {what} {a}, but now it is {b}").format(
                     what=key, a=begun.get(key), b=value
                 ),
-                where=out,
-                advice=Remedy.START_NEW,
+                out,
+                Remedy.START_NEW,
             )

@@ -84,8 +84,8 @@ class _Worker:
         if calibration.identity != settings.calibration_id:
             raise InputError(
                 tr("The calibration was replaced while in use"),
-                where=settings.calibration,
-                advice=Remedy.START_NEW,
+                settings.calibration,
+                Remedy.START_NEW,
             )
         self._reconstructor = Reconstructor(
             calibration, model=settings.model, effort=settings.effort, workers=1
@@ -145,8 +145,8 @@ def _frame(recording: Recording, job: Job, index: int) -> RecordedFrame:
         return recording.frame(index)
     raise InputError(
         tr("Frame {n} has changed since the run was started").format(n=index),
-        where=job.path,
-        advice=tr("Repeat the command, which reads the recording again"),
+        job.path,
+        tr("Repeat the command, which reads the recording again"),
     )
 
 

@@ -127,16 +127,16 @@ def cluster(address: str) -> Iterator[Workers]:
     except ImportError as error:
         raise InputError(
             tr("Dask is not installed"),
-            where="--workers",
-            advice=Remedy.INSTALL.format(package="gelpolight-studio[dask]"),
+            "--workers",
+            Remedy.INSTALL.format(package="gelpolight-studio[dask]"),
         ) from error
     try:
         client = Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
             tr("No Dask scheduler responds at this address (such as tcp://10.0.0.1:8786)"),
-            where=address,
-            advice=Remedy.CLUSTER,
+            address,
+            Remedy.CLUSTER,
         ) from error
     with client:
         # Not pure: the same frames may have to be repeated, and the result is the files.
@@ -152,6 +152,6 @@ def cluster(address: str) -> Iterator[Workers]:
                 tr("The cluster does not work ({reason})").format(
                     reason=str(error).partition("\n")[0] or type(error).__name__
                 ),
-                where=address,
-                advice=Remedy.CLUSTER,
+                address,
+                Remedy.CLUSTER,
             ) from error

@@ -138,8 +138,8 @@ def _require_balls(results: Results) -> None:
                 tr("No ball was found with this background ({label}: {value:.1f} {unit})").format(
                     label=figure.text, value=figure.value, unit=figure.unit
                 ),
-                where=tr("background"),
-                advice=figure.remedy,
+                tr("background"),
+                figure.remedy,
             )
     for ball in balls.seen:
         if ball.fault is not None:
@@ -234,8 +234,8 @@ def placed_contact(
     if not np.isfinite(edge_mm).all():
         raise InputError(
             tr("The circle set by hand extends beyond the visible membrane"),
-            where=tr("balls"),
-            advice=Remedy.MOVE_INSIDE,
+            tr("balls"),
+            Remedy.MOVE_INSIDE,
         )
     middle = edge_mm.mean(axis=0)
     radius_mm = float(np.hypot(*(edge_mm - middle).T).mean())

@@ -130,6 +130,6 @@ def _checked(channel: int, curve: Curve) -> Curve:
         return nodes, shown
     raise InputError(
         found,
-        where=tr("reflectance, {name} channel").format(name=channel_name(channel)),
-        advice=Remedy.MOVE_NODES,
+        tr("reflectance, {name} channel").format(name=channel_name(channel)),
+        Remedy.MOVE_NODES,
     )

@@ -77,9 +77,7 @@ class EditableSession:
         session = session_to_calibrate(folder)
         if not self.recipe.fits(session):
             raise InputError(
-                tr("The session is now of another kind of sensor"),
-                where=folder,
-                advice=Remedy.OPEN_AGAIN,
+                tr("The session is now of another kind of sensor"), folder, Remedy.OPEN_AGAIN
             )
         return session
 

@@ -53,8 +53,8 @@ def refuse_unfit(
                 tr("The image is already in the session, as {name}").format(
                     name=f"{twin.parent.name}/{twin.name}"
                 ),
-                where=path,
-                advice=Remedy.CHOOSE_FILE,
+                path,
+                Remedy.CHOOSE_FILE,
             )
 
 
@@ -79,9 +79,7 @@ def refuse_board(image: LinearImage, boards: Sequence[BoardSpec], *, where: str)
     for inner_corners in {board.inner_corners for board in boards}:
         if find_rough_corners(grey, inner_corners) is not None:
             raise InputError(
-                tr("the checkerboard is still in the image"),
-                where=where,
-                advice=Remedy.REMOVE_BOARD,
+                tr("the checkerboard is still in the image"), where, Remedy.REMOVE_BOARD
             )
 
 

@@ -238,8 +238,8 @@ def _presses(
             tr("there are {n} ball images, {least} are needed").format(
                 n=len(presses), least=LEAST_PRESSES
             ),
-            where=session.folder / "balls",
-            advice=Remedy.PRESS_BALLS,
+            session.folder / "balls",
+            Remedy.PRESS_BALLS,
         )
     return presses, unreadable
 

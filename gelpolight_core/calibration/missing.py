@@ -69,4 +69,4 @@ def refuse_missing(
             "Capture these images; or calibrate in place, from background and balls alone: replace "
             "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."
         )
-    raise InputError(found, where=folder, advice=advice)
+    raise InputError(found, folder, advice)

@@ -403,15 +403,15 @@ def _refuse_unlit(image: LinearImage) -> None:
     if brightest.min() < 0.05:
         raise InputError(
             tr("The image is dark (a channel only reaches {v:.1%})").format(v=brightest.min()),
-            where=f"background/{image.name}",
-            advice=Remedy.LIGHT_ON,
+            f"background/{image.name}",
+            Remedy.LIGHT_ON,
         )
     share = float(saturated(image.rgb).any(axis=2).mean())
     if share > 0.2:
         raise InputError(
             tr("{share:.0%} of the image is saturated").format(share=share),
-            where=f"background/{image.name}",
-            advice=Remedy.SHORTER_EXPOSURE,
+            f"background/{image.name}",
+            Remedy.SHORTER_EXPOSURE,
         )
 
 

@@ -284,8 +284,8 @@ class Project(EditableSession):
                 if not self._is_current(key, found):
                     raise InputError(
                         tr("The stage {stage} has no up-to-date result").format(stage=key),
-                        where=session.folder,
-                        advice=Remedy.COMPLETE_STAGES,
+                        session.folder,
+                        Remedy.COMPLETE_STAGES,
                     )
                 if (fault := self.fault(key)) is not None:
                     raise fault

@@ -200,9 +200,7 @@ class Results:
         result = self.get(stage)
         if result is None:
             raise InputError(
-                tr("An earlier stage has no result yet"),
-                where=stage.title,
-                advice=Remedy.COMPLETE_STAGES,
+                tr("An earlier stage has no result yet"), stage.title, Remedy.COMPLETE_STAGES
             )
         return result
 

@@ -151,8 +151,8 @@ def recipe_of(session: Session, model: str | None = None) -> Recipe:
         tr("The session has no table [in_place]")
         if session.in_place is None
         else tr("The session is of a closed sensor"),
-        where=f"--model {model}",
-        advice=Remedy.REMOVE_OPTION,
+        f"--model {model}",
+        Remedy.REMOVE_OPTION,
     )
 
 

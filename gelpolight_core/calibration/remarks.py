@@ -39,8 +39,8 @@ def write_remark(path: Path, key: str, text: str) -> None:
     except ValueError as error:
         raise InputError(
             tr("The text is not plain text of at most {n} characters").format(n=REMARK_LENGTH),
-            where=path,
-            advice=Remedy.CORRECT_VALUE,
+            path,
+            Remedy.CORRECT_VALUE,
         ) from error
     calibration = read_calibration(path)
     remark: dict[str, Any] = {key: text.strip()}

@@ -142,24 +142,24 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
     if len(design.leds) != 3:
         raise InputError(
             tr("There are {n} LEDs, not one of each colour").format(n=len(design.leds)),
-            where=f"{where} [[leds]]",
-            advice=Remedy.CORRECT_ENTRY,
+            f"{where} [[leds]]",
+            Remedy.CORRECT_ENTRY,
         )
     if design.layers.air_gap_mm <= 0.0:
         raise InputError(
             tr("The layers are {t} mm thick, more than top_distance_mm").format(
                 t=design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
             ),
-            where=f"{where} [layers]",
-            advice=Remedy.CORRECT_VALUE,
+            f"{where} [layers]",
+            Remedy.CORRECT_VALUE,
         )
     if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
         raise InputError(
             tr("The camera has {w} x {h} pixels, more than {n} megapixels").format(
                 w=design.camera.width_px, h=design.camera.height_px, n=MAX_PIXELS // 10**6
             ),
-            where=f"{where} [camera]",
-            advice=Remedy.CORRECT_VALUE,
+            f"{where} [camera]",
+            Remedy.CORRECT_VALUE,
         )
     return design
 
@@ -177,16 +177,16 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
                     tr("{name} is {value}, not a number from {low} to {high}").format(
                         name=name, value=brief(value), low=low, high=high
                     ),
-                    where=where,
-                    advice=Remedy.CORRECT_VALUE,
+                    where,
+                    Remedy.CORRECT_VALUE,
                 )
         elif "choices" in item.metadata:
             choices = item.metadata["choices"]
             if value not in choices:
                 raise InputError(
                     tr("{name} is {value}").format(name=name, value=brief(value)),
-                    where=where,
-                    advice=Remedy.ONE_OF.format(names=", ".join(map(str, choices))),
+                    where,
+                    Remedy.ONE_OF.format(names=", ".join(map(str, choices))),
                 )
         elif hasattr(value, "__dataclass_fields__"):
             _check_ranges(value, where=where, prefix=f"{name}.")
@@ -227,13 +227,13 @@ def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
     """Return a part of a design with the values of a table instead of its defaults."""
     where = f"{where} [{part}]" if part else where
     if not isinstance(table, dict):
-        raise InputError(tr("The value is not a table"), where=where, advice=Remedy.CORRECT_ENTRY)
+        raise InputError(tr("The value is not a table"), where, Remedy.CORRECT_ENTRY)
     known = {item.name for item in fields(default)}
     if unknown := sorted(set(table) - known):
         raise InputError(
             tr("Unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
-            where=where,
-            advice=Remedy.ONE_OF.format(names=", ".join(sorted(known))),
+            where,
+            Remedy.ONE_OF.format(names=", ".join(sorted(known))),
         )
     values = {}
     for name, value in table.items():
@@ -244,8 +244,8 @@ def _read(default: Any, table: Any, *, where: str, part: str) -> Any:
             if not isinstance(value, list):
                 raise InputError(
                     tr("The value is not a list of tables (double brackets)"),
-                    where=f"{where} [[{name}]]",
-                    advice=Remedy.CORRECT_ENTRY,
+                    f"{where} [[{name}]]",
+                    Remedy.CORRECT_ENTRY,
                 )
             kind: Any = type(like[0])
             values[name] = tuple(_read(kind(), v, where=where, part=f"[{name}]") for v in value)
@@ -286,6 +286,6 @@ def _converted(value: Any, like: Any, *, where: str) -> Any:
         kind = tr("a number")
     raise InputError(
         tr("The value is {value}, not {kind}").format(value=brief(value), kind=kind),
-        where=where,
-        advice=Remedy.CORRECT_VALUE,
+        where,
+        Remedy.CORRECT_VALUE,
     )

@@ -48,9 +48,7 @@ def write_board(board: BoardSpec, path: Path) -> None:
     """
     if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("A board is written as PDF, so its name must end in .pdf"),
-            where=path,
-            advice=Remedy.CHOOSE_NAME,
+            tr("A board is written as PDF, so its name must end in .pdf"), path, Remedy.CHOOSE_NAME
         )
     stream = io.BytesIO()
     information = {"Title": caption(board), "Creator": "GelPoLight Studio", "CreationDate": None}
@@ -105,8 +103,8 @@ def _paper(width_mm: float, height_mm: float, board: BoardSpec) -> tuple[float, 
         tr("A board of {w:.0f} x {h:.0f} mm does not fit on an A4 page").format(
             w=width_mm, h=height_mm
         ),
-        where=caption(board),
-        advice=Remedy.BOARD_SIZE,
+        caption(board),
+        Remedy.BOARD_SIZE,
     )
 
 

@@ -82,8 +82,8 @@ def write_heightmap(
         if name not in FORMATS:
             raise InputError(
                 tr("The format {name} is unknown").format(name=repr(name)),
-                where=tr("export"),
-                advice=Remedy.ONE_OF.format(names=", ".join(FORMATS)),
+                tr("export"),
+                Remedy.ONE_OF.format(names=", ".join(FORMATS)),
             )
     surface = mesh_of(heightmap, stride=stride) if MESH_FORMATS.keys() & formats else None
     make_folder(folder)

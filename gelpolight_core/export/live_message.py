@@ -81,8 +81,8 @@ def unpack(parts: Sequence[bytes]) -> tuple[dict[str, Any], dict[str, NDArray[An
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise InputError(
             tr("it is not a height map message that this program can read"),
-            where=tr("stream"),
-            advice=tr("Subscribe to a stream of the same version of the program"),
+            tr("stream"),
+            tr("Subscribe to a stream of the same version of the program"),
         ) from error
     return header, arrays
 

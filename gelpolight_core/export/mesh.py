@@ -63,9 +63,7 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
     used = ~_bad_cells(heightmap, stride)
     if not used.any():
         raise InputError(
-            tr("No part of the surface is in the working area"),
-            where=heightmap.source,
-            advice=Remedy.CHECK_AREA,
+            tr("No part of the surface is in the working area"), heightmap.source, Remedy.CHECK_AREA
         )
     first = np.arange(depth_mm.size, dtype=np.int32).reshape(depth_mm.shape)
     corner, right, below, across = (

@@ -81,8 +81,8 @@ def check_bare_membrane(
         if is_same(small, white, area):
             raise InputError(
                 tr("The image shows the same as the whiteboard image"),
-                where=tr("background"),
-                advice=Remedy.WITH_MEMBRANE,
+                tr("background"),
+                Remedy.WITH_MEMBRANE,
             )
         pressed = _find_pressed(small, white, area)
     full, touched = saturated_percent(image, area), 100.0 * _share(pressed, area)
@@ -120,9 +120,7 @@ def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
     whole = np.asarray(cv2.resize(area, size, interpolation=cv2.INTER_AREA)) > 0.99
     if not whole.any():
         raise InputError(
-            tr("The working area is not in the image"),
-            where=tr("background"),
-            advice=Remedy.CHECK_LENGTHS,
+            tr("The working area is not in the image"), tr("background"), Remedy.CHECK_LENGTHS
         )
     return whole
 

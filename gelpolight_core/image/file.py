@@ -95,8 +95,8 @@ def _check_declared_size(path: Path, data: bytes) -> None:
                 tr("The image declares {w} x {h} pixels, more than {n} megapixels").format(
                     w=width, h=height, n=MAX_PIXELS // 10**6
                 ),
-                where=path,
-                advice=Remedy.SMALLER_IMAGES,
+                path,
+                Remedy.SMALLER_IMAGES,
             )
 
 

@@ -65,8 +65,8 @@ def require_size(size: tuple[int, int], expected: tuple[int, int], *, where: str
             tr("The image has {a} pixels instead of {b}").format(
                 a="x".join(map(str, size)), b="x".join(map(str, expected))
             ),
-            where=where,
-            advice=Remedy.SAME_CAMERA,
+            where,
+            Remedy.SAME_CAMERA,
         )
 
 

@@ -129,7 +129,7 @@ def lit_area(background: Array) -> Mask:
     bright = light > max(0.05 * float(np.quantile(light[::3, ::3], 0.99)), 0.5 * DARK)
     regions, _ = cv2.findContours(bright.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not regions:
-        raise InputError(tr("the image is all black"), where=BACKGROUND, advice=Remedy.LIGHT_ON)
+        raise InputError(tr("the image is all black"), BACKGROUND, Remedy.LIGHT_ON)
     filled = np.zeros(bright.shape, np.uint8)
     cv2.drawContours(filled, [max(regions, key=cv2.contourArea)], -1, 1, cv2.FILLED)
     return filled > 0
@@ -142,8 +142,8 @@ def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str
                 tr(
                     "the array has shape {shape}, not of a colour image of 32x32 pixels or more"
                 ).format(shape=image.shape),
-                where=what,
-                advice=Remedy.CHOOSE_FILE,
+                what,
+                Remedy.CHOOSE_FILE,
             )
     for other, what in ((background, BACKGROUND), (valid, tr("working area"))):
         if other is not None and other.shape[:2] != press.shape[:2]:
@@ -155,8 +155,8 @@ def _check_shapes(press: Array, background: Array, valid: Mask | None, name: str
                     ow=other.shape[1],
                     oh=other.shape[0],
                 ),
-                where=name,
-                advice=Remedy.SAME_CAMERA,
+                name,
+                Remedy.SAME_CAMERA,
             )
 
 
@@ -164,16 +164,16 @@ def _check_exposure(image: Array, area: Mask, name: str) -> None:
     step = max(1, min(image.shape[:2]) // 256)
     inside = image[::step, ::step][area[::step, ::step]]
     if len(inside) == 0:
-        raise InputError(tr("the working area is empty"), where=name, advice=Remedy.CHECK_AREA)
+        raise InputError(tr("the working area is empty"), name, Remedy.CHECK_AREA)
     brightest = inside.max(axis=1)
     if float(np.median(brightest)) < DARK:
-        raise InputError(tr("the image is all black"), where=name, advice=Remedy.LIGHT_ON)
+        raise InputError(tr("the image is all black"), name, Remedy.LIGHT_ON)
     share = float(np.mean(brightest >= SATURATED))
     if share > 0.5:
         raise InputError(
             tr("{share:.0f} % of the image is saturated").format(share=100.0 * share),
-            where=name,
-            advice=Remedy.SHORTER_EXPOSURE,
+            name,
+            Remedy.SHORTER_EXPOSURE,
         )
 
 
@@ -337,8 +337,8 @@ def check_gain(gain: tuple[float, float, float], name: str) -> None:
             tr("a colour channel is {gain:.2f} times as bright as in the background").format(
                 gain=worst
             ),
-            where=name,
-            advice=Remedy.SAME_LIGHT,
+            name,
+            Remedy.SAME_LIGHT,
         )
 
 

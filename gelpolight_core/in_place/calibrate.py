@@ -291,8 +291,8 @@ def _require_presses(found: Sequence[_Press], refused: Mapping[str, InputError])
     )
     raise InputError(
         f"{sentence} ({'; '.join(reasons[:2])})" if reasons else sentence,
-        where="balls",
-        advice=Remedy.PRESS_BALLS,
+        "balls",
+        Remedy.PRESS_BALLS,
     )
 
 
@@ -341,8 +341,8 @@ def _explained(
                     "its shading does not fit a ball of the stated diameter, compared with the "
                     "other presses (slope error {e:.2f}, other presses {m:.2f})"
                 ).format(e=error, m=float(np.median(errors))),
-                where=press.name,
-                advice=Remedy.CHECK_RADIUS,
+                press.name,
+                Remedy.CHECK_RADIUS,
             )
     rest = list(compress(presses, kept))
     _require_presses(rest, refused)

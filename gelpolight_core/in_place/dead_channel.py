@@ -69,6 +69,6 @@ def refuse_dead_channel(images: Sequence[Map], background: Map) -> None:
             tr("The {channel} channel shows no light of its own").format(
                 channel=channel_name(weakest)
             ),
-            where="balls",
-            advice=Remedy.LIGHT_ON,
+            "balls",
+            Remedy.LIGHT_ON,
         )

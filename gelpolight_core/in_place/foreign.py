@@ -99,11 +99,11 @@ def read_foreign(folder: Path) -> ForeignFolder:
 
 def _unusable(found: str, where: Path | str) -> InputError:
     advice = Remedy.CHOOSE_FOLDER
-    return InputError(found, where=where, advice=advice)
+    return InputError(found, where, advice)
 
 
 def _wrong_line(found: str, where: str) -> InputError:
-    return InputError(found, where=where, advice=Remedy.CORRECT_ENTRY)
+    return InputError(found, where, Remedy.CORRECT_ENTRY)
 
 
 def _catalog(folder: Path, table: Path) -> ForeignFolder:
@@ -198,9 +198,7 @@ def _label(path: Path) -> PlacedCircle:
             raise ValueError(radius)
     except (FileNotFoundError, ValueError, KeyError) as error:
         raise InputError(
-            tr("The label contains no circle (center, radius)"),
-            where=path,
-            advice=Remedy.CORRECT_FILE,
+            tr("The label contains no circle (center, radius)"), path, Remedy.CORRECT_FILE
         ) from error
     return PlacedCircle(float(x), float(y), radius)
 

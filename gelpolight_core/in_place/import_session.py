@@ -64,15 +64,13 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> Session:
         If background, ball radius or scale is not known, or an image cannot be read or written.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(
-            tr("The folder already contains files"), where=out, advice=Remedy.CHOOSE_FOLDER
-        )
+        raise InputError(tr("The folder already contains files"), out, Remedy.CHOOSE_FOLDER)
     background = stated.background or found.background
     if background is None:
         raise InputError(
             tr("The folder has no image of the untouched membrane"),
-            where=found.form,
-            advice=Remedy.STATE_WITH.format(option="--background"),
+            found.form,
+            Remedy.STATE_WITH.format(option="--background"),
         )
     names = [f"ball_{index:03d}" for index in range(len(found.presses))]
     pairs = list(zip(names, found.presses, strict=True))
@@ -108,8 +106,8 @@ def _radius(press: ForeignPress, stated: Stated) -> float:
     if radius is None:
         raise InputError(
             tr("The folder does not state the diameter of the ball in mm"),
-            where=press.image.parent,
-            advice=Remedy.STATE_WITH.format(option="--ball-diameter"),
+            press.image.parent,
+            Remedy.STATE_WITH.format(option="--ball-diameter"),
         )
     return radius
 
@@ -125,8 +123,8 @@ def _scale(found: ForeignFolder, stated: Stated, background: Path) -> tuple[floa
         return stated.preset.scale_for(columns, rows)
     raise InputError(
         tr("The folder does not state the scale, and no preset is chosen"),
-        where=found.form,
-        advice=Remedy.STATE_WITH.format(option="--mm-per-px"),
+        found.form,
+        Remedy.STATE_WITH.format(option="--mm-per-px"),
     )
 
 
@@ -138,7 +136,7 @@ def _pixels(path: Path) -> tuple[int, int]:
 def _copy(source: Path, target: Path) -> None:
     """Copy an image of a format that a session can contain."""
     if source.suffix.lower() not in SUFFIXES:
-        raise InputError(tr("The image is neither PNG nor TIFF"), where=source, advice=Remedy.PNG)
+        raise InputError(tr("The image is neither PNG nor TIFF"), source, Remedy.PNG)
     read_raw_image(source)
     data = read_file(source, FILE_LIMIT)
     make_folder(target.parent)

@@ -86,8 +86,8 @@ class Preset:
                 tr("The images have {a} pixels; the preset {name} is for the shape {b}").format(
                     a=f"{width_px}x{height_px}", name=self.name, b=f"{width}x{height}"
                 ),
-                where="mm_per_px",
-                advice=tr("Crop and turn the images as the preset states, or state the scale"),
+                "mm_per_px",
+                tr("Crop and turn the images as the preset states, or state the scale"),
             )
         share = width / width_px
         return self.mm_per_px * share, self.mm_per_px_sd * share
@@ -119,8 +119,8 @@ def preset_named(key: str) -> Preset:
         return read_preset(Path(key))
     raise InputError(
         tr('There is no preset or TOML file "{key}"').format(key=brief(key)),
-        where="preset",
-        advice=Remedy.ONE_OF.format(names=", ".join(sorted(known))),
+        "preset",
+        Remedy.ONE_OF.format(names=", ".join(sorted(known))),
     )
 
 

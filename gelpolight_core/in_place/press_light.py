@@ -78,9 +78,7 @@ def press_lights(
             tr("the background looks like {x:.0f} % of the membrane around the balls").format(
                 x=100.0 * untouched
             ),
-            where="background",
-            advice=tr(
-                "Use a background of the same gel, crop, size and exposure as the ball images"
-            ),
+            "background",
+            tr("Use a background of the same gel, crop, size and exposure as the ball images"),
         )
     return found

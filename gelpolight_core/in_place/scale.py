@@ -160,8 +160,8 @@ def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
     if (count := len(found.pins_px)) < LEAST_PINS:
         raise InputError(
             tr("no regular grid of 3 x 3 pins or more was found ({n} pins of one)").format(n=count),
-            where=where,
-            advice=Remedy.STATE_SCALE,
+            where,
+            Remedy.STATE_SCALE,
         )
     # Where a pin's spot is cut off on one side, its centre depends on the smoothing. The error
     # follows from the other smoothing with the nearest result, as that of one of two values.
@@ -229,7 +229,7 @@ def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
     off = np.abs(np.hypot(points[:, 0] - a, points[:, 1] - b) - found.radius)
     if np.mean(off < 2.0 * BLURS_PX[0]) < LEAST_ON_LATTICE:
         raise InputError(
-            tr("no round edge of a pressed punch was found"), where=where, advice=Remedy.STATE_SCALE
+            tr("no round edge of a pressed punch was found"), where, Remedy.STATE_SCALE
         )
     return found
 

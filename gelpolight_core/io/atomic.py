@@ -57,9 +57,7 @@ def write_atomically(
     target = _ordinary_target(path)
     if inside is not None and not target.is_relative_to(os.path.realpath(inside)):
         raise InputError(
-            tr("The path is a link that points outside the folder"),
-            where=path,
-            advice=Remedy.REPLACE_LINK,
+            tr("The path is a link that points outside the folder"), path, Remedy.REPLACE_LINK
         )
     try:
         _write_and_place(target, _temporary_for(target), writer, _place_new if new else os.replace)
@@ -128,9 +126,7 @@ def _ordinary_target(path: Path) -> Path:
     target = Path(os.path.realpath(path))
     if target.exists() and not (target.is_file() or target.is_dir()):
         # Otherwise an ordinary file would replace, for example, /dev/full.
-        raise InputError(
-            tr("The path is a device, not a file"), where=path, advice=Remedy.CHOOSE_FILE
-        )
+        raise InputError(tr("The path is a device, not a file"), path, Remedy.CHOOSE_FILE)
     return target
 
 
@@ -193,7 +189,7 @@ def sync_folder(folder: Path) -> None:
 def cannot_write(error: OSError, path: Path) -> InputError:
     """Return the error for a file that the system does not allow to be written."""
     found, advice = _plain_words(error)
-    return InputError(found, where=path, advice=advice)
+    return InputError(found, path, advice)
 
 
 def _plain_words(error: OSError) -> tuple[str, str]:

@@ -100,8 +100,8 @@ class RunLock(FileLock):
     def _refusal(self, holder: str) -> InputError:
         return InputError(
             tr("This run is being written by {holder}").format(holder=holder),
-            where=self.folder,
-            advice=Remedy.STOP_OTHER,
+            self.folder,
+            Remedy.STOP_OTHER,
         )
 
 
@@ -117,8 +117,8 @@ def _lock(handle: int) -> None:
 def _is_link(path: Path) -> InputError:
     return InputError(
         tr("This file is a link to another file, which would be overwritten"),
-        where=path,
-        advice=Remedy.REPLACE_LINK,
+        path,
+        Remedy.REPLACE_LINK,
     )
 
 

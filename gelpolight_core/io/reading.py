@@ -87,8 +87,8 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
             tr("The file is larger than {n} bytes, the limit for files of this kind").format(
                 n=limit
             ),
-            where=path,
-            advice=Remedy.CHOOSE_FILE,
+            path,
+            Remedy.CHOOSE_FILE,
         )
     return data
 
@@ -185,8 +185,8 @@ def read_toml(path: Path, *, missing: InputError | None = None) -> dict[str, Any
     except ValueError as error:
         raise InputError(
             tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
-            where=path,
-            advice=Remedy.CORRECT_FILE,
+            path,
+            Remedy.CORRECT_FILE,
         ) from error
 
 
@@ -271,8 +271,8 @@ def refuse_newer(version: int, newest: int, path: Path) -> None:
             tr("The file has version {v}, but this program only reads up to version {k}").format(
                 v=version, k=newest
             ),
-            where=path,
-            advice=Remedy.UPDATE,
+            path,
+            Remedy.UPDATE,
         )
 
 
@@ -299,9 +299,7 @@ def refusing(found: str, where: Path | str) -> Iterator[None]:
         raise missing_file(Path(where)) from error
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = brief(str(error).partition("\n")[0], 200) or type(error).__name__
-        raise InputError(
-            found.format(error=reason), where=where, advice=Remedy.REPAIR_FILE
-        ) from error
+        raise InputError(found.format(error=reason), where, Remedy.REPAIR_FILE) from error
 
 
 def read_own(
@@ -398,15 +396,15 @@ def brief(value: Any, most: int = 60) -> str:
 
 def missing_file(path: Path) -> InputError:
     """Return the error for a file that does not exist."""
-    return InputError(tr("The file does not exist"), where=path, advice=Remedy.CHECK_NAME)
+    return InputError(tr("The file does not exist"), path, Remedy.CHECK_NAME)
 
 
 def unreadable(error: OSError, path: Path) -> InputError:
     """Return the error for a file that the system cannot read."""
     return InputError(
         tr("The file cannot be read ({reason})").format(reason=error.strerror or error),
-        where=path,
-        advice=Remedy.CHECK_DISK,
+        path,
+        Remedy.CHECK_DISK,
     )
 
 

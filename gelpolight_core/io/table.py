@@ -42,6 +42,6 @@ def read_csv(path: Path) -> list[tuple[int, list[str]]]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(
             tr("the file is not a table ({error})").format(error=error),
-            where=str(path),
-            advice=tr("Save it again as CSV in UTF-8"),
+            str(path),
+            tr("Save it again as CSV in UTF-8"),
         ) from error

@@ -152,7 +152,7 @@ def refuse_meaningless(health: Health, *, where: str) -> None:
     """
     fault = health.meaningless
     if fault is not None:
-        raise InputError(fault.text, where=where, advice=fault.remedy)
+        raise InputError(fault.text, where, fault.remedy)
 
 
 def as_dict(finding: Finding) -> dict[str, Any]:

@@ -208,16 +208,14 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
     if float(np.quantile(blocks, 0.99)) < LEAST_LIGHT:
         raise InputError(
             tr("The image is dark (brightest value {v:.1%})").format(v=np.quantile(blocks, 0.99)),
-            where=where,
-            advice=Remedy.LIGHT_ON,
+            where,
+            Remedy.LIGHT_ON,
         )
     clear = blocks[(blocks < SATURATED).all(axis=1)]
     lit = clear[clear.max(axis=1, initial=0.0) > LEAST_LIGHT / 2.0]
     if len(lit) < LEAST_BLOCKS:
         raise InputError(
-            tr("The image is saturated in nearly all lit areas"),
-            where=where,
-            advice=Remedy.SHORTER_EXPOSURE,
+            tr("The image is saturated in nearly all lit areas"), where, Remedy.SHORTER_EXPOSURE
         )
     shares = np.median(lit / np.maximum(lit[:, led : led + 1], 1e-6), axis=0)
     strongest = int(np.argmax(shares))
@@ -227,8 +225,8 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
             tr("The {other} channel has {x:.0%} of the {name} channel's light").format(
                 other=channel_name(rival), x=min(shares[rival], 1e3), name=name
             ),
-            where=where,
-            advice=Remedy.SINGLE_LED,
+            where,
+            Remedy.SINGLE_LED,
         )
 
 

@@ -160,8 +160,8 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
     if brightest.max() < 0.05:
         raise InputError(
             tr("The image is black (brightest value {v:.0%})").format(v=brightest.max()),
-            where=where,
-            advice=Remedy.LIGHT_ON,
+            where,
+            Remedy.LIGHT_ON,
         )
     share = float((brightest > 0.25 * brightest.max()).mean())
     if share > BRIGHT_SHARE_LIMIT:
@@ -169,8 +169,8 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
             tr(
                 "{share:.0%} of the image is bright, but only three small spots are expected"
             ).format(share=share),
-            where=where,
-            advice=Remedy.CLEAN_MIRROR,
+            where,
+            Remedy.CLEAN_MIRROR,
         )
 
 
@@ -280,8 +280,8 @@ def _refuse_merged(candidates: list[Spot], where: str) -> None:
                     u=spot.centre_px[0],
                     v=spot.centre_px[1],
                 ),
-                where=where,
-                advice=Remedy.SHORTER_EXPOSURE,
+                where,
+                Remedy.SHORTER_EXPOSURE,
             )
 
 
@@ -292,9 +292,7 @@ def _choose(
     name = channel_name(channel)
     if not own:
         raise InputError(
-            tr("The {name} LED has no spot").format(name=name),
-            where=where,
-            advice=Remedy.MIRROR_VIEW,
+            tr("The {name} LED has no spot").format(name=name), where, Remedy.MIRROR_VIEW
         )
     best, others = own[0], own[1:]
     if others and others[0].flux[channel] > RIVAL_FLUX * best.flux[channel]:
@@ -303,14 +301,14 @@ def _choose(
                 n=1 + sum(s.flux[channel] > RIVAL_FLUX * best.flux[channel] for s in others),
                 name=name,
             ),
-            where=where,
-            advice=Remedy.CLEAN_MIRROR,
+            where,
+            Remedy.CLEAN_MIRROR,
         )
     if best.touches_border:
         raise InputError(
             tr("The {name} spot is cut by the image border").format(name=name),
-            where=where,
-            advice=Remedy.MIRROR_VIEW,
+            where,
+            Remedy.MIRROR_VIEW,
         )
     reason = tr("Fainter than the main spot of the {name} LED: a glint or second reflection")
     return best, [(s, reason.format(name=name)) for s in others]

@@ -119,8 +119,8 @@ def locate_leds(
             tr(
                 "The three light directions lie nearly in one plane (condition number {c:.0f})"
             ).format(c=condition),
-            where=tr("mirror"),
-            advice=Remedy.WIDER_LEDS,
+            tr("mirror"),
+            Remedy.WIDER_LEDS,
         )
     return LightResult(
         positions,

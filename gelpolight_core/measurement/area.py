@@ -49,8 +49,8 @@ class Rectangle:
                 tr("the rectangle of {a:g} x {b:g} mm at ({x:g}, {y:g}) mm has no area").format(
                     a=self.sides_mm[0], b=self.sides_mm[1], x=self.centre_mm[0], y=self.centre_mm[1]
                 ),
-                where=tr("rectangle"),
-                advice=Remedy.CORRECT_VALUE,
+                tr("rectangle"),
+                Remedy.CORRECT_VALUE,
             )
 
     @property
@@ -83,10 +83,8 @@ class Rectangle:
         """Return the error for a rectangle with too few nodes of a map."""
         return InputError(
             tr("the rectangle contains {n} points of the map").format(n=nodes),
-            where=tr("rectangle at ({x:g}, {y:g}) mm").format(
-                x=self.centre_mm[0], y=self.centre_mm[1]
-            ),
-            advice=Remedy.LARGER_AREA,
+            tr("rectangle at ({x:g}, {y:g}) mm").format(x=self.centre_mm[0], y=self.centre_mm[1]),
+            Remedy.LARGER_AREA,
         )
 
 

@@ -245,9 +245,7 @@ def _edge_offsets(
     there = inner & (top > least) & found
     if int(there.sum()) < 5:
         raise InputError(
-            tr("there is no edge near the drawn shape"),
-            where=tr("steepest slope"),
-            advice=Remedy.DRAW_AGAIN,
+            tr("there is no edge near the drawn shape"), tr("steepest slope"), Remedy.DRAW_AGAIN
         )
     return np.asarray(offsets[0] + step * index), there
 
@@ -307,6 +305,4 @@ def _together(points: Array) -> float:
 
 
 def _no_circle() -> InputError:
-    return InputError(
-        tr("no circle goes through these points"), where=tr("circle"), advice=Remedy.PLACE_POINTS
-    )
+    return InputError(tr("no circle goes through these points"), tr("circle"), Remedy.PLACE_POINTS)

@@ -86,8 +86,8 @@ def evaluate_presses(
             tr("{count} of {all} images are missing beside it, first {file}").format(
                 count=len(missing), all=len(table.rows), file=missing[0]
             ),
-            where=folder / "truth.csv",
-            advice=Remedy.TRUTH_ROW,
+            folder / "truth.csv",
+            Remedy.TRUTH_ROW,
         )
     paths = [folder / row.file for row in table.rows]
     truths = [row.truth for row in table.rows]

@@ -209,8 +209,8 @@ def _complete(profile: Profile) -> Mask:
     if not (there[0] and there[-1]):
         raise InputError(
             tr("the section ends outside the working area"),
-            where=tr("profile of {length:.2f} mm").format(length=profile.along_mm[-1]),
-            advice=Remedy.MOVE_INSIDE,
+            tr("profile of {length:.2f} mm").format(length=profile.along_mm[-1]),
+            Remedy.MOVE_INSIDE,
         )
     return there
 

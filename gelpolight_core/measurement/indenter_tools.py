@@ -72,9 +72,7 @@ def measure_heightmap(
     except InputError as error:
         for doubt in heightmap.doubts:
             found = pattern("{cause}; {found}", cause=doubt.text, found=error.found)
-            raise InputError(
-                found, where=error.where, advice=doubt.remedy or error.advice
-            ) from error
+            raise InputError(found, error.where, doubt.remedy or error.advice) from error
         raise
 
 
@@ -89,7 +87,7 @@ def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:
         found = tr("the object may be a {first} or a {second}").format(
             first=proposal.candidates[0], second=proposal.candidates[1]
         )
-    raise InputError(found, where=heightmap.source or tr("height map"), advice=Remedy.CHOOSE_SHAPE)
+    raise InputError(found, heightmap.source or tr("height map"), Remedy.CHOOSE_SHAPE)
 
 
 def mode_error(heightmap: HeightMap) -> ModeError:

@@ -51,9 +51,7 @@ def masked(heightmap: HeightMap, keep: Mask) -> HeightMap:
     before = usable(heightmap)
     if not (before & keep).any():
         raise InputError(
-            tr("the mask leaves out all points with a depth"),
-            where=tr("mask"),
-            advice=Remedy.LARGER_AREA,
+            tr("the mask leaves out all points with a depth"), tr("mask"), Remedy.LARGER_AREA
         )
     flags = heightmap.flags | np.where(keep, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
     percent = 100.0 * float((before & ~keep).sum() / before.sum())
@@ -85,9 +83,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
     for _ in range(3 if mask is None else 1):
         if there.sum() < 3:
             raise InputError(
-                tr("fewer than three points have a depth"),
-                where=tr("levelling"),
-                advice=Remedy.LARGER_AREA,
+                tr("fewer than three points have a depth"), tr("levelling"), Remedy.LARGER_AREA
             )
         left = above_plane(x, y, depth, there)
         middle = float(np.median(left[there]))
@@ -115,8 +111,8 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     if positions.shape != (3, 2):
         raise InputError(
             tr("there are {n} points for a plane, which needs three").format(n=len(positions)),
-            where=tr("levelling"),
-            advice=Remedy.PLACE_POINTS,
+            tr("levelling"),
+            Remedy.PLACE_POINTS,
         )
     depth = depth_at(heightmap, positions[:, 0], positions[:, 1])
     (ax, ay), (bx, by) = positions[1] - positions[0], positions[2] - positions[0]
@@ -126,8 +122,8 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     if not np.isfinite(depth).all() or abs(ax * by - ay * bx) < 1e-3 * longest:
         raise InputError(
             tr("the three points lie on a line, or one has no depth"),
-            where=tr("levelling"),
-            advice=Remedy.PLACE_POINTS,
+            tr("levelling"),
+            Remedy.PLACE_POINTS,
         )
     terms = np.column_stack([np.ones(3), positions])
     level, slope_x, slope_y = np.linalg.solve(terms, depth)
@@ -214,8 +210,8 @@ def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     if not (there & usable(heightmap)).any():
         raise InputError(
             tr("the two height maps do not overlap"),
-            where=f"{heightmap.source}, {earlier.source}",
-            advice=Remedy.SAME_SENSOR,
+            f"{heightmap.source}, {earlier.source}",
+            Remedy.SAME_SENSOR,
         )
     note = tr("Difference to {name}.").format(name=earlier.source)
     left = _without(heightmap, np.where(there, other, heightmap.depth_mm), note)
@@ -239,9 +235,7 @@ def histogram(
     """
     there = usable(heightmap)
     if not there.any():
-        raise InputError(
-            tr("no point has a depth"), where=heightmap.source, advice=Remedy.CHECK_AREA
-        )
+        raise InputError(tr("no point has a depth"), heightmap.source, Remedy.CHECK_AREA)
     counts, edges = np.histogram(heightmap.depth_mm[there].astype(np.float64), bins=bins)
     return counts, edges
 
@@ -301,6 +295,6 @@ def _bad_size(size: float) -> InputError:
         tr(
             "the size of the filter, {size:g}, is neither above 0 mm nor an odd number from 3 to 15"
         ).format(size=size),
-        where=tr("smoothing"),
-        advice=Remedy.CORRECT_VALUE,
+        tr("smoothing"),
+        Remedy.CORRECT_VALUE,
     )

@@ -107,8 +107,8 @@ def measure_object(
     if shape not in MODELS:
         raise InputError(
             tr("unknown shape '{shape}'").format(shape=shape),
-            where=tr("shape"),
-            advice=Remedy.ONE_OF.format(names=", ".join(SHAPES)),
+            tr("shape"),
+            Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
     window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, mode=mode)
     if shape == "ball" and mode is not None and mode.smoothed_mm2:
@@ -139,16 +139,16 @@ def _stated(
     if "edge_radius_mm" not in model.names:
         raise InputError(
             tr("A ball has no edge radius"),
-            where=tr("edge radius"),
-            advice=tr("Leave it out, or measure a cylinder or a cuboid"),
+            tr("edge radius"),
+            tr("Leave it out, or measure a cylinder or a cuboid"),
         )
     if not 0.0 <= edge_radius_mm <= EDGES_MM[-1]:
         raise InputError(
             tr("The edge radius {radius:g} mm is not between 0 and {most:g} mm").format(
                 radius=edge_radius_mm, most=EDGES_MM[-1]
             ),
-            where=tr("edge radius"),
-            advice=tr("Correct it, or leave it out: it is fitted then"),
+            tr("edge radius"),
+            tr("Correct it, or leave it out: it is fitted then"),
         )
     sd_mm = sd_mm or max(STATED_SHARE * edge_radius_mm, STATED_SD_MM)
     return replace(prior, edge_radius_mm=edge_radius_mm, edge_radius_sd_mm=sd_mm, stated=True)
@@ -182,9 +182,7 @@ def find_object(
     depth, x, y, weight = usable_depth(heightmap)
     if min(weight.shape) < 8 or not weight.any():
         raise InputError(
-            tr("no pixel is usable"),
-            where=tr("depth map"),
-            advice=tr("Check the image and the working area"),
+            tr("no pixel is usable"), tr("depth map"), tr("Check the image and the working area")
         )
     regions = find_pressed_regions(depth, x, y, weight > 0.0)
     region = _chosen_region(regions, x, y, seed_mm)
@@ -193,8 +191,8 @@ def find_object(
             tr("the object at ({x:.1f}, {y:.1f}) mm is cut by the border of the map").format(
                 x=region.centre_mm[0], y=region.centre_mm[1]
             ),
-            where=tr("depth map"),
-            advice=Remedy.PRESS_MIDDLE,
+            tr("depth map"),
+            Remedy.PRESS_MIDDLE,
         )
     window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
     blur, known = (window.pitch_mm**2, UNKNOWN_BLUR_MM**2), False
@@ -221,9 +219,7 @@ def _chosen_region(
 ) -> PressedRegion:
     """Return the object at the seed, or the only one."""
     if not regions:
-        raise InputError(
-            tr("no object is pressed"), where=tr("depth map"), advice=Remedy.PRESS_DEEPER
-        )
+        raise InputError(tr("no object is pressed"), tr("depth map"), Remedy.PRESS_DEEPER)
     if seed_mm is not None:
         return _region_at(regions, x_mm, y_mm, seed_mm)
     tall = [r for r in regions if r.height_mm > SECONDARY_SHARE * regions[0].height_mm]
@@ -233,8 +229,8 @@ def _chosen_region(
             tr("{count} objects are pressed, at {places} mm").format(
                 count=len(tall), places=places
             ),
-            where=tr("depth map"),
-            advice=Remedy.CHOOSE_OBJECT,
+            tr("depth map"),
+            Remedy.CHOOSE_OBJECT,
         )
     return tall[0]
 
@@ -252,8 +248,8 @@ def _region_at(
             tr(
                 "no object lies at ({x:g}, {y:g}) mm; the nearest is at ({a:.1f}, {b:.1f}) mm"
             ).format(x=seed_mm[0], y=seed_mm[1], a=nearest.centre_mm[0], b=nearest.centre_mm[1]),
-            where=tr("seed"),
-            advice=Remedy.CHOOSE_OBJECT,
+            tr("seed"),
+            Remedy.CHOOSE_OBJECT,
         )
     return nearest
 

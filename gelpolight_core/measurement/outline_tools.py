@@ -121,6 +121,6 @@ def _check_edge(edge: str) -> None:
     if edge not in EDGES:
         raise InputError(
             tr("unknown edge '{edge}'").format(edge=edge),
-            where=tr("measuring tool"),
-            advice=Remedy.ONE_OF.format(names=", ".join(EDGES)),
+            tr("measuring tool"),
+            Remedy.ONE_OF.format(names=", ".join(EDGES)),
         )

@@ -123,9 +123,7 @@ class Angle:
         arms = positions[[0, 2]] - positions[1]
         if not (np.isfinite(arms).all() and np.hypot(*arms.T).min() > 0.0):
             raise InputError(
-                tr("an arm of the angle has no length"),
-                where=tr("angle"),
-                advice=Remedy.PLACE_POINTS,
+                tr("an arm of the angle has no length"), tr("angle"), Remedy.PLACE_POINTS
             )
 
         def compute(at: Array, depth: Array) -> tuple[float, ...]:
@@ -214,8 +212,8 @@ def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
             tr("the point ({x:g}, {y:g}) mm lies outside the working area").format(
                 x=x_mm[k], y=y_mm[k]
             ),
-            where=tr("measuring tool"),
-            advice=Remedy.MOVE_INSIDE,
+            tr("measuring tool"),
+            Remedy.MOVE_INSIDE,
         )
     return depth
 

@@ -163,16 +163,14 @@ def read_truth(path: Path) -> TruthTable:
         file, shape = record.get("file", ""), record.get("shape", "").lower()
         fault = _file_fault(file, seen)
         if fault is not None:
-            raise InputError(fault[0], where=where, advice=fault[1])
+            raise InputError(fault[0], where, fault[1])
         seen.add(file)
         if shape in MODELS:
             rows.append(_press(file, shape, record, where))
         else:
             skipped.append(file)
     if not rows:
-        raise InputError(
-            tr("no row with a cylinder, cuboid or ball"), where=path, advice=Remedy.TRUTH_ROW
-        )
+        raise InputError(tr("no row with a cylinder, cuboid or ball"), path, Remedy.TRUTH_ROW)
     return TruthTable(tuple(rows), tuple(skipped))
 
 
@@ -195,8 +193,8 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     except FileNotFoundError as error:
         raise InputError(
             tr("The file does not exist"),
-            where=str(path),
-            advice=tr("Put a truth.csv with the columns {names} there").format(
+            str(path),
+            tr("Put a truth.csv with the columns {names} there").format(
                 names="file,shape,diameter_mm,side_mm,height_mm"
             ),
         ) from error
@@ -209,8 +207,8 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     if missing:
         raise InputError(
             tr("the column {names} is missing in the first line").format(names=", ".join(missing)),
-            where=path,
-            advice=Remedy.CORRECT_FILE,
+            path,
+            Remedy.CORRECT_FILE,
         )
     return [
         (line, dict(zip(header, (cell.strip() for cell in cells), strict=False)))
@@ -226,8 +224,8 @@ def _completed(
     if name and name not in known:
         raise InputError(
             tr("'{name}' is not an indenter of session.toml").format(name=brief(name)),
-            where=tr("{path}, line {line}").format(path=path, line=line),
-            advice=Remedy.ONE_OF.format(names=", ".join(known) or f"[{INDENTERS}]"),
+            tr("{path}, line {line}").format(path=path, line=line),
+            Remedy.ONE_OF.format(names=", ".join(known) or f"[{INDENTERS}]"),
         )
     stated = {key: str(value) for key, value in known.get(name, {}).items()}
     return stated | {key: cell for key, cell in record.items() if cell}
@@ -274,4 +272,4 @@ def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHOR
     )
     if value > LONGEST_MM:
         advice = tr("Give a length of at most {most:g} mm").format(most=LONGEST_MM)
-    raise InputError(found.format(key=key, text=brief(text)), where=where, advice=advice)
+    raise InputError(found.format(key=key, text=brief(text)), where, advice)

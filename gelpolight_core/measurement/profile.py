@@ -108,9 +108,7 @@ def take_profile(
     count = there.sum(axis=0)
     if not count.any():
         raise InputError(
-            tr("the line lies outside the working area"),
-            where=tr("profile"),
-            advice=Remedy.MOVE_INSIDE,
+            tr("the line lies outside the working area"), tr("profile"), Remedy.MOVE_INSIDE
         )
     total = np.where(there, depth, 0.0).sum(axis=0)
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
@@ -138,8 +136,8 @@ def _check_line(length: float, width_mm: float, step: float) -> None:
             tr("the line has no length or no valid width ({length:g} mm x {width:g} mm)").format(
                 length=length, width=width_mm
             ),
-            where=tr("profile"),
-            advice=Remedy.DRAW_AGAIN,
+            tr("profile"),
+            Remedy.DRAW_AGAIN,
         )
 
 
@@ -340,8 +338,8 @@ def _crossings(
     if crossings.size < 2 or above[0] != above[-1]:
         raise InputError(
             tr("the profile does not cross {level:.4f} mm twice").format(level=level),
-            where=tr("width of a profile"),
-            advice=Remedy.DRAW_AGAIN,
+            tr("width of a profile"),
+            Remedy.DRAW_AGAIN,
         )
     found = [
         _Crossing(
@@ -366,8 +364,8 @@ def _within(profile: Profile, part_mm: Point, least: int) -> Mask:
             tr("the range from {low:g} to {high:g} mm holds too few points of the map").format(
                 low=low, high=high
             ),
-            where=tr("profile of {length:.2f} mm").format(length=along[-1]),
-            advice=Remedy.LARGER_AREA,
+            tr("profile of {length:.2f} mm").format(length=along[-1]),
+            Remedy.LARGER_AREA,
         )
     return np.asarray(part)
 

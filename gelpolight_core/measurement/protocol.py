@@ -185,7 +185,7 @@ def check_protocol(protocol: Protocol, *, where: str = "protocol") -> Protocol:
         or an object has no room.
     """
     for found, advice in _faults(protocol):
-        raise InputError(found, where=where, advice=advice)
+        raise InputError(found, where, advice)
     return protocol
 
 
@@ -279,9 +279,7 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
     path = folder / FILE_NAME
     if not path.is_file():
         raise InputError(
-            tr("there is no {name}").format(name=FILE_NAME),
-            where=folder,
-            advice=Remedy.CHOOSE_FOLDER,
+            tr("there is no {name}").format(name=FILE_NAME), folder, Remedy.CHOOSE_FOLDER
         )
     with refusing(tr("the protocol cannot be read ({error})"), path):
         content = parse_toml(read_file(path, SIZE_LIMIT))

@@ -190,9 +190,7 @@ class ProtocolRun:
         """
         if press.file not in self._rows:
             raise InputError(
-                tr("this press is not done yet"),
-                where=press.file,
-                advice=tr("Choose a finished press"),
+                tr("this press is not done yet"), press.file, tr("Choose a finished press")
             )
         # The row first: without its row, the image does not count, and no data are lost.
         rows = {file: row for file, row in self._rows.items() if file != press.file}
@@ -235,9 +233,7 @@ def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str
     for name in (FILE_NAME, PRESSES):
         if (folder / name).exists():
             raise InputError(
-                tr("the folder already contains {name}").format(name=name),
-                where=folder,
-                advice=Remedy.START_NEW,
+                tr("the folder already contains {name}").format(name=name), folder, Remedy.START_NEW
             )
     make_folder(folder / PRESSES)
     content = ProtocolFile(protocol, serial, calibration)
@@ -263,8 +259,8 @@ def open_run(folder: Path) -> ProtocolRun:
         if press is None or len(row) != len(COLUMNS) or row[1:-1] != _row(press)[1:-1]:
             raise InputError(
                 tr("the row of {file} does not belong to this protocol").format(file=brief(row[0])),
-                where=presses / TRUTH,
-                advice=Remedy.REPAIR_FILE,
+                presses / TRUTH,
+                Remedy.REPAIR_FILE,
             )
         # A deleted image is requested again.
         if (presses / row[0]).is_file():
@@ -338,9 +334,7 @@ def _read_rows(path: Path) -> list[list[str]]:
         return []
     if not lines or tuple(lines[0]) != COLUMNS:
         raise InputError(
-            tr("the first line is not that of a protocol run"),
-            where=path,
-            advice=Remedy.REPAIR_FILE,
+            tr("the first line is not that of a protocol run"), path, Remedy.REPAIR_FILE
         )
     return lines[1:]
 

@@ -271,8 +271,8 @@ def checked_day(text: str, where: Path | str) -> str:
     except ValueError as error:
         raise InputError(
             tr("'{text}' is not a day").format(text=brief(text)),
-            where=where,
-            advice=tr("Write it as 2027-03-31"),
+            where,
+            tr("Write it as 2027-03-31"),
         ) from error
 
 
@@ -303,15 +303,15 @@ def compare(
             tr("the true shape is a {truth}, but a {shape} was measured").format(
                 truth=truth.shape, shape=measurement.shape
             ),
-            where=tr("truth"),
-            advice=Remedy.CHOOSE_SHAPE,
+            tr("truth"),
+            Remedy.CHOOSE_SHAPE,
         )
     for value in (truth.size_mm, truth.height_mm):
         if value <= 0.0 or math.isinf(value):
             raise InputError(
                 tr("the true size is {value} mm, not greater than zero").format(value=value),
-                where=tr("truth"),
-                advice=Remedy.CORRECT_VALUE,
+                tr("truth"),
+                Remedy.CORRECT_VALUE,
             )
     rows = (
         (truth.size_key, measurement.size_mm, measurement.size_sd_mm, truth.size_mm),

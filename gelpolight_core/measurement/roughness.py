@@ -120,8 +120,8 @@ def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> Parameters
             tr("a line of {length:.2f} mm is shorter than two cut-offs of {cutoff:g} mm").format(
                 length=step * count, cutoff=cutoff_mm
             ),
-            where=tr("profile roughness"),
-            advice=Remedy.DRAW_AGAIN,
+            tr("profile roughness"),
+            Remedy.DRAW_AGAIN,
         )
     first = (count - sections * section) // 2
     errors = profile.errors and replace(profile.errors, depth_mm=profile.errors.depth_mm[:, inside])
@@ -205,8 +205,8 @@ def _check_cutoff(cutoff_mm: float, pitch_mm: float) -> None:
         tr(
             "the cut-off is {cutoff:g} mm, and {least:.2f} mm the least for this map (0.8 is usual)"
         ).format(cutoff=cutoff_mm, least=LEAST_PITCHES * pitch_mm),
-        where=tr("profile roughness"),
-        advice=Remedy.CORRECT_VALUE,
+        tr("profile roughness"),
+        Remedy.CORRECT_VALUE,
     )
 
 
@@ -216,8 +216,6 @@ def _inside(profile: Profile) -> slice:
     whole = there.size > 1 and there.size == there[-1] - there[0] + 1
     if not whole:
         raise InputError(
-            tr("the line crosses points without depth"),
-            where=tr("profile roughness"),
-            advice=Remedy.DRAW_AGAIN,
+            tr("the line crosses points without depth"), tr("profile roughness"), Remedy.DRAW_AGAIN
         )
     return slice(int(there[0]), int(there[-1]) + 1)

@@ -139,7 +139,5 @@ def read_true_depth(path: Path) -> TrueDepth:
 
 def _not_a_truth(path: Path) -> InputError:
     return InputError(
-        tr("the file does not contain the true depth of a press"),
-        where=path,
-        advice=Remedy.CHOOSE_SESSION,
+        tr("the file does not contain the true depth of a press"), path, Remedy.CHOOSE_SESSION
     )

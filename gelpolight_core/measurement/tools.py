@@ -88,8 +88,8 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
     if kind is None:
         raise InputError(
             tr("unknown tool '{name}'").format(name=brief(name)),
-            where=tr("measuring tool"),
-            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
+            tr("measuring tool"),
+            Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     given = {key: value for key, value in content.items() if key != "tool"}
     with refusing(
@@ -112,8 +112,8 @@ def tools_from_json(content: Any) -> tuple[Tool, ...]:
     if not isinstance(content, list) or not content:
         raise InputError(
             tr("there is no measuring tool"),
-            where=tr("measuring tools"),
-            advice=Remedy.ONE_OF.format(names=", ".join(TOOLS)),
+            tr("measuring tools"),
+            Remedy.ONE_OF.format(names=", ".join(TOOLS)),
         )
     tools = []
     for entry in content:

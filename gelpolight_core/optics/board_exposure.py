@@ -40,8 +40,8 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
     if not finite.all():
         raise InputError(
             tr("{n} pixels have no valid value").format(n=int(np.count_nonzero(~finite))),
-            where=name,
-            advice=Remedy.CAPTURE_AGAIN,
+            name,
+            Remedy.CAPTURE_AGAIN,
         )
     # One pixel in 200 at each end may be a glint or a hole.
     low, high = np.percentile(grey[::2, ::2], [0.5, 99.5])
@@ -56,7 +56,7 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
             tr("The image has the same brightness everywhere"),
             Remedy.SHOW_BOARD,
         )
-    raise InputError(found, where=name, advice=advice)
+    raise InputError(found, name, advice)
 
 
 def saturated_share(image: LinearImage, corners: Array) -> float:
@@ -130,6 +130,6 @@ def blur_error(edge_width_px: float, limit_px: float, name: str) -> InputError:
         tr(
             "The image is blurred: edges are {e:.1f} px wide, but at most {m:.1f} px is allowed"
         ).format(e=edge_width_px, m=limit_px),
-        where=name,
-        advice=Remedy.FOCUS,
+        name,
+        Remedy.FOCUS,
     )

@@ -225,8 +225,8 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
             w=board.inner_corners[0],
             h=board.inner_corners[1],
         ),
-        where=name,
-        advice=Remedy.BOARD_SIZE,
+        name,
+        Remedy.BOARD_SIZE,
     )
 
 
@@ -235,8 +235,8 @@ def _larger(board: BoardSpec, name: str) -> InputError:
         tr("The board has more than {w} x {h} inner corners").format(
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
-        where=name,
-        advice=Remedy.BOARD_SIZE,
+        name,
+        Remedy.BOARD_SIZE,
     )
 
 
@@ -250,6 +250,6 @@ def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputErro
         tr("No checkerboard with {w} x {h} inner corners was found").format(
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
-        where=name,
-        advice=Remedy.SHOW_BOARD,
+        name,
+        Remedy.SHOW_BOARD,
     )

@@ -159,7 +159,7 @@ def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     try:
         refuse_unobservable(sd, fit, spread_deg)
         if (nonsense := find_nonsense(camera)) is not None:
-            raise InputError(nonsense, where=tr("checkerboard"), advice=more_views_advice())
+            raise InputError(nonsense, tr("checkerboard"), more_views_advice())
     except InputError as fault:
         raise LensRefusal(fault, views) from fault
     return _assemble(views, fit, held_out, camera, sd, spread_deg, square_pixels)
@@ -217,8 +217,8 @@ def _common_size(images: Sequence[LinearImage]) -> tuple[int, int]:
             tr("There are {n} images, but at least {m} are needed").format(
                 n=len(images), m=MIN_VIEWS
             ),
-            where=tr("checkerboard"),
-            advice=more_views_advice(),
+            tr("checkerboard"),
+            more_views_advice(),
         )
     size = images[0].size
     for image in images:

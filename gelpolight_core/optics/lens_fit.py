@@ -101,9 +101,7 @@ def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> Lens
     solved = [fit for fit in fits if fit is not None and np.isfinite(fit.values).all()]
     if not solved:
         raise InputError(
-            tr("No camera model fits the views"),
-            where=tr("checkerboard"),
-            advice=more_views_advice(),
+            tr("No camera model fits the views"), tr("checkerboard"), more_views_advice()
         )
     return min(solved, key=lambda fit: fit.rms_px)
 

@@ -52,16 +52,16 @@ def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
                 "The views are nearly parallel: the board tilt varies by only {s:.1f} degrees, so "
                 "the focal length is uncertain by {p:.2g} %"
             ).format(s=spread_deg, p=100.0 * focal_sd),
-            where=tr("checkerboard"),
-            advice=more_views_advice(),
+            tr("checkerboard"),
+            more_views_advice(),
         )
     raise InputError(
         tr(
             "The corners do not lie on the stated flat grid (error {r:.2f} px), so the focal "
             "length is uncertain by {p:.2g} % although the board tilt varies by {s:.1f} degrees"
         ).format(r=fit.rms_px, s=spread_deg, p=100.0 * focal_sd),
-        where=tr("checkerboard"),
-        advice=Remedy.FLAT_BOARD,
+        tr("checkerboard"),
+        Remedy.FLAT_BOARD,
     )
 
 

@@ -175,8 +175,8 @@ def require_views(views: Sequence[LensView]) -> None:
         tr("Only {n} of {m} views can be used, but at least {k} are needed ({why})").format(
             n=used, m=len(views), k=MIN_VIEWS, why=left_out_views(views)
         ),
-        where=tr("checkerboard"),
-        advice=max(advices, key=advices.count) if advices else more_views_advice(),
+        tr("checkerboard"),
+        max(advices, key=advices.count) if advices else more_views_advice(),
     )
 
 

@@ -154,7 +154,7 @@ def estimate_top_pose(
     boards = [board_view for board_view, _ in looked if board_view is not None]
     if not boards:
         first = next(refusal for _, refusal in looked if refusal is not None)
-        raise InputError(first.found, where=f"top_pose/{first.where}", advice=first.advice)
+        raise InputError(first.found, f"top_pose/{first.where}", first.advice)
     candidates = [find_poses(seen, camera) for seen in boards]
     reference, margin = choose_side(candidates)
     views = _describe(images, looked, candidates, reference)
@@ -167,8 +167,8 @@ def _check_images(images: Sequence[LinearImage], camera: Camera) -> None:
     if not images:
         raise InputError(
             tr("There is no image of the board on the top surface"),
-            where=tr("top_pose"),
-            advice=Remedy.BOARD_ON_TOP,
+            tr("top_pose"),
+            Remedy.BOARD_ON_TOP,
         )
     for image in images:
         require_size(image.size, (camera.width, camera.height), where=f"top_pose/{image.name}")
@@ -242,8 +242,8 @@ def _refuse_discord(views: Sequence[TopPoseView], count: int) -> None:
         tr("The {n} boards do not lie in one plane ({names})").format(
             n=count, names="; ".join(f"{view.name}: {view.reason}" for view in strays)
         ),
-        where=tr("top_pose"),
-        advice=Remedy.BOARD_ON_TOP,
+        tr("top_pose"),
+        Remedy.BOARD_ON_TOP,
     )
 
 

@@ -72,8 +72,8 @@ def build_stack(
                 "Elastomer and window are {t:.1f} mm thick, but the top surface is only "
                 "{d:.1f} mm away"
             ).format(t=elastomer_thickness_mm + window_thickness_mm, d=distance_mm),
-            where=tr("sensor description"),
-            advice=Remedy.CHECK_LENGTHS,
+            tr("sensor description"),
+            Remedy.CHECK_LENGTHS,
         )
     layers = [
         (air_mm, 1.0),

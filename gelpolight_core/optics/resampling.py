@@ -122,8 +122,8 @@ def build_resampling_table(
             tr("The image has {w} x {h} pixels, more than {n} a side").format(
                 w=camera.width, h=camera.height, n=FLOAT32_MAX_PIXELS
             ),
-            where=tr("camera"),
-            advice=Remedy.SMALLER_IMAGES,
+            tr("camera"),
+            Remedy.SMALLER_IMAGES,
         )
     grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
     points = grid.points_mm()
@@ -207,9 +207,7 @@ def visible_grid(
     high = np.minimum(ahead.max(axis=0, initial=-np.inf), diameter_mm / 2)
     if not (high - low > 2 * pitch_mm).all():
         raise InputError(
-            tr("The camera sees nothing of the working circle"),
-            where="top_pose",
-            advice=Remedy.CHECK_LENGTHS,
+            tr("The camera sees nothing of the working circle"), "top_pose", Remedy.CHECK_LENGTHS
         )
     if not (high - low >= LEAST_NODES * pitch_mm).all():
         raise InputError(
@@ -217,15 +215,15 @@ def visible_grid(
                 "The visible part of the working circle is {x:.2f} x {y:.2f} mm, less than "
                 "{n} pixels"
             ).format(x=high[0] - low[0], y=high[1] - low[1], n=LEAST_NODES),
-            where=tr("sensor description"),
-            advice=Remedy.CHECK_LENGTHS,
+            tr("sensor description"),
+            Remedy.CHECK_LENGTHS,
         )
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_IMAGE * camera.width * camera.height:
         raise InputError(
             tr("The membrane grid would have {n:.1e} nodes").format(n=nodes),
-            where=tr("camera"),
-            advice=Remedy.CHECK_LENGTHS,
+            tr("camera"),
+            Remedy.CHECK_LENGTHS,
         )
     axes = []
     for start, stop in zip(low, high, strict=True):

@@ -123,15 +123,15 @@ def _refuse_hopeless(
             tr("The {name} channel is dark (brightest value {v:.1%})").format(
                 name=name, v=min(brightest)
             ),
-            where=where,
-            advice=Remedy.LIGHT_ON,
+            where,
+            Remedy.LIGHT_ON,
         )
     share = float(saturated[valid].mean())
     if share > 0.3:
         raise InputError(
             tr("{share:.0%} of the working area is saturated").format(share=share),
-            where=where,
-            advice=Remedy.SHORTER_EXPOSURE,
+            where,
+            Remedy.SHORTER_EXPOSURE,
         )
 
 
@@ -154,8 +154,8 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
                     "The {name} channel is lit from the position of the {other} LED in the "
                     "mirror image"
                 ).format(name=name, other=names[best]),
-                where=where,
-                advice=Remedy.MIRROR_AGAIN,
+                where,
+                Remedy.MIRROR_AGAIN,
             )
 
 

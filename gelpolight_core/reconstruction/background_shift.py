@@ -74,8 +74,8 @@ def background_shift(frame: NDArray[Any], calibration: Calibration) -> Backgroun
     if not middle.size or float(np.median(middle)) < DARK - 1.0:
         raise InputError(
             tr("the image is dark where the sensor's membrane is"),
-            where=tr("background"),
-            advice=tr("Switch all three LEDs on"),
+            tr("background"),
+            tr("Switch all three LEDs on"),
         )
     around = seen[check.samples.beside].mean(axis=1)
     touched = bool((np.abs(seen - around) > TOUCHED_SHARE).any())
@@ -116,8 +116,8 @@ def zeroed(
     if not frames:
         raise InputError(
             tr("there is no image of the untouched sensor"),
-            where=tr("zero"),
-            advice=tr("Capture one, with nothing on the sensor"),
+            tr("zero"),
+            tr("Capture one, with nothing on the sensor"),
         )
     for frame in frames:
         _refuse_unfit(background_shift(frame, calibration))
@@ -136,8 +136,8 @@ def _require_size(frame: NDArray[Any], calibration: Calibration) -> None:
             tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
                 shape="x".join(str(n) for n in frame.shape), w=camera.width, h=camera.height
             ),
-            where=tr("background"),
-            advice=tr("Use the calibration of this sensor at this image size"),
+            tr("background"),
+            tr("Use the calibration of this sensor at this image size"),
         )
 
 
@@ -209,4 +209,4 @@ def _refuse_unfit(shift: BackgroundShift) -> None:
                 if shift.touched
                 else tr("the membrane has moved by {px:.1f} px").format(px=figures[0].value)
             )
-            raise InputError(found, where=tr("zero"), advice=figures[0].remedy)
+            raise InputError(found, tr("zero"), figures[0].remedy)

@@ -76,8 +76,8 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     if size not in BYTES_OF_KIND.get(kind, ()):
         raise InputError(
             tr("the image contains values of type {kind}").format(kind=frame.dtype),
-            where=name or tr("image"),
-            advice=Remedy.LINEAR_ARRAY,
+            name or tr("image"),
+            Remedy.LINEAR_ARRAY,
         )
     if kind == "u":
         return frame.astype(frame.dtype.newbyteorder("="), copy=False)
@@ -89,8 +89,8 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
             tr("the median of the image is {value:.4g}, but floats are linear light 0..1").format(
                 value=median
             ),
-            where=name or tr("image"),
-            advice=Remedy.LINEAR_ARRAY,
+            name or tr("image"),
+            Remedy.LINEAR_ARRAY,
         )
     limited: Map = np.clip(frame, 0.0, 1.0).astype(np.float32)
     limited[~np.isfinite(frame)] = np.nan
@@ -274,8 +274,8 @@ def refuse_coplanar_lights(calibration: OpenSensor, leds_mm: NDArray[np.float64]
             tr(
                 "The three light directions lie nearly in one plane (condition number {c:.0f})"
             ).format(c=condition),
-            where=calibration.serial,
-            advice=Remedy.WIDER_LEDS,
+            calibration.serial,
+            Remedy.WIDER_LEDS,
         )
 
 
@@ -303,8 +303,8 @@ def refuse_dark_membrane(calibration: OpenSensor, light: Map) -> None:
             tr("only {share:.1f} % of the membrane is lit by all three LEDs").format(
                 share=100.0 * share
             ),
-            where=calibration.serial,
-            advice=tr("Place the LEDs lower, or calibrate again with more light"),
+            calibration.serial,
+            tr("Place the LEDs lower, or calibrate again with more light"),
         )
 
 

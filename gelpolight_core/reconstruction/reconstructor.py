@@ -96,8 +96,8 @@ class Reconstructor:
                 tr("the calibration was made for the model {made}, not for {model}").format(
                     made=calibration.model, model=self.model
                 ),
-                where=calibration.identity,
-                advice=Remedy.OTHER_MODEL,
+                calibration.identity,
+                Remedy.OTHER_MODEL,
             )
         self._kind.refuse_unfit(calibration.data)
 
@@ -351,7 +351,7 @@ class Reconstructor:
                 tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
                     shape=shape, w=camera.width, h=camera.height
                 ),
-                where=name or tr("image"),
-                advice=Remedy.SAME_SENSOR,
+                name or tr("image"),
+                Remedy.SAME_SENSOR,
             )
         return self.calibration.data.bad_pixels.left_out(accepted(frame, name=name))

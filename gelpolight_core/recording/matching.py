@@ -33,8 +33,8 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
             tr("The recording is of sensor {a}, but the calibration is of sensor {b}").format(
                 a=recorded, b=calibrated
             ),
-            where=recording.path,
-            advice=Remedy.SAME_SENSOR,
+            recording.path,
+            Remedy.SAME_SENSOR,
         )
     if len(recording):
         camera = calibration.camera

@@ -62,7 +62,7 @@ class RecordingWriter(Closing):
             self._file: int | None = os.open(path, flags, 0o666)
         except FileExistsError as error:
             raise InputError(
-                tr("A file with this name already exists"), where=path, advice=Remedy.CHOOSE_NAME
+                tr("A file with this name already exists"), path, Remedy.CHOOSE_NAME
             ) from error
         except OSError as error:
             raise cannot_write(error, path) from error

@@ -74,7 +74,7 @@ def in_plain_words(path: Path) -> Iterator[None]:
         yield
     except (sqlite3.Error, UnicodeDecodeError) as error:
         found, advice = _plain_words(error)
-        raise InputError(found, where=path, advice=advice) from error
+        raise InputError(found, path, advice) from error
 
 
 def is_damage(error: sqlite3.Error | UnicodeDecodeError) -> bool:

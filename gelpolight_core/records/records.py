@@ -249,8 +249,8 @@ class Records(Closing):
             if changed.rowcount != 1:
                 raise InputError(
                     tr("Measurement {number} does not exist").format(number=number),
-                    where=self.path,
-                    advice=Remedy.OPEN_AGAIN,
+                    self.path,
+                    Remedy.OPEN_AGAIN,
                 )
 
     def _know(self, connection: sqlite3.Connection, serial: str, calibration_id: str) -> None:

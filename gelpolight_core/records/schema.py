@@ -107,8 +107,8 @@ def refuse_other_tables(connection: sqlite3.Connection, path: Path) -> None:
     if _tables(connection) != wanted:
         raise InputError(
             tr("The records contain other tables than those of this program"),
-            where=path,
-            advice=Remedy.REPAIR_FILE,
+            path,
+            Remedy.REPAIR_FILE,
         )
 
 
@@ -125,7 +125,7 @@ def _version(connection: sqlite3.Connection, path: Path) -> int:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if tables and owner != APPLICATION_ID:
         raise InputError(
-            tr("The file is a database of another program"), where=path, advice=Remedy.CHOOSE_FOLDER
+            tr("The file is a database of another program"), path, Remedy.CHOOSE_FOLDER
         )
     refuse_newer(version, len(MIGRATIONS), path)
     return int(version) if tables else 0

@@ -139,8 +139,8 @@ def indentation_at(
     ):
         raise InputError(
             tr("the contact placed by hand reaches beyond the working area"),
-            where=name,
-            advice=Remedy.MOVE_INSIDE,
+            name,
+            Remedy.MOVE_INSIDE,
         )
     turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
     points = np.stack(

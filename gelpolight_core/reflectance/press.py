@@ -145,9 +145,7 @@ def find_ball(
     inside = usable & _within(table, seen, INSIDE * contact)
     pixels = _shaded_pixels(image, background, table, inside)
     if not pixels.weight.any():
-        raise InputError(
-            tr("no lit pixel of the contact can be used"), where=name, advice=Remedy.CHECK_EXPOSURE
-        )
+        raise InputError(tr("no lit pixel of the contact can be used"), name, Remedy.CHECK_EXPOSURE)
     pose, misfit, sd = refine_centre(pixels, start, led_positions_mm)
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
     return BallPress(
@@ -159,7 +157,7 @@ def larger_contact(contact_mm: float, radius_mm: float, name: str) -> InputError
     """Return the error that a contact is larger than the ball that is stated."""
     text = tr("the contact is {c:.2f} mm wide, the ball's diameter is stated as {d:.2f} mm")
     text = text.format(c=2.0 * contact_mm, d=2.0 * radius_mm)
-    return InputError(text, where=name, advice=Remedy.CHECK_RADIUS)
+    return InputError(text, name, Remedy.CHECK_RADIUS)
 
 
 def _on_grid(placed: PlacedContact, table: ResamplingTable) -> Circle:

@@ -136,9 +136,7 @@ def calibrate_reflectance(
         If there is no press, or a channel's scatter is too poor for a curve.
     """
     if not presses:
-        raise InputError(
-            tr("no ball press can be used"), where=tr("balls"), advice=Remedy.PRESS_BALLS
-        )
+        raise InputError(tr("no ball press can be used"), tr("balls"), Remedy.PRESS_BALLS)
     scatter = ball_scatter(presses, images, table, led_positions_mm, radiance, factors)
     fits = [
         fit_channel(cosines, values, name=channel_name(k))

@@ -183,7 +183,7 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
 
 
 def _poor(name: str, text: str, *, n: int) -> InputError:
-    return InputError(text.format(name=name, n=n), where=tr("balls"), advice=Remedy.PRESS_BALLS)
+    return InputError(text.format(name=name, n=n), tr("balls"), Remedy.PRESS_BALLS)
 
 
 def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Array]:

@@ -177,7 +177,5 @@ def refuse_other_endings(path: Path) -> None:
     """
     if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("A report is written as PDF, so its name must end in .pdf"),
-            where=path,
-            advice=Remedy.CHOOSE_NAME,
+            tr("A report is written as PDF, so its name must end in .pdf"), path, Remedy.CHOOSE_NAME
         )

@@ -189,8 +189,8 @@ def _fit_channel(series: Series) -> _Channel:
                 "No exposure can be checked against the others: no part of the scene is well "
                 "exposed in three images"
             ),
-            where="response",
-            advice=Remedy.MORE_EXPOSURES,
+            "response",
+            Remedy.MORE_EXPOSURES,
         )
     # Small errors of the stated exposure times bend the curve more than pixel noise does.
     uncertainty = max(REPEATABILITY, float(np.median(known)))
@@ -235,17 +235,15 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
     span = float(times_ms.max() / times_ms.min()) if count else 0.0
     # Stated times are rounded: 0.5 to 2.0 ms is a factor of four.
     if count < LEAST_IMAGES or span < LEAST_SPAN * (1.0 - 1e-6):
-        raise InputError(
-            found.format(n=count, r=span), where="response", advice=Remedy.MORE_EXPOSURES
-        )
+        raise InputError(found.format(n=count, r=span), "response", Remedy.MORE_EXPOSURES)
 
 
 def _refuse_unsteady(residual: float) -> None:
     if residual > LARGEST_RESIDUAL:
         raise InputError(
             tr("The images disagree by {x:.1%} of their light").format(x=residual),
-            where="response",
-            advice=Remedy.STEADY_SERIES,
+            "response",
+            Remedy.STEADY_SERIES,
         )
 
 
@@ -253,8 +251,8 @@ def _refuse_unknown(departure_sd: float) -> None:
     if departure_sd > LARGEST_SD:
         raise InputError(
             tr("The response curve is uncertain by {x:.1%} of full scale").format(x=departure_sd),
-            where="response",
-            advice=Remedy.MORE_EXPOSURES,
+            "response",
+            Remedy.MORE_EXPOSURES,
         )
 
 

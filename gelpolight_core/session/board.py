@@ -42,16 +42,16 @@ class BoardSpec:
                 tr("The board has {w} x {h} inner corners, fewer than 3 x 3").format(
                     w=self.inner_corners[0], h=self.inner_corners[1]
                 ),
-                where=tr("checkerboard"),
-                advice=Remedy.BOARD_SIZE,
+                tr("checkerboard"),
+                Remedy.BOARD_SIZE,
             )
         if not (math.isfinite(self.square_mm) and self.square_mm > 0.0):
             raise InputError(
                 tr("The side of the squares is {s} mm, not greater than zero").format(
                     s=self.square_mm
                 ),
-                where=tr("checkerboard"),
-                advice=Remedy.BOARD_SIZE,
+                tr("checkerboard"),
+                Remedy.BOARD_SIZE,
             )
 
     @property

@@ -36,9 +36,7 @@ def write_description(session: Session) -> None:
     """
     if fault := serial_fault(session.serial):
         raise InputError(
-            tr("The serial number {what}").format(what=fault),
-            where=session.folder,
-            advice=Remedy.CORRECT_VALUE,
+            tr("The serial number {what}").format(what=fault), session.folder, Remedy.CORRECT_VALUE
         )
     radii: dict[str, float] = dict(session.ball_radii_mm)
     if session.ball_default_radius_mm is not None:
@@ -67,9 +65,7 @@ def create_session(session: Session) -> None:
     path: Path = session.folder / FILE_NAME
     if path.exists():
         raise InputError(
-            tr("The folder already contains a session"),
-            where=session.folder,
-            advice=Remedy.CHOOSE_FOLDER,
+            tr("The folder already contains a session"), session.folder, Remedy.CHOOSE_FOLDER
         )
     make_folder(session.folder)
     write_description(session)

@@ -45,8 +45,8 @@ def refuse_copies(files: Iterable[Path]) -> None:
                 tr("The image is a copy of {first}").format(
                     first=f"{first.parent.name}/{first.name}"
                 ),
-                where=path,
-                advice=Remedy.CAPTURE_AGAIN,
+                path,
+                Remedy.CAPTURE_AGAIN,
             )
 
 
@@ -102,8 +102,8 @@ class KnownFiles:
         if path in self.changed():
             raise InputError(
                 tr("Another program has changed the file since it was read; nothing was written"),
-                where=path,
-                advice=Remedy.REPEAT_CHANGE,
+                path,
+                Remedy.REPEAT_CHANGE,
             )
 
 

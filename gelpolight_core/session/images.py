@@ -67,8 +67,8 @@ class SessionImages:
                 tr("The stage has no images")
                 if not self.captured(stage)
                 else tr("All images of the stage are excluded"),
-                where=self.folder / stage,
-                advice=Remedy.CAPTURE_STAGE,
+                self.folder / stage,
+                Remedy.CAPTURE_STAGE,
             )
         return found
 
@@ -166,8 +166,8 @@ class SessionImages:
         if radius is None:
             raise InputError(
                 tr('[balls] has neither "{name}" = radius in mm nor a default').format(name=name),
-                where=self.folder / "session.toml",
-                advice=Remedy.STATE_IN_SESSION,
+                self.folder / "session.toml",
+                Remedy.STATE_IN_SESSION,
             )
         return radius
 
@@ -185,8 +185,8 @@ class SessionImages:
             tr("[balls] lists {stray}, which does not exist, but not {name}").format(
                 stray=strays[0], name=name
             ),
-            where=self.folder / "session.toml",
-            advice=Remedy.CORRECT_ENTRY,
+            self.folder / "session.toml",
+            Remedy.CORRECT_ENTRY,
         )
 
 
@@ -247,15 +247,11 @@ def read_raw_image(path: Path) -> tuple[NDArray[Any], bool]:
     raw = decode_image(path)
     if raw is None:
         raise InputError(
-            tr("The file is not a complete PNG or TIFF image"),
-            where=path,
-            advice=Remedy.CAPTURE_AGAIN,
+            tr("The file is not a complete PNG or TIFF image"), path, Remedy.CAPTURE_AGAIN
         )
     if raw.dtype not in (np.uint8, np.uint16):
         raise InputError(
-            tr("The image contains {kind} values").format(kind=raw.dtype),
-            where=path,
-            advice=Remedy.PNG,
+            tr("The image contains {kind} values").format(kind=raw.dtype), path, Remedy.PNG
         )
     grey = raw.ndim == 2
     bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
@@ -278,15 +274,13 @@ def require_colour(image: LinearImage, *, where: str) -> None:
         If the channels are equal, because the camera is monochrome or everything is saturated.
     """
     if float(image.rgb.min()) >= 1.0:
-        raise InputError(
-            tr("The image is saturated everywhere"), where=where, advice=Remedy.SHORTER_EXPOSURE
-        )
+        raise InputError(tr("The image is saturated everywhere"), where, Remedy.SHORTER_EXPOSURE)
     rgb = image.rgb
     same = image.grey or bool(
         np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
     )
     if same and float(rgb.max()) > 0.0:
-        raise InputError(tr("The image is grey"), where=where, advice=Remedy.CAPTURE_COLOUR)
+        raise InputError(tr("The image is grey"), where, Remedy.CAPTURE_COLOUR)
 
 
 Frame = NDArray[Any]
@@ -325,5 +319,5 @@ def write_image(rgb: Frame, path: Path, *, new: bool = False, inside: Path | Non
     make_folder(path.parent)
     done, data = cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]))
     if not done:
-        raise InputError(tr("The image cannot be encoded"), where=path, advice=Remedy.CAPTURE_AGAIN)
+        raise InputError(tr("The image cannot be encoded"), path, Remedy.CAPTURE_AGAIN)
     write_atomically(path, lambda stream: stream.write(data.tobytes()), new=new, inside=inside)

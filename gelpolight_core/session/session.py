@@ -210,9 +210,7 @@ class Session(SessionImages):
             if name not in names:
                 found = tr("[response] lists {name}, but there is no such image")
             raise InputError(
-                found.format(name=name),
-                where=self.folder / "session.toml",
-                advice=Remedy.CORRECT_FILE,
+                found.format(name=name), self.folder / "session.toml", Remedy.CORRECT_FILE
             )
         return images, tuple(self.exposures_ms[image.name] for image in images)
 
@@ -230,8 +228,8 @@ class Session(SessionImages):
                 tr("The folder contains {found} instead of red, green and blue").format(
                     found=", ".join(path.name for path in self.files("single_led"))
                 ),
-                where=self.folder / "single_led",
-                advice=Remedy.SINGLE_LED,
+                self.folder / "single_led",
+                Remedy.SINGLE_LED,
             )
         return tuple(by_name[name] for name in CHANNEL_KEYS)
 
@@ -262,7 +260,7 @@ def read_description(folder: Path) -> dict[str, Any]:
         If the folder or file is missing or is not TOML.
     """
     path = folder / "session.toml"
-    missing = InputError(tr("There is no session.toml"), where=folder, advice=Remedy.CHOOSE_SESSION)
+    missing = InputError(tr("There is no session.toml"), folder, Remedy.CHOOSE_SESSION)
     return read_toml(path, missing=missing)
 
 
@@ -350,8 +348,8 @@ def _parse_in_place(top: Table) -> dict[str, Any]:
     if found.mm_per_px is None and not one:
         raise InputError(
             tr("[in_place] has no mm_per_px, pin_spacing_mm or punch_diameter_mm"),
-            where=top.path,
-            advice=Remedy.STATE_IN_SESSION,
+            top.path,
+            Remedy.STATE_IN_SESSION,
         )
     return {"sensor": SensorData(_parse_serial(sensor)), "in_place": found}
 

@@ -29,7 +29,7 @@ class Table:
         """Return the error for a key; `what` is ignored if the key is missing."""
         if key not in self.content:
             what = tr("is missing")
-        return InputError(f"{self._key(key)} {what}", where=self.path, advice=Remedy.CORRECT_ENTRY)
+        return InputError(f"{self._key(key)} {what}", self.path, Remedy.CORRECT_ENTRY)
 
     def text(self, key: str) -> str:
         """Return a text that is not empty."""
@@ -102,6 +102,6 @@ class Table:
             if key not in known:
                 raise InputError(
                     tr("The key {key} is unknown").format(key=self._key(key)),
-                    where=self.path,
-                    advice=Remedy.CORRECT_ENTRY,
+                    self.path,
+                    Remedy.CORRECT_ENTRY,
                 )

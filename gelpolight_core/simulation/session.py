@@ -121,9 +121,7 @@ def simulate_session(
     """
     out = Path(out)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(
-            tr("The folder already contains files"), where=out, advice=Remedy.CHOOSE_FOLDER
-        )
+        raise InputError(tr("The folder already contains files"), out, Remedy.CHOOSE_FOLDER)
     sensor = VirtualSensor(design.scaled(scale), seed)
     made = not out.exists()
     stages = CLOSED_STAGES if closed else session_stages(design)

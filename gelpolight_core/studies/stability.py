@@ -209,8 +209,8 @@ def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
         if name not in known:
             raise InputError(
                 tr("there is no case {name!r}").format(name=name),
-                where="--only",
-                advice=Remedy.ONE_OF.format(names=", ".join(sorted(known))),
+                "--only",
+                Remedy.ONE_OF.format(names=", ".join(sorted(known))),
             )
     return tuple(case for case in cases if case.name in asked or case.subject in asked)
 

@@ -181,8 +181,8 @@ def measure_session(
     if not rows:
         raise InputError(
             tr("No press of a cylinder or cuboid was found"),
-            where=folder / "presses" / "truth.csv",
-            advice=Remedy.CHOOSE_SESSION,
+            folder / "presses" / "truth.csv",
+            Remedy.CHOOSE_SESSION,
         )
     solvers = dict(reversed(solvers_of(calibration).items()))
     radius_mm = scored_radius_mm(calibration.open_sensor.sensor)
@@ -217,8 +217,8 @@ def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
             tr("The presses are of {one}, the calibration is of {other}").format(
                 one=serial, other=calibration.serial
             ),
-            where=where,
-            advice=Remedy.SAME_SENSOR,
+            where,
+            Remedy.SAME_SENSOR,
         )
 
 

@@ -71,8 +71,8 @@ class WorkingGrid:
                 ).format(
                     region=list(self.region), w=self.image.width, h=self.image.height, n=LEAST_NODES
                 ),
-                where="region_px",
-                advice=Remedy.STATE_IN_SESSION,
+                "region_px",
+                Remedy.STATE_IN_SESSION,
             )
 
     def __repr__(self) -> str:

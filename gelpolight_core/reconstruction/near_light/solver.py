@@ -154,8 +154,8 @@ class NearLightSolver(OpenSolver):
         if calibration.full is None:
             raise InputError(
                 tr("the calibration was made for the paper's model only"),
-                where=calibration.serial,
-                advice=Remedy.OTHER_MODEL,
+                calibration.serial,
+                Remedy.OTHER_MODEL,
             )
         refuse_coplanar_lights(calibration, calibration.full.led_positions_mm)
         refuse_dark_membrane(calibration, calibration.full.background)
