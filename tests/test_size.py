@@ -39,7 +39,7 @@ MOST = {
     "app/shell": 1222,
     "app/sources": 2394,
     "app/start": 135,
-    "app/theme": 279,
+    "app/theme": 280,
     "app/tools": 334,
     "app/view2d": 1082,
     "app/view3d": 1539,

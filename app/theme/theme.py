@@ -30,6 +30,7 @@ COLOURS = {
     "light": ("#ffffff", "#2d323b"),
     "highlight": ("#1a63c5", "#2a6fd0"),
     "highlighted": ("#ffffff", "#ffffff"),
+    "bar": ("#a9c8f0", "#1f4a80"),
     "accent": ("#1259b8", "#78b4f8"),
     "pass": ("#17652f", "#5fce84"),
     "warn": ("#7f4d00", "#f2b75f"),
@@ -136,7 +137,7 @@ QScrollBar::handle:hover {{ background: {muted}; }}
 QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
 QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
 QProgressBar {{ background: {button}; border: none; border-radius: 4px; text-align: center; }}
-QProgressBar::chunk {{ background: {highlight}; border-radius: 4px; }}
+QProgressBar::chunk {{ background: {bar}; border-radius: 4px; }}
 QCheckBox::indicator, QGroupBox::indicator, QAbstractItemView::indicator {{
     width: 14px; height: 14px; border: 1px solid {muted}; border-radius: 3px; background: {base}; }}
 QCheckBox::indicator:hover, QCheckBox::indicator:focus, QGroupBox::indicator:hover {{
