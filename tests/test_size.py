@@ -81,7 +81,7 @@ MOST = {
     "tests/docs": 423,
     "tests/export": 518,
     "tests/factors": 76,
-    "tests/golden": 214,
+    "tests/golden": 223,
     "tests/image": 176,
     "tests/in_place": 1174,
     "tests/io": 228,

@@ -63,6 +63,15 @@ commit before on the same machine."""
 
 OWN = ("id", "calibration_id", "calibration", "format", "version", "sha256")
 """Keys whose values follow from the exact bits of a calibration, or name the form of a file."""
+COMPARISONS = ("expanded_mm", "en", "decision")
+RATIOS = (
+    "errors",
+    "characteristics",
+    "comparisons",
+    *(f"{direction}_{what}" for direction in ("planar", "depth") for what in COMPARISONS),
+)
+"""Keys of small differences of recorded numbers, which another processor changes by more than it
+changes those."""
 TEXTS = ("/label", "/advice", "/reason")
 """Texts for people, whose wording is not recorded, as that of any text with a space."""
 
@@ -207,7 +216,7 @@ def flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict | list):
         items = value.items() if isinstance(value, dict) else enumerate(value)
         for key, part in items:
-            if key not in OWN:
+            if key not in (*OWN, *RATIOS):
                 yield from flat(part, f"{path}/{key}" if path else str(key))
     elif isinstance(value, str):
         sentence = value and path.endswith(TEXTS)
