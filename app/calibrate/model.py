@@ -18,7 +18,7 @@ from app.context.context import AppContext
 from app.live.live_detection import LiveDetection
 from app.live.session import LiveSession
 from app.services.jobs import Job, Jobs
-from app.widgets.undo import Step
+from app.widgets.undo import UndoStep
 from app.workspace.entries import read_entry
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError
@@ -235,7 +235,7 @@ class WizardModel(QObject):
             return True
 
         first = iter((is_done,))
-        self.undo.push(Step(text, lambda: next(first, False) or run(act), partial(run, revert)))
+        self.undo.push(UndoStep(text, lambda: next(first, False) or run(act), partial(run, revert)))
 
     def reload(self) -> None:
         """Read the session files again and start a new history.

@@ -33,7 +33,7 @@ HEAD = "font-size: 11px; color: @muted"
 
 @dataclass(frozen=True, slots=True)
 class Remarks:
-    """What is said of a measurement."""
+    """Operator and note of a measurement."""
 
     operator: str = text("", tr("Operator"))
     note: str = text("", tr("Note"), example=tr("Any remark"))

@@ -11,7 +11,7 @@ from PySide6.QtGui import QUndoStack
 
 from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
-from app.widgets.undo import Step
+from app.widgets.undo import UndoStep
 from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once
@@ -127,7 +127,7 @@ class RecordBook(QObject):
 
     def _push(self, text: str, redo: Change, undo: Change) -> None:
         change = partial(self.change, tr("Changing the records"))
-        self.undo.push(Step(text, partial(change, redo), partial(change, undo)))
+        self.undo.push(UndoStep(text, partial(change, redo), partial(change, undo)))
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
         """Write a table of all measurements, or of those of one sensor."""

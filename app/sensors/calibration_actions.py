@@ -14,7 +14,7 @@ from app.context.context import AppContext
 from app.services.jobs import Job, Jobs
 from app.widgets.dialog import Kinds
 from app.widgets.question import ask
-from app.widgets.undo import Change, Step
+from app.widgets.undo import Change, UndoStep
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from app.workspace.trash import Removal
@@ -147,7 +147,7 @@ class CalibrationActions:
             )
 
     def _push(self, text: str, redo: Change, undo: Change) -> bool:
-        step = Step(text, partial(self._try, redo), partial(self._try, undo))
+        step = UndoStep(text, partial(self._try, redo), partial(self._try, undo))
         self.undo.push(step)
         return step.worked
 

@@ -9,7 +9,7 @@ from PySide6.QtGui import QUndoCommand
 Change = Callable[[], object]
 
 
-class Step(QUndoCommand):
+class UndoStep(QUndoCommand):
     """A step of two functions. One that returns False failed, and the step leaves the history.
 
     Parameters

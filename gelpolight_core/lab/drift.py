@@ -2,8 +2,9 @@
 
 A value is constant, and from one of several days on it changes by the same amount every day. All
 of these days are tried whenever there is a new value. The level of the test is the stated rate of
-false alarms divided by the number of tests of a year (Bonferroni), so that no number is tuned. A
-value that wanders from day to day is told from a drift by the correlation of its residuals.
+false alarms divided by the number of tests of a year (Bonferroni); this rate is the only number
+that was chosen. A value that changes at random from day to day is distinguished from a drift by
+the correlation of its residuals.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A drift is told from scatter with a stated rate of false alarms, and its line is the true one."""
+"""How often chance looks like a drift, how soon a drift is found, and that its line is true."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from test_lut_model import fitted, scatter
 from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.curves import LutEditor
 from app.calibrate.reflectance.lut_model import CurveSet
-from app.widgets.undo import Step
+from app.widgets.undo import UndoStep
 from gelpolight_core.calibration.edit_effect import Effect
 
 MOVE_MS = 12
@@ -40,7 +40,7 @@ def editor(qtbot: QtBot) -> Iterator[LutEditor]:
 
     def history(text: str, after: CurveSet) -> None:
         act, revert = partial(widget.show_curves, after), partial(widget.show_curves, widget.curves)
-        stack.push(Step(text, act, revert))
+        stack.push(UndoStep(text, act, revert))
 
     curves = model.fitted_curves(fitted())
     thin = model.with_curve(curves, 0, model.thin_nodes(curves[0]))
