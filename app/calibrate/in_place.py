@@ -64,18 +64,17 @@ def detect_scale(
         refuse_size(rgb, (background.shape[1], background.shape[0]))
         images = [linear_image(raw, "", response=response) for raw in (rgb, background)]
         grid, pressed = stated_grid(stated, images[1].size), stated.pressed_scale
-        seen, bare = (grid.cut(image.rgb) for image in images)
-        left, top = grid.region[:2]
+        seen, bare = (image.rgb for image in images)
         if pressed.pin_spacing_mm is not None:
-            pins = find_pins(seen, bare, where=tr("Image"))
-            at = pins.pins_px + np.array([left, top])
+            pins = find_pins(seen, bare, grid=grid, where=tr("Image"))
+            at = pins.pins_px
             marks = Overlay(markers=tuple(Marker(u, v, "dot", "good") for u, v in at))
             x, y = pressed.pin_spacing_mm / pins.spacing_px
             text = tr("{n} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high.")
             said = text.format(n=len(at), x=x, y=y)
         else:
-            disc = find_punch(seen, bare, where=tr("Image"))
-            circle = Circle(left + disc.x, top + disc.y, disc.radius, "good")
+            disc = find_punch(seen, bare, grid=grid, where=tr("Image"))
+            circle = Circle(disc.x, disc.y, disc.radius, "good")
             marks = Overlay(circles=(circle,))
             wide = (pressed.punch_diameter_mm or 0.0) / (2.0 * disc.radius)
             said = tr("Contact of the punch found: a pixel is {s:.4f} mm wide.").format(s=wide)

@@ -152,6 +152,8 @@ def find_slopes(
         sd_mm = scale.relative_sd * scale.mm_per_px[0]
         stated = replace(stated, mm_per_px=scale.mm_per_px, mm_per_px_sd=sd_mm)
     grid, sd = stated_grid(stated, background.size), stated.mm_per_px_sd
+    if scale is not None:
+        grid = replace(grid, lens=scale.lens)
     scale_sd = STATED_SCALE_SD if sd is None else sd / grid.mm_per_px
     presses, unreadable = _presses(session, background)
     noise = _noise(grid.cut(background.rgb))
@@ -212,13 +214,17 @@ def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
     stated = session.in_place or InPlace()
     pressed, grid = stated.pressed_scale, stated_grid(stated, background.size)
     images = session.images("scale")
-    rgb, bare = [grid.cut(image.rgb) for image in images], grid.cut(background.rgb)
-    where = str(session.folder / "scale")
+    rgb, bare, where = (
+        [image.rgb for image in images],
+        background.rgb,
+        str(session.folder / "scale"),
+    )
     require_size(images[0].size, background.size, where=where)
-    if pressed.pin_spacing_mm is not None:
-        return scale_from_pins(rgb, bare, spacing_mm=pressed.pin_spacing_mm, where=where)
-    assert pressed.punch_diameter_mm is not None
-    return scale_from_punch(rgb, bare, diameter_mm=pressed.punch_diameter_mm, where=where)
+    pins, punch = pressed.pin_spacing_mm, pressed.punch_diameter_mm
+    if pins is not None:
+        return scale_from_pins(rgb, bare, spacing_mm=pins, grid=grid, where=where)
+    assert punch is not None
+    return scale_from_punch(rgb, bare, diameter_mm=punch, grid=grid, where=where)
 
 
 def _presses(
@@ -271,7 +277,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
     more = tr("Press more balls at more positions")
     sizes = tr("Check the ball diameters and the scale (mm per pixel)")
     grid = result.model.grid
-    scale = judge_scale(grid.pixel_mm.tolist(), result.model.scale_sd).figures
+    scale = judge_scale(grid.pixel_mm.tolist(), result.model.scale_sd, grid.lens).figures
     return {
         "scale": QualityTable((*scale, *judge_stretch(result.stretch, grid))),
         "balls": QualityTable(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.in_place.roundness import DOUBTFUL_SIGMAS
+from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid, unfolded
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.translation import tr
 
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 
 LEAST_PINS = 9
-BLURS_PX = (2.0, 3.0, 4.5, 7.0)
+BLURS_PX = (2.0, 3.0, 4.5, 7.0, 10.0)
 """Smoothing of the images for the detection of pins: about half a pin's radius."""
 LEAST_PEAK = 0.25
 """Least strength of a pin as a share of the strongest one."""
@@ -29,6 +30,8 @@ than that of a diagonal."""
 OFF_LATTICE = 0.2
 """Largest distance of a pin from the grid, as a share of the spacing."""
 LEAST_ON_LATTICE = 0.7
+LENS_TERMS = 3
+"""Most terms of the correction of a wide lens, even powers of the distance from its axis."""
 EDGE_SD_PX = 1.0
 """Standard deviation of the diameter of a single punch."""
 
@@ -44,11 +47,15 @@ class MeasuredScale:
         differ by more than the standard deviations allow.
     pins : int
         That were used; 0 for a punch.
+    lens : tuple of float
+        As of :class:`~gelpolight_core.reconstruction.in_place.grid.WorkingGrid`; the scale is that
+        in the middle of the image.
     """
 
     mm_per_px: tuple[float, float]
     sd_mm_per_px: tuple[float, float]
     pins: int = 0
+    lens: tuple[float, ...] = ()
 
     @property
     def relative_sd(self) -> float:
@@ -59,10 +66,12 @@ class MeasuredScale:
     def quality(self) -> QualityTable:
         """The scale and its uncertainty, and whether pixels are square."""
         more = tr("Add images of the pressed object, at other places")
-        return judge_scale(self.mm_per_px, self.relative_sd, more)
+        return judge_scale(self.mm_per_px, self.relative_sd, self.lens, more)
 
 
-def judge_scale(mm_per_px: Sequence[float], scale_sd: float, advice: str = "") -> QualityTable:
+def judge_scale(
+    mm_per_px: Sequence[float], scale_sd: float, lens: tuple[float, ...] = (), advice: str = ""
+) -> QualityTable:
     """Judge a scale along x and y by its relative standard deviation.
 
     Parameters
@@ -71,11 +80,16 @@ def judge_scale(mm_per_px: Sequence[float], scale_sd: float, advice: str = "") -
         Size of a pixel.
     scale_sd : float
         Relative standard deviation.
+    lens : tuple of float, optional
+        As of :class:`MeasuredScale`.
     advice : str, optional
         How to lower it.
     """
     x, y = mm_per_px
     scale = [judge("mm_per_px", tr("Scale"), x, "mm/px")]
+    if lens:
+        moved = tr("Correction of the lens at the corner of the image")
+        scale.append(judge("lens_correction_percent", moved, 100.0 * sum(lens), "%"))
     if x != y:
         scale.append(judge("mm_per_px_y", tr("Scale along y (pixels are not square)"), y, "mm/px"))
     uncertainty = judge(
@@ -101,15 +115,23 @@ class PinGrid:
         deviations.
     pins_px : (N, 2) float64
         Their centres (u, v).
+    lens : tuple of float
+        As of :class:`MeasuredScale`; the spacing is that in the middle of the image.
     """
 
     spacing_px: Array
     sd_px: Array
     pins_px: Array
+    lens: tuple[float, ...] = ()
 
 
 def scale_from_pins(
-    images: Sequence[Map], background: Map, *, spacing_mm: float, where: str = "scale"
+    images: Sequence[Map],
+    background: Map,
+    *,
+    spacing_mm: float,
+    grid: WorkingGrid | None = None,
+    where: str = "scale",
 ) -> MeasuredScale:
     """Return the scale from images of a pressed square grid of pins.
 
@@ -121,6 +143,8 @@ def scale_from_pins(
         The untouched membrane.
     spacing_mm : float
         Between neighbouring pins.
+    grid : WorkingGrid, optional
+        With the membrane's part of the image; by default all of it.
     where : str, optional
         Name of the images in messages.
 
@@ -129,25 +153,29 @@ def scale_from_pins(
     InputError
         If an image shows no regular grid of at least 9 pins.
     """
-    grids = [find_pins(image, background, where=where) for image in images]
-    spacings = np.array([grid.spacing_px for grid in grids])
-    within = np.mean([grid.sd_px for grid in grids], axis=0)
+    found = [find_pins(image, background, grid=grid, where=where) for image in images]
+    spacings = np.array([pins.spacing_px for pins in found])
+    within = np.mean([pins.sd_px for pins in found], axis=0)
     mm_per_px = spacing_mm / spacings.mean(axis=0)
-    sd_px = np.hypot(spacings.std(axis=0) / np.sqrt(len(grids)), within)
+    sd_px = np.hypot(spacings.std(axis=0) / np.sqrt(len(found)), within)
     relative_sd = sd_px * mm_per_px / spacing_mm
     both = float(np.hypot(*relative_sd))
     if abs(np.log(mm_per_px[1] / mm_per_px[0])) <= DOUBTFUL_SIGMAS * both:
         mm_per_px, relative_sd = np.full(2, mm_per_px.mean()), np.full(2, 0.5 * both)
     (x, y), (sd_x, sd_y) = mm_per_px.tolist(), (relative_sd * mm_per_px).tolist()
-    return MeasuredScale((x, y), (sd_x, sd_y), sum(len(grid.pins_px) for grid in grids))
+    # The lens is the same: it is taken from the image that shows most of it.
+    lens = max(found, key=lambda pins: len(pins.pins_px)).lens
+    return MeasuredScale((x, y), (sd_x, sd_y), sum(len(pins.pins_px) for pins in found), lens)
 
 
-def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
+def find_pins(
+    image: Map, background: Map, *, grid: WorkingGrid | None = None, where: str = "scale"
+) -> PinGrid:
     """Find the pressed square grid of pins in an image.
 
     Parameters
     ----------
-    image, background, where
+    image, background, grid, where
         As for :func:`scale_from_pins`.
 
     Raises
@@ -155,7 +183,10 @@ def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
     InputError
         If it shows no regular grid of at least 9 pins.
     """
-    fits = [_lattice(_pins(image, background, blur)) for blur in BLURS_PX]
+    grid = grid or _whole(background)
+    seen, bare, first = grid.cut(image), grid.cut(background), np.array(grid.region[:2])
+    middle = grid.middle_px
+    fits = [_lattice(_pins(seen, bare, blur) + first, middle) for blur in BLURS_PX]
     found = max(fits, key=lambda fit: len(fit.pins_px))
     if (count := len(found.pins_px)) < LEAST_PINS:
         raise InputError(
@@ -171,13 +202,18 @@ def find_pins(image: Map, background: Map, *, where: str = "scale") -> PinGrid:
 
 
 def scale_from_punch(
-    images: Sequence[Map], background: Map, *, diameter_mm: float, where: str = "scale"
+    images: Sequence[Map],
+    background: Map,
+    *,
+    diameter_mm: float,
+    grid: WorkingGrid | None = None,
+    where: str = "scale",
 ) -> MeasuredScale:
     """Return the scale from images of a pressed flat round punch.
 
     Parameters
     ----------
-    images, background, where
+    images, background, grid, where
         As for :func:`scale_from_pins`.
     diameter_mm : float
         Of the punch.
@@ -187,7 +223,7 @@ def scale_from_punch(
     InputError
         If an image shows no contact.
     """
-    edges = [find_punch(image, background, where=where) for image in images]
+    edges = [find_punch(image, background, grid=grid, where=where) for image in images]
     widths = np.array([2.0 * edge.radius for edge in edges])
     width = float(widths.mean())
     sd_px = float(max(widths.std(), 2.0 * EDGE_SD_PX) / np.sqrt(len(widths)))
@@ -195,12 +231,14 @@ def scale_from_punch(
     return MeasuredScale((mm_per_px,) * 2, (mm_per_px * sd_px / width,) * 2)
 
 
-def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
+def find_punch(
+    image: Map, background: Map, *, grid: WorkingGrid | None = None, where: str = "scale"
+) -> Circle:
     """Find the edge of the face of a pressed flat round punch: there the membrane begins to slope.
 
     Parameters
     ----------
-    image, background, where
+    image, background, grid, where
         As for :func:`scale_from_pins`.
 
     Raises
@@ -208,7 +246,9 @@ def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
     InputError
         If the image shows no round edge.
     """
-    change = cv2.GaussianBlur(np.abs(image - background).sum(axis=2), (0, 0), BLURS_PX[0])
+    grid = grid or _whole(background)
+    change = np.abs(grid.cut(image) - grid.cut(background)).sum(axis=2)
+    change = cv2.GaussianBlur(change, (0, 0), BLURS_PX[0])
     strong = np.argwhere(change > 0.5 * change.max())
     reach = min(change.shape) // 2  # of the rays from the centre, two for each pixel of length
     angle = np.pi * np.arange(2 * reach) / reach
@@ -231,7 +271,12 @@ def find_punch(image: Map, background: Map, *, where: str = "scale") -> Circle:
         raise InputError(
             tr("no round edge of a pressed punch was found"), where, Remedy.STATE_SCALE
         )
-    return found
+    return Circle(found.x + grid.region[0], found.y + grid.region[1], found.radius)
+
+
+def _whole(image: Map) -> WorkingGrid:
+    height, width = image.shape[:2]
+    return WorkingGrid(ImageSize(width, height), 1.0)
 
 
 def _pins(image: Map, background: Map, blur: float) -> Array:
@@ -264,11 +309,64 @@ def _offset(before: Map, at: Map, after: Map) -> Array:
     return np.clip(0.5 * (before - after) / bend, -0.5, 0.5).astype(np.float64)
 
 
-def _lattice(pins: Array) -> PinGrid:
-    """Return the best square grid through pins; one without pins if there is none."""
+def _lattice(pins: Array, middle: Array) -> PinGrid:
+    """Return the best square grid through pins; one without pins if there is none.
+
+    Parameters
+    ----------
+    pins : (N, 2) float64
+        Spots in the image.
+    middle : (2,) float64
+        Of the image, which the lens has its axis in.
+    """
     none = PinGrid(np.ones(2), np.ones(2), np.empty((0, 2)))
-    if len(pins) < LEAST_PINS:
+    index, on = _walked(pins)
+    if len(on) < max(LEAST_PINS, LEAST_ON_LATTICE * len(pins)):
         return none
+    out = pins[on] - middle
+    reach = (out**2).sum(axis=1, keepdims=True) / (middle @ middle)
+    design = np.kron(np.column_stack([index, np.ones(len(index))]), np.eye(2))
+    if np.linalg.matrix_rank(design) < 6:
+        return none
+    found = none
+    for terms in range(LENS_TERMS + 1):
+        # Linear in all: a place of the grid is the pixel, corrected by the terms of the lens.
+        bent = [(-out * reach**power).ravel() for power in range(1, terms + 1)]
+        whole = np.column_stack([design, *bent])
+        values = np.linalg.lstsq(whole, out.ravel(), rcond=None)[0]
+        rest = (out.ravel() - whole @ values).reshape(-1, 2)
+        spread = np.linalg.inv(whole.T @ whole) * (rest**2).sum() / max(rest.size - len(values), 1)
+        if terms and abs(values[-1]) < DOUBTFUL_SIGMAS * np.sqrt(spread[-1, -1]):
+            break
+        # A square grid turns both axes by the same angle: the columns are perpendicular, and as
+        # long as the spacing along x and y, for pixels of any height.
+        axes = values[:4].reshape(2, 2)
+        spacing = np.linalg.norm(axes, axis=0)
+        along = axes / spacing
+        skewed = abs(float(along[:, 0] @ along[:, 1])) > OFF_LATTICE
+        lens = tuple(values[6:].tolist())
+        if skewed or np.abs(rest).max() > OFF_LATTICE * spacing.min() or not unfolded(lens):
+            continue
+        parts = spread[:4, :4].reshape(2, 2, 2, 2)
+        # The spacing in the middle depends on the number of terms: one of two values.
+        off = (spacing - found.spacing_px) / np.sqrt(2.0) if terms and len(found.pins_px) else 0.0
+        sd = np.sqrt(np.einsum("ik,ikjk,jk->k", along, parts, along) + off**2)
+        found = PinGrid(spacing, sd, pins[on], lens)
+    return found
+
+
+def _walked(pins: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the place of each pin in its grid, found by steps like the one before.
+
+    Returns
+    -------
+    index : (M, 2) float64
+        Row and column of each pin of the grid.
+    pins : (M,) intp
+        Which they are.
+    """
+    if len(pins) < LEAST_PINS:
+        return np.empty((0, 2)), np.empty(0, np.intp)
     start = int(np.linalg.norm(pins - np.median(pins, axis=0), axis=1).argmin())
     steps = np.delete(pins, start, axis=0) - pins[start]
     lengths = np.linalg.norm(steps, axis=1)
@@ -276,27 +374,17 @@ def _lattice(pins: Array) -> PinGrid:
     # The nearest pin in another direction: along y pixels may have another size.
     across = np.abs(steps @ [-first[1], first[0]]) / (lengths * lengths.min())
     second = steps[np.where(across > ACROSS, lengths, np.inf).argmin()]
-    axes, middle = np.stack([first, second]), pins[start]
-    for reach in (1.6, 3.2, 6.4, 100.0):
-        if np.linalg.matrix_rank(axes) < 2:
-            return none
-        index = (pins - middle) @ np.linalg.inv(axes)
-        whole = np.rint(index)
-        near = np.abs(whole).max(axis=1) < reach
-        on = near & (np.abs(index - whole).max(axis=1) < OFF_LATTICE)
-        design = np.column_stack([whole[on], np.ones(np.count_nonzero(on))])
-        if len(design) < 4 or np.linalg.matrix_rank(design) < 3:
-            return none
-        found = np.linalg.lstsq(design, pins[on], rcond=None)[0]
-        axes, middle = found[:2], found[2]
-    # A square grid turns both axes by the same angle: the columns are perpendicular, and as long as
-    # the spacing along x and y, for pixels of any height.
-    spacing = np.linalg.norm(axes, axis=0)
-    along = axes / spacing
-    square = abs(float(along[:, 0] @ along[:, 1])) < OFF_LATTICE
-    if not square or np.count_nonzero(on) < LEAST_ON_LATTICE * len(pins):
-        return none
-    scatter = ((pins[on] - design @ found) ** 2).sum(axis=0) / max(len(design) - 3, 1)
-    spread = np.linalg.inv(design.T @ design)[:2, :2]
-    sd = np.sqrt(scatter * np.einsum("ik,ij,jk->k", along, spread, along))
-    return PinGrid(spacing, sd, pins[on])
+    at = {(0, 0): start}
+    walk = [((0, 0), np.stack([first, second]))]
+    for (i, j), axes in walk:
+        for di, dj in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            step = di * axes[0] + dj * axes[1]
+            away = np.linalg.norm(pins - pins[at[i, j]] - step, axis=1)
+            near = int(away.argmin())
+            place = i + di, j + dj
+            if away[near] < np.linalg.norm(step) / 3.0 and place not in at:
+                at[place] = near
+                turned = axes.copy()
+                turned[abs(dj)] = (pins[near] - pins[at[i, j]]) * (di + dj)
+                walk.append((place, turned))
+    return np.array(list(at), np.float64), np.array(list(at.values()))

@@ -186,14 +186,36 @@ def test_a_pin_grid_gives_the_scale(aspect: float, turn: float) -> None:
         scale_from_pins([background], background, spacing_mm=2.0)
 
 
-@pytest.mark.parametrize("aspect", [1.0, 1.25, 0.7])
+def test_a_wide_lens_is_corrected_with_the_pins_it_shows() -> None:
+    """The lens draws its corner 20 % nearer to the middle; the pins reach near the border."""
+    lens, spacing_px = (-0.3, 0.1), 30.0
+    grid = WorkingGrid(ImageSize(400, 300), 1.0, lens=lens)
+    flat = np.array(
+        [
+            [198.0 + spacing_px * i, 152.0 + spacing_px * j]
+            for i, j in product(range(-5, 6), range(-4, 5))
+        ]
+    )
+    pins = grid.to_pixels(flat - grid.middle_px)
+    background, (y, x) = np.full((300, 400, 3), 0.4, np.float32), np.mgrid[:300, :400]
+    image = background + 0.1 * np.random.default_rng(5).normal(0.0, 0.02, background.shape)
+    for u, v in pins:
+        image -= (0.2 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 5.0**2)))[..., None]
+    found = scale_from_pins([image.astype(np.float32)], background, spacing_mm=2.5)
+    assert found.pins == np.count_nonzero((np.abs(pins - grid.middle_px) < grid.middle_px).all(1))
+    assert found.mm_per_px[0] == pytest.approx(2.5 / spacing_px, abs=2.0 * found.sd_mm_per_px[0])
+    assert sum(found.lens) == pytest.approx(sum(lens), abs=0.02)
+    assert found.quality["lens_correction_percent"].value == pytest.approx(-20.0, abs=2.0)
+
+
+@pytest.mark.parametrize(("aspect", "lens"), [(1.0, ()), (1.25, ()), (0.7, ()), (1.0, (-0.2,))])
 @pytest.mark.parametrize("size", [(320, 240), (1280, 960)])
 def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states(
-    size: tuple[int, int], aspect: float
+    size: tuple[int, int], aspect: float, lens: tuple[float, ...]
 ) -> None:
     width, height = size
     region = (width // 9, height // 5, width // 2, height // 3)
-    grid = WorkingGrid(ImageSize(*size), 0.02, aspect, region)
+    grid = WorkingGrid(ImageSize(*size), 0.02, aspect, region, lens)
     v, u = np.mgrid[:height, :width].astype(np.float32)
     nodes, table = grid.reduce(np.stack([u, v, u], axis=-1)), grid.table()
     inner = np.s_[1:-1, 1:-1]  # outside of the outermost pixels' centres nothing is known
@@ -202,15 +224,16 @@ def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states
     assert np.abs(nodes[..., 1] - table.v_px)[inner].max() < 0.02 * grid.step_px[1]
     assert np.diff(grid.x_mm) == pytest.approx(grid.pitch_mm)
     assert np.diff(grid.y_mm) == pytest.approx(grid.pitch_mm)
-    pixel = np.array([[region[0] + 3.0, region[1] + 7.0]])
+    flat = np.array([[region[0] + 3.0, region[1] + 7.0]])
     middle = 0.5 * (np.array(size) - 1.0)  # of the whole image
-    place = (pixel - middle) * [0.02, 0.02 * aspect]
-    assert grid.to_pixels(place) == pytest.approx(pixel)
+    place = (flat - middle) * [0.02, 0.02 * aspect]
+    pixel = grid.to_pixels(place)
+    assert (np.abs(pixel - flat).max() < 1e-9) is not bool(lens)
     node = grid.on_nodes(Circle(*pixel[0], 9.0))
-    assert grid.x_mm[0] + node.x * grid.pitch_mm == pytest.approx(place[0, 0])
-    assert grid.y_mm[0] + node.y * grid.pitch_mm == pytest.approx(place[0, 1])
+    assert grid.x_mm[0] + node.x * grid.pitch_mm == pytest.approx(place[0, 0], abs=1e-5)
+    assert grid.y_mm[0] + node.y * grid.pitch_mm == pytest.approx(place[0, 1], abs=1e-5)
     back = grid.in_image(node)
-    assert (back.x, back.y, back.radius) == pytest.approx((*pixel[0], 9.0))
+    assert (back.x, back.y, back.radius) == pytest.approx((*pixel[0], 9.0), rel=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -227,5 +250,6 @@ def test_a_grid_of_square_pixels_and_the_whole_image_is_named_as_in_earlier_prog
     others = [
         replace(usual, aspect=2.0),
         replace(usual, region_px=(0, 0, 320, 239)),
+        replace(usual, lens=(-0.1,)),
     ]
-    assert len({repr(grid) for grid in (usual, *others)}) == 3
+    assert len({repr(grid) for grid in (usual, *others)}) == 4

@@ -7,6 +7,7 @@ gel limits the resolution more than the camera.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, fields
 
@@ -23,6 +24,10 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 WORKING_SIDE = 320
 """Approximate number of nodes along the longer side of the grid."""
+LENS_STEPS = 1000
+"""Of the table of a wide lens, from the middle of the image to its corner."""
+FAR = 10.0
+"""Distance in corners of a place that the image does not show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +52,17 @@ class WorkingGrid:
         Size of a camera pixel along y over its size along x.
     region_px : (x, y, width, height) or None
         The membrane's part of the image; None for all of it.
+    lens : tuple of float
+        Terms k1, k2, ... of a wide lens: a pixel at the distance r from the middle of the image
+        shows what a lens without distortion would show at r (1 + k1 r2 + k2 r4 + ...); r is 1 at
+        the corner. The scale is that in the middle.
     """
 
     image: ImageSize
     mm_per_px: float
     aspect: float = 1.0
     region_px: tuple[int, int, int, int] | None = None
+    lens: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a region that is not inside the image or cannot hold a press.
@@ -128,14 +138,15 @@ class WorkingGrid:
         return np.asarray(pixels)
 
     def _positions(self, axis: int) -> Array:
-        return np.asarray((self._pixels(axis) - self._middle_px[axis]) * self.pixel_mm[axis])
+        return np.asarray((self._pixels(axis) - self.middle_px[axis]) * self.pixel_mm[axis])
 
     @property
     def _first_px(self) -> Array:
         return np.array(self.region[:2]) + 0.5 * (self.step_px - 1.0)
 
     @property
-    def _middle_px(self) -> Array:
+    def middle_px(self) -> Array:
+        """The middle (2,) of the image."""
         return np.asarray(0.5 * (np.array([self.image.width, self.image.height]) - 1.0))
 
     def cut(self, rgb: Map) -> Map:
@@ -146,6 +157,9 @@ class WorkingGrid:
     def reduce(self, rgb: Map) -> Map:
         """Return an image (height, width, 3) averaged over each node's block."""
         rows, columns = self.shape
+        if self.lens:
+            u, v = _camera_pixels(self)
+            rgb = np.asarray(cv2.remap(rgb, u, v, cv2.INTER_LINEAR), np.float32)
         # Whole pixels are averaged; what is left of the step along y is interpolated.
         tall = max(1, int(self.step_px[1]))
         left = self.step_px[1] / tall
@@ -162,17 +176,42 @@ class WorkingGrid:
 
     def to_pixels(self, points_mm: NDArray[np.floating]) -> Array:
         """Return the camera pixels (N, 2) at positions (N, 2) on the membrane."""
-        return np.asarray(points_mm / self.pixel_mm + self._middle_px, np.float64)
+        pixels = np.asarray(points_mm / self.pixel_mm + self.middle_px, np.float64)
+        return self.through_lens(pixels)
+
+    def through_lens(self, pixels: NDArray[np.floating], *, back: bool = False) -> Array:
+        """Return the pixels (N, 2) of the camera for those of a lens without distortion, or back.
+
+        What lies beyond the corner of the image is far outside of it.
+        """
+        if not self.lens:
+            return np.asarray(pixels, np.float64)
+        corner = float(np.linalg.norm(self.middle_px))
+        radii = _radii(self.lens)
+        out = (np.asarray(pixels, np.float64) - self.middle_px) / corner
+        away = np.linalg.norm(out, axis=1)
+        there = np.interp(away, *(radii if back else radii[::-1]), right=FAR)
+        there *= corner / np.maximum(away, 1e-12)
+        return np.asarray(out * there[:, None] + self.middle_px)
 
     def on_nodes(self, circle: Circle) -> Circle:
         """Return a circle in camera pixels as one in nodes."""
-        x, y = (np.array([circle.x, circle.y]) - self._first_px) / self.step_px
-        return Circle(float(x), float(y), circle.radius / self._mean_step_px)
+        flat = self._circle(circle, back=True)
+        x, y = (np.array([flat.x, flat.y]) - self._first_px) / self.step_px
+        return Circle(float(x), float(y), flat.radius / self._mean_step_px)
 
     def in_image(self, circle: Circle) -> Circle:
         """Return a circle in nodes as one in camera pixels."""
         x, y = np.array([circle.x, circle.y]) * self.step_px + self._first_px
-        return Circle(float(x), float(y), circle.radius * self._mean_step_px)
+        flat = Circle(float(x), float(y), circle.radius * self._mean_step_px)
+        return self._circle(flat, back=False)
+
+    def _circle(self, circle: Circle, *, back: bool) -> Circle:
+        # Of the same area as its image, by the lens at its middle.
+        around = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
+        at = self.through_lens(around + np.array([circle.x, circle.y]), back=back)
+        area = abs(float(np.linalg.det([at[1] - at[2], at[3] - at[4]])))
+        return Circle(float(at[0, 0]), float(at[0, 1]), circle.radius * math.sqrt(area))
 
     @property
     def _mean_step_px(self) -> float:
@@ -181,7 +220,29 @@ class WorkingGrid:
     def table(self) -> ResamplingTable:
         """Return the camera pixel of each node; rays are assumed to be vertical."""
         grid = MembraneGrid(self.x_mm, self.y_mm, self.pitch_mm)
-        pixels = (self._pixels(axis).astype(np.float32) for axis in (0, 1))
-        u, v = (np.ascontiguousarray(a) for a in np.meshgrid(*pixels))
+        flat = np.stack(np.meshgrid(self._pixels(0), self._pixels(1)), axis=-1).reshape(-1, 2)
+        at = self.through_lens(flat).astype(np.float32)
+        u, v = (np.ascontiguousarray(at[:, axis].reshape(self.shape)) for axis in (0, 1))
+        inside = np.asarray((np.abs(at - self.middle_px) <= self.middle_px + 0.5).all(axis=1))
         ray_slope = np.zeros((*self.shape, 2), np.float32)
-        return ResamplingTable(grid, u, v, np.ones(self.shape, np.bool_), ray_slope)
+        return ResamplingTable(grid, u, v, inside.reshape(self.shape), ray_slope)
+
+
+@functools.lru_cache(4)
+def _camera_pixels(grid: WorkingGrid) -> tuple[Map, Map]:
+    """Return u and v (height, width) in the camera of all pixels without distortion."""
+    shape = grid.image.height, grid.image.width
+    at = grid.through_lens(np.indices(shape, np.float64)[::-1].reshape(2, -1).T).astype(np.float32)
+    u, v = (np.ascontiguousarray(at[:, axis].reshape(shape)) for axis in (0, 1))
+    return u, v
+
+
+def unfolded(lens: tuple[float, ...]) -> bool:
+    """Return whether the terms of a lens keep the order of all pixels from the middle outwards."""
+    return bool((np.diff(_radii(lens)[1]) > 0.0).all())
+
+
+def _radii(lens: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return radii in the image, and where a lens without distortion shows what is there."""
+    seen = np.linspace(0.0, 1.0, LENS_STEPS + 1)
+    return seen, np.asarray(seen * np.polynomial.Polynomial((1.0, *lens))(seen**2))
