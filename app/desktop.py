@@ -18,9 +18,10 @@ from PySide6.QtWidgets import QApplication
 
 from app.cameras.manager import CameraManager
 from app.context.context import AppContext, Requests, SourceChoice
+from app.services.kept import APPLICATION
 from app.services.log import Log
 from app.services.opengl import surface_format
-from app.services.settings import APPLICATION, Settings
+from app.services.settings import Settings
 from app.services.status import StatusModel
 from app.services.toasts import Toasts
 from app.shell.faults import Faults

@@ -1,17 +1,45 @@
-"""Output that several commands share: progress and tables."""
+"""What several commands share: progress, tables and tolerances."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
+from math import inf
 
 from tqdm import tqdm
 
+from app.command_line.options import option
 from app.command_line.terminal import harmless
+from app.services.kept import kept_in_file
+from app.services.preferences import Limits
 from gelpolight_core.causes import with_one_cause
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.translation import tr
+
+tolerance = partial(
+    option,
+    tr("tolerances of size and height in percent (default: those of the preferences)"),
+    metavar=("SIZE", "HEIGHT"),
+)
+
+
+def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
+    """Return the tolerances of size and height in percent: as stated, or those of the user.
+
+    Raises
+    ------
+    InputError
+        If one is not a positive number.
+    """
+    size, height = stated or kept_in_file(Limits, "limits").percent
+    if not (0.0 < size < inf and 0.0 < height < inf):
+        raise InputError(
+            tr("A tolerance is not greater than 0"), "--tolerance", Remedy.CORRECT_VALUE
+        )
+    return size, height
 
 
 @contextmanager

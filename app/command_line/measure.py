@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from app.command_line.common import tolerance, tolerances
 from app.command_line.options import file, option, place, result
 from app.command_line.parser import MENDABLE
 from app.command_line.reconstructing import despite_faults, load_reconstructor, model, read_frame
@@ -41,6 +42,7 @@ class Measure(ToolArguments):
         help=tr("edge radius of the cylinder or cuboid in mm, if it is known; with --shape"),
         metavar="MM",
     )
+    tolerance: tuple[float, float] | None = tolerance()
     json: Path | None = result()
     report: Path | None = option(
         help=tr("certificate to write, with uncertainty budget and decisions; with --shape"),
@@ -56,19 +58,11 @@ class Measure(ToolArguments):
         An image that cannot be measured is reported, and the other images are measured.
         """
         tools = self.tools()
-        if tools and self.edge_radius is not None:
-            raise InputError(
-                tr("Tools do not use an edge radius"), "--edge-radius", Remedy.REMOVE_OPTION
-            )
-        if tools and self.report is not None:
-            raise InputError(
-                tr("A certificate states sizes, not results of tools"),
-                "--report",
-                Remedy.REMOVE_OPTION,
-            )
+        if tools:
+            self._refuse("edge_radius", "tolerance", "truth", "report")
         if self.report is not None:
             refuse_other_endings(self.report)
-        truths = self._truths()
+        truths, limits = self._truths(), tolerances(self.tolerance)
         reconstructor = load_reconstructor(self.calibration, self.model)
         several = len(self.images) > 1
         entries, refused = [], 0
@@ -76,7 +70,7 @@ class Measure(ToolArguments):
         for image in self.images:
             try:
                 entry, lines = self._measured(
-                    image, reconstructor, tools, truths.get(image.name), certified
+                    image, reconstructor, tools, truths.get(image.name), limits, certified
                 )
             except InputError as error:
                 if not several:
@@ -94,7 +88,10 @@ class Measure(ToolArguments):
             from gelpolight_core.report.file import write_report  # slow to import
             from gelpolight_core.report.measurement import measurement_report
 
-            write_report(measurement_report(reconstructor.calibration, certified), self.report)
+            certificate = measurement_report(
+                reconstructor.calibration, certified, limits_percent=limits
+            )
+            write_report(certificate, self.report)
         return MENDABLE if refused else 0
 
     def _measured(
@@ -103,6 +100,7 @@ class Measure(ToolArguments):
         reconstructor: Reconstructor,
         tools: Sequence[Tool],
         truth: Truth | None,
+        limits_percent: tuple[float, float],
         certified: list[MeasuredPress],
     ) -> tuple[dict[str, Any], list[str]]:
         """Reconstruct an image, fit the object or apply the tools. Return JSON values and text."""
@@ -140,7 +138,7 @@ class Measure(ToolArguments):
         measurement = judged(found, heightmap)
         digest = file_hash(image)
         certified.append(MeasuredPress(image.name, digest, heightmap, measurement, truth))
-        values = measurement.as_json(truth)
+        values = measurement.as_json(truth, limits_percent)
         corrected += [] if truth is None else [finding.line for finding in truth.findings()]
         shape = [f"{tr('shape'):<12} {measurement.shape}"] if self.shape == AUTO else []
         return values | faults, [*shape, *measurement_lines(values), *corrected]
@@ -149,10 +147,6 @@ class Measure(ToolArguments):
         """Return the true sizes of each image's object, if a file with them is given."""
         if self.truth is None:
             return {}
-        if self.shape is None:
-            raise InputError(
-                tr("Tools cannot be compared with true sizes"), "--truth", Remedy.REMOVE_OPTION
-            )
         rows = {row.file: row.truth for row in read_truth(self.truth).rows}
         for image in self.images:
             if image.name not in rows:
@@ -200,6 +194,7 @@ def measurement_lines(values: Mapping[str, Any]) -> list[str]:
             line += tr("  error {e:+.2f} %").format(e=row["deviation_percent"])
             line += tr(", En {en:.2f}").format(en=row["en"]) if row["en"] is not None else ""
             line += f", {words(row['decision'])}"
+            line += tr(" (tolerance {t:g} %)").format(t=row["tolerance_percent"])
         lines.append(line)
     verdict = ": ".join(filter(None, (values["verdict"], values["reason"])))
     return [*lines, f"{tr('verdict'):<12} {verdict}"]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import stage_progress
+from app.command_line.common import stage_progress, tolerance, tolerances
 from app.command_line.options import Command, option, output, place
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration
@@ -25,6 +27,8 @@ from gelpolight_core.report.file import write_report
 from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.translation import tr
 
+Validation = Callable[[Calibration], Validated | None]
+
 
 @dataclass(frozen=True)
 class Report(Command):
@@ -39,6 +43,7 @@ class Report(Command):
         tr("folder of presses with truth.csv or of a protocol run, for validation"),
         metavar="PRESSES",
     )
+    tolerance: tuple[float, float] | None = tolerance()
     model: str | None = option(
         tr("model for the calibration of a session (default: full)"), choices=MODELS
     )
@@ -52,9 +57,11 @@ class Report(Command):
             )
         # Before minutes of work for nothing.
         presses = presses_folder(self.presses) if self.presses else None
+        limits_percent = tolerances(self.tolerance)
         with stage_progress() as progress:
+            validated = partial(_validation, presses, limits_percent, progress)
             make = self._of_session if self.source.is_dir() else self._of_calibration
-            report = make(presses, progress)
+            report = make(validated, progress)
         write_report(report, self.output)
         say(
             tr("Report saved to {path}: {verdict}").format(
@@ -62,25 +69,30 @@ class Report(Command):
             )
         )
 
-    def _of_calibration(self, presses: Path | None, progress: Any) -> Document:
+    def _of_calibration(self, validated: Validation, _progress: Any) -> Document:
         if self.model:
             raise InputError(
                 tr("A calibration already has its model"), "--model", Remedy.REMOVE_OPTION
             )
         calibration = read_calibration(self.source)
-        validation = _validation(calibration, presses, progress)
-        return calibration_report(calibration, validation=validation)
+        return calibration_report(calibration, validation=validated(calibration))
 
-    def _of_session(self, presses: Path | None, progress: Any) -> Document:
+    def _of_session(self, validated: Validation, progress: Any) -> Document:
         session = session_to_calibrate(self.source)
         run = calibrate(session, recipe_of(session, self.model), progress=progress)
-        validation = _validation(run.calibration, presses, progress)
+        validation = validated(run.calibration)
         progress(tr("report"), 1.0)
         return run_report(run, validation=validation)
 
 
-def _validation(calibration: Calibration, presses: Path | None, progress: Any) -> Validated | None:
+def _validation(
+    presses: Path | None,
+    limits_percent: tuple[float, float],
+    progress: Any,
+    calibration: Calibration,
+) -> Validated | None:
     if presses is None:
         return None
     measure = press_measurement(Reconstructor(calibration))
-    return validation_of(evaluate_presses(presses, measure, progress=progress))
+    evaluation = evaluate_presses(presses, measure, progress=progress)
+    return validation_of(replace(evaluation, limits_percent=limits_percent))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
 
-from app.command_line.common import stage_progress
+from app.command_line.common import stage_progress, tolerance, tolerances
 from app.command_line.options import Command, file, option, output, place
 from app.command_line.reconstructing import load_reconstructor, model
 from app.command_line.terminal import say
@@ -55,6 +55,7 @@ class Evaluate(Command):
     )
     output: Path = output("OUT", writes=False)
     model: str | None = model()
+    tolerance: tuple[float, float] | None = tolerance()
     workers: int = option(
         tr("number of images processed at the same time, one process each"),
         choices=range(1, 65),
@@ -64,6 +65,7 @@ class Evaluate(Command):
 
     def run(self) -> None:
         """Measure every press, write the report's files and print the table."""
+        limits_percent = tolerances(self.tolerance)
         reconstructor = load_reconstructor(self.calibration, self.model)
         presses = presses_folder(self.presses)  # before a folder is created for nothing
         make_folder(self.output)
@@ -77,6 +79,7 @@ class Evaluate(Command):
                     evaluation = evaluated(measure=remote, mapped=pool.map)
             else:
                 evaluation = evaluated(measure=press_measurement(reconstructor))
+        evaluation = replace(evaluation, limits_percent=limits_percent)
         written = write_evaluation_files(
             evaluation, self.output, calibration=reconstructor.calibration
         )

@@ -127,12 +127,12 @@ class ToolArguments(Command):
     def _refuse(self, *names: str) -> None:
         """Raise an error for an option that would be ignored."""
         for name in names:
-            if getattr(self, name):
+            if getattr(self, name) not in (None, []):
                 raise InputError(
                     tr("This option cannot be used with {name}").format(
                         name=self.tool or "--shape"
                     ),
-                    f"--{name}",
+                    f"--{name.replace('_', '-')}",
                     Remedy.REMOVE_OPTION,
                 )
 

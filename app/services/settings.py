@@ -6,13 +6,13 @@ import json
 import logging
 import re
 from collections.abc import Mapping
-from dataclasses import Field, asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
-import platformdirs
 from PySide6.QtCore import QByteArray, QSettings
 
+from app.services.kept import MOST_BYTES, Kept, kept_values, settings_file
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import cannot_write
@@ -21,11 +21,9 @@ from gelpolight_core.io.reading import read_file
 if TYPE_CHECKING:
     from app.services.preferences import Limits, Preferences
 
-APPLICATION = "gelpolight"
 RECENT = 8
 RECENT_KINDS = ("sessions", "calibrations", "recordings")
 CAMERAS = 16
-Kept = TypeVar("Kept")
 _LOG = logging.getLogger(__name__)
 
 
@@ -36,7 +34,7 @@ OBJECTS = re.compile(rb"@(Variant|DateTime)\(", re.IGNORECASE)
 def _keep_aside_what_is_no_text(path: Path) -> None:
     """Start with empty settings if the file contains anything but text, numbers and layouts."""
     try:
-        spoilt = OBJECTS.search(read_file(path, 10_000_000)) is not None
+        spoilt = OBJECTS.search(read_file(path, MOST_BYTES)) is not None
     except FileNotFoundError:
         return
     except InputError:
@@ -54,7 +52,7 @@ class Settings:
     """Typed access to the settings file."""
 
     def __init__(self, path: Path | None = None) -> None:
-        self.path = path or platformdirs.user_config_path(APPLICATION) / "desktop.ini"
+        self.path = path or settings_file()
         _keep_aside_what_is_no_text(self.path)
         self._store = QSettings(str(self.path), QSettings.Format.IniFormat)
 
@@ -93,13 +91,7 @@ class Settings:
         self._keep(asdict(limits), "limits/")
 
     def _read(self, kind: type[Kept], group: str) -> Kept:
-        """Return kept values. One that is missing or not possible gets its default."""
-        values = {}
-        for f in fields(kind):  # type: ignore[arg-type]
-            value = _value(self._text(group + f.name), f)
-            if value is not None:
-                values[f.name] = value
-        return kind(**values)
+        return kept_values(kind, lambda name: self._text(group + name))
 
     def _keep(self, values: Mapping[str, str | float], group: str) -> None:
         for name, value in values.items():
@@ -205,16 +197,3 @@ class Settings:
     def save(self) -> None:
         """Write the file now."""
         self._store.sync()
-
-
-def _value(text: str, f: Field[Any]) -> str | float | None:
-    """Return a kept value of a field, or None if it is not possible."""
-    if isinstance(f.default, bool):
-        return {"yes": True, "no": False}.get(text)
-    if isinstance(f.default, float):
-        try:
-            number = float(text)
-        except ValueError:
-            return None
-        return number if 0.0 < number < 1e6 else None
-    return text if text in f.metadata.get("choices", (text,)) else None

@@ -17,6 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import get_font
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
@@ -78,9 +79,13 @@ def drawing(
         def drawn(*arguments: P.args, **named: P.kwargs) -> Drawing:
             with rc_context(_STYLE):
                 size_inch = (width_mm / 25.4, height_mm / 25.4)
-                figure = Figure(figsize=size_inch, layout="constrained")
+                layout = ConstrainedLayoutEngine()
+                figure = Figure(figsize=size_inch, layout=layout)
                 FigureCanvasSVG(figure)
                 caption, stream = paint(figure, *arguments, **named), io.StringIO()
+                # Left to savefig, everything would be drawn twice.
+                layout.execute(figure)
+                figure.set_layout_engine(None)
                 figure.savefig(stream, format="svg", metadata={"Date": None})
             return Drawing(caption, stream.getvalue())
 
@@ -101,10 +106,14 @@ def png(paint: Callable[[Figure], object], width_in: float, height_in: float) ->
     return stream.getvalue()
 
 
+@functools.cache
+def _characters() -> frozenset[int]:
+    return frozenset(get_font(str(FONTS / "DejaVuSans.ttf")).get_charmap())
+
+
 def printable(text: str) -> str:
     """Return text on one line, with a white square for every character that the font lacks."""
-    known = get_font(str(FONTS / "DejaVuSans.ttf")).get_charmap()
-    shown = " ".join(text.split())
+    shown, known = " ".join(text.split()), _characters()
     return "".join(c if ord(c) in known else "\N{WHITE SQUARE}" for c in shown)
 
 

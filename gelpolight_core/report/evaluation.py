@@ -197,17 +197,13 @@ def evaluation_sentence(evaluation: Evaluation) -> str:
         return tr("None of {n} presses could be measured").format(n=count)
     summary = [tr("{measured} of {n} presses were measured").format(measured=measured, n=count)]
     texts = {
-        "planar": tr(
-            "mean absolute error in the planar direction {e:.2f} % (paper: about {p:.0f} %)"
-        ),
-        "depth": tr(
-            "mean absolute error in the depth direction {e:.2f} % (paper: about {p:.0f} %)"
-        ),
+        "planar": tr("mean absolute error in the planar direction {e:.2f} % (tolerance {t:g} %)"),
+        "depth": tr("mean absolute error in the depth direction {e:.2f} % (tolerance {t:g} %)"),
     }
-    for direction, text in texts.items():
+    for (direction, text), limit in zip(texts.items(), evaluation.limits_percent, strict=True):
         error = evaluation.overall(direction).mean_absolute
         if math.isfinite(error):
-            summary.append(text.format(e=error, p=PAPER_PERCENT[direction]))
+            summary.append(text.format(e=error, t=limit))
     return "; ".join(summary)
 
 

@@ -10,6 +10,12 @@ import pytest
 from app.command_line.main import main
 
 
+@pytest.fixture(autouse=True)
+def _no_preferences(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the tests out of the preferences of whoever runs them."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+
+
 @pytest.fixture(scope="session")
 def session(small_session: Path) -> Path:
     """Return a session folder of the virtual sensor, at a quarter of the image size."""

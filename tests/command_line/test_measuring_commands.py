@@ -155,6 +155,9 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
         (["--tool", "nowhere.json"], "nor a JSON file"),
         (["--shape", "ball", "--size", "1", "2"], "cannot be used with --shape"),
         (["--tool", "ball", "--truth", "truth.csv"], "--truth"),
+        (["--tool", "ball", "--edge-radius", "0"], "--edge-radius"),
+        (["--tool", "ball", "--tolerance", "5", "8"], "--tolerance"),
+        (["--shape", "ball", "--tolerance", "5", "nan"], "--tolerance"),
     ],
 )
 def test_a_tool_that_is_not_described_is_refused_in_one_line(

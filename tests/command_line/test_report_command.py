@@ -38,16 +38,20 @@ def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
     """Both commands accept the folder of a run, or that of its presses."""
     page, presses = tmp_path / "r.pdf", str(run_folder / "presses")
     assert main(["evaluate", str(calibration), str(run_folder), "-o", str(tmp_path / "e")]) == 0
-    overall = json.loads((tmp_path / "e" / "evaluation.json").read_text())["overall"]
+    evaluation = json.loads((tmp_path / "e" / "evaluation.json").read_text())
+    overall = evaluation["overall"]
+    assert evaluation["tolerance_percent"] == {"planar": 5.0, "depth": 8.0}
     assert {overall[direction]["count"] for direction in ("planar", "depth")} == {1}
-    assert main(["report", str(calibration), "-o", str(page), "--presses", presses]) == 0
+    arguments = ["report", str(calibration), "-o", str(page), "--presses", presses]
+    assert main([*arguments, "--tolerance", "3", "40"]) == 0
     planar, depth = (overall[name]["mean_absolute_percent"] for name in ("planar", "depth"))
     validation = report_data(page)["validation"]
     assert validation["sentence"].startswith("Not validated")  # one press says little
     found = validation["data"]["overall"]
     assert found["planar"]["mean_absolute_percent"] == planar
     assert found["depth"]["mean_absolute_percent"] == depth
-    assert f"depth direction {depth:.2f} %" in report_text(page)
+    assert validation["data"]["tolerance_percent"] == {"planar": 3.0, "depth": 40.0}
+    assert f"depth direction {depth:.2f} % (tolerance 40 %)" in report_text(page)
 
 
 def test_an_evaluation_gives_the_same_numbers_with_one_process_or_two(

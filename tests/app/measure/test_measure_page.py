@@ -24,6 +24,7 @@ from app.command_line.main import main
 from app.context.context import AppContext
 from app.live.grips import grips_of
 from app.measure.page import MeasurePage
+from app.services.kept import settings_file
 from app.services.preferences import Limits
 from app.workspace.reference import Reference
 from gelpolight_core.calibration.file import read_calibration, write_calibration
@@ -172,6 +173,15 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     context.settings.limits = Limits(size_percent=20.0)
     context.requests.preferences_changed.emit()
     assert press_view.state.rows[0].role == "pass"
+    # The command judges by the same tolerances.
+    assert reported["comparisons"][0]["decision"] == "not decidable"
+    context.settings.save()
+    settings_file().parent.mkdir()
+    shutil.copy(context.settings.path, settings_file())
+    assert main([*arguments, "--at", repr(at[0]), repr(at[1])]) == 0
+    by_command = json.loads(result.read_text())["comparisons"]
+    assert [row["decision"] for row in by_command] == ["conforms", record.quantities[1].decision]
+    assert [row["tolerance_percent"] for row in by_command] == [20.0, 8.0]
 
     again = _open(context)
     _kept(again, qtbot, 1)

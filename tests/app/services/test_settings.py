@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
 from PySide6.QtCore import QSettings
 
+from app.services.kept import kept_in_file, settings_file
+from app.services.preferences import Limits
 from app.services.settings import Settings
 
 
@@ -25,3 +28,22 @@ def test_settings_with_objects_are_set_aside_and_never_executed(
     assert settings.preferences.theme == "system"
     assert not (tmp_path / "harm").exists()
     assert (tmp_path / "desktop.ini.refused").exists()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[limits]\nsize_percent=3\nheight_percent=1e-06\nage_days=30\n[window]\nage_days=7\n",
+        "theme=dark\nsize_percent=2\n\n[limits]\nheight_percent=nan\nsize_percent=-1\n",
+        "[other]\nsize_percent=2\n[limits]\n; a remark\nsize_percent=4.5",
+        "",
+    ],
+)
+def test_the_commands_read_the_tolerances_of_the_window(text: str) -> None:
+    path = settings_file()
+    assert kept_in_file(Limits, "limits") == Limits()
+    path.parent.mkdir()
+    path.write_text(text)
+    assert kept_in_file(Limits, "limits") == Settings(path).limits
+    Settings(path).limits = Limits(12.0, 3.25, 0.5)
+    assert kept_in_file(Limits, "limits") == Limits(12.0, 3.25, 0.5)

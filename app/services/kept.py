@@ -1,0 +1,58 @@
+"""The settings file, and the values that it keeps, without Qt: the commands read it, too."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import Field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+import platformdirs
+
+from gelpolight_core.io.reading import read_file
+
+APPLICATION = "gelpolight"
+MOST_BYTES = 10_000_000
+Kept = TypeVar("Kept")
+
+
+def settings_file() -> Path:
+    """Return the INI file of the user."""
+    return platformdirs.user_config_path(APPLICATION) / "desktop.ini"
+
+
+def kept_values(kind: type[Kept], stored: Callable[[str], object]) -> Kept:
+    """Return kept values. One that is missing or not possible gets its default."""
+    found = {f.name: _value(str(stored(f.name)), f) for f in fields(kind)}  # type: ignore[arg-type]
+    return kind(**{name: value for name, value in found.items() if value is not None})
+
+
+def kept_in_file(kind: type[Kept], section: str) -> Kept:
+    """Return the values of a section of the user's file, as Qt reads them.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    try:
+        text = read_file(settings_file(), MOST_BYTES).decode(errors="replace")
+    except FileNotFoundError:
+        return kind()
+    found = re.findall(rf"^\[{section}\]$(.*?)(?=^\[|\Z)", text, re.MULTILINE | re.DOTALL)
+    values = dict(re.findall(r"^(\w+)=(.*)$", "".join(found), re.MULTILINE))
+    return kept_values(kind, lambda name: values.get(name, ""))
+
+
+def _value(text: str, f: Field[Any]) -> str | float | None:
+    """Return a kept value of a field, or None if it is not possible."""
+    if isinstance(f.default, bool):
+        return {"yes": True, "no": False}.get(text)
+    if isinstance(f.default, float):
+        try:
+            number = float(text)
+        except ValueError:
+            return None
+        return number if 0.0 < number < 1e6 else None
+    return text if text in f.metadata.get("choices", (text,)) else None
