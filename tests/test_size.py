@@ -65,7 +65,7 @@ MOST = {
     "gelpolight_core/recording": 494,
     "gelpolight_core/records": 486,
     "gelpolight_core/reflectance": 2330,
-    "gelpolight_core/report": 1334,
+    "gelpolight_core/report": 1337,
     "gelpolight_core/response": 398,
     "gelpolight_core/session": 971,
     "gelpolight_core/simulation": 2120,

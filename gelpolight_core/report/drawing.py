@@ -17,7 +17,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import get_font
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
@@ -40,6 +39,9 @@ ACROSS = 6
 PNG_DPI = 150
 MAP_PX = 280
 """Width of each of three maps side by side: 150 points an inch."""
+MAP_PLACES = {"left": 0.072, "right": 0.898, "bottom": 0.17, "top": 0.89, "wspace": 0.07}
+SCALE_PLACE = (0.912, 0.17, 0.012, 0.72)
+"""Three maps side by side and their scale, as parts of the figure."""
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 7.5,
@@ -79,13 +81,12 @@ def drawing(
         def drawn(*arguments: P.args, **named: P.kwargs) -> Drawing:
             with rc_context(_STYLE):
                 size_inch = (width_mm / 25.4, height_mm / 25.4)
-                layout = ConstrainedLayoutEngine()
-                figure = Figure(figsize=size_inch, layout=layout)
+                figure = Figure(figsize=size_inch, layout="constrained")
                 FigureCanvasSVG(figure)
                 caption, stream = paint(figure, *arguments, **named), io.StringIO()
-                # Left to savefig, everything would be drawn twice.
-                layout.execute(figure)
-                figure.set_layout_engine(None)
+                if layout := figure.get_layout_engine():
+                    layout.execute(figure)
+                    figure.set_layout_engine(None)  # which savefig would draw everything for
                 figure.savefig(stream, format="svg", metadata={"Date": None})
             return Drawing(caption, stream.getvalue())
 
@@ -162,7 +163,9 @@ def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Seq
     # Means over pixels as small as print shows.
     fine = min(MAP_PX / maps.shape[1], 1.0)
     shown = cv2.resize(shown, None, fx=fine, fy=fine, interpolation=cv2.INTER_AREA)
-    panels: list[Axes] = list(figure.subplots(1, 3, sharey=True))
+    # A layout by the sizes of all labels would take as long as the drawing.
+    figure.set_layout_engine(None)
+    panels: list[Axes] = list(figure.subplots(1, 3, sharey=True, gridspec_kw=MAP_PLACES))
     for k, axes in enumerate(panels):
         image = axes.imshow(
             shown[..., k],
@@ -174,5 +177,5 @@ def three_maps(figure: Figure, maps: Map, grid: MembraneGrid, label: str) -> Seq
         axes.set_title(channel_name(k), color=COLOURS[k])
         axes.set_xlabel("x (mm)")
     panels[0].set_ylabel("y (mm)")
-    figure.colorbar(image, ax=panels, label=label, shrink=0.8, pad=0.01)
+    figure.colorbar(image, cax=figure.add_axes(SCALE_PLACE), label=label)
     return panels
