@@ -8,8 +8,7 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
@@ -20,21 +19,20 @@ from app.live.grips import grips_of
 from app.live.replay_bar import ReplayBar
 from app.live.session import LiveSession
 from app.live.stage import Layout, Stage
-from app.measure.figures_text import figure_text
+from app.measure.certificate import certify
 from app.measure.inspector import Inspector
 from app.measure.judging import record_of
 from app.measure.measuring import MeasuredImage, with_residual
 from app.measure.palette import Palette
-from app.measure.placing import kind_label
 from app.measure.solid import solid_of
 from app.measure.state import PressState, advice_of, resolve
 from app.measure.steady import SteadyPress
+from app.measure.tool_list import ToolList
 from app.measure.tool_map import ToolMap
 from app.measure.tool_section import ToolSection
 from app.measure.work import Work
 from app.services.file_dialogs import ask_open, ask_save
-from app.services.jobs import Job, Jobs
-from app.theme.icons import icon
+from app.services.jobs import Jobs
 from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
 from app.widgets.layout import hbox, vbox
@@ -42,7 +40,6 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.tools import Cuboid, Cylinder
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
@@ -54,7 +51,6 @@ IMAGES = (".png", ".tif", ".tiff")
 TOOLS_WIDTH = 148
 QUANTITIES = {"depth": tr("Depth"), "residual": tr("Residual of the fitted object")}
 """What colours the surface in 3D."""
-KEY = Qt.ItemDataRole.UserRole
 
 
 class PressView(QWidget):
@@ -160,10 +156,7 @@ class PressView(QWidget):
             self.stage.bar.addWidget(icon_button(action))
 
     def _lay_out(self) -> None:
-        self.placed = named(QListWidget(), "measure.tools", tr("Tools on the image"))
-        self.placed.setIconSize(QSize(16, 16))
-        self.placed.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.placed.itemClicked.connect(lambda item: self.work.choose(item.data(KEY)))
+        self.placed = ToolList(self.work)
         tools = QWidget()
         tools.setFixedWidth(TOOLS_WIDTH)
         vbox(
@@ -366,22 +359,15 @@ class PressView(QWidget):
             return
         digest = "" if image.path is None else file_hash(image.path)
         truth = self.inspector.reference.stated_for(fit.shape).truth(fit.shape)
-        press = MeasuredPress(image.name, digest, heightmap, fit, truth)
-        limits, operator = self.context.settings.limits, self.inspector.remarks.value.operator
-
-        def work(_progress: object) -> None:
-            from gelpolight_core.report.file import write_report  # slow to import
-            from gelpolight_core.report.measurement import measurement_report
-
-            report = measurement_report(
-                calibration, (press,), limits_percent=limits.percent, operator=operator
-            )
-            write_report(report, path)
-
-        def done(_nothing: None) -> None:
-            self.inspector.say(tr("Certificate saved as {path}").format(path=path), "pass")
-
-        self._jobs.submit(Job(tr("Writing the certificate"), work, done))
+        certify(
+            MeasuredPress(image.name, digest, heightmap, fit, truth),
+            path,
+            calibration,
+            limits=self.context.settings.limits,
+            operator=self.inspector.remarks.value.operator,
+            jobs=self._jobs,
+            done=lambda sentence: self.inspector.say(sentence, "pass"),
+        )
 
     def _place(self, kind: str) -> None:
         """Let the user place a tool on the frozen image. Empty: none."""
@@ -413,7 +399,7 @@ class PressView(QWidget):
     def _render(self) -> None:
         """Show the present state, of an object with the edge that is stated."""
         tool, stated = self.work.tool, self.inspector.reference.stated_for
-        if isinstance(tool, Cylinder | Cuboid):
+        if tool is not None:
             self.work.state_edge(*stated(tool.name).edge_mm)
         state = self.state = self._resolved()
         self._want()
@@ -435,7 +421,7 @@ class PressView(QWidget):
         self.remove_action.setEnabled(bool(state.kind))
         if not state.frozen:
             self.palette_.clear()
-        self._show_placed()
+        self.placed.refresh()
         self._advise()
 
     def _show_work(self) -> None:
@@ -464,19 +450,6 @@ class PressView(QWidget):
     def _on_colour(self, quantity: str) -> None:
         self._colour_by = quantity
         self._show_frozen()
-
-    def _show_placed(self) -> None:
-        self.placed.clear()
-        for key, tool in self.work.sheet.items():
-            answer = self.work.answer_of(key)
-            value = "" if answer.refused else "…"
-            if answer.result is not None:
-                value = figure_text(answer.result.figures[0]).partition(" ")[0]
-            item = QListWidgetItem(icon(f"tool-{tool.name}"), f"{kind_label(tool.name)} {value}")
-            item.setData(KEY, key)
-            self.placed.addItem(item)
-            if key == self.work.chosen:
-                self.placed.setCurrentItem(item)
 
     def _advise(self) -> None:
         """Show what to do next."""

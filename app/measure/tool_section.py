@@ -10,7 +10,6 @@ from app.measure.work import Work
 from app.view2d.profile_plot import ProfilePlot
 from app.widgets.label import PlainLabel
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.profile_tools import Section
 from gelpolight_core.translation import tr
 
 
@@ -29,9 +28,9 @@ class ToolSection(QStackedWidget):
         """Show the section of the chosen tool."""
         found, tool = work.result, work.tool
         profile = None if found is None else found.profile
-        if found is None and work.heightmap is not None and isinstance(tool, Section):
+        if found is None and work.heightmap is not None and tool is not None:
             with suppress(InputError):  # the message is in the inspector
-                profile = tool.profile(work.heightmap)
+                profile = tool.section(work.heightmap)
         self.setCurrentWidget(self._words if profile is None else self.plot)
         self.plot.show_profiles({} if profile is None else {1: profile})
         self.plot.show_width(None if found is None else found.width_ends)

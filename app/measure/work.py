@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
@@ -151,9 +149,8 @@ class Work(QObject):
 
     def state_edge(self, radius_mm: float | None, sd_mm: float | None) -> None:
         """State the edge of the chosen cylinder or cuboid. It follows the reference, not undo."""
-        tool: Any = self._sheet[self.chosen]
-        edged = replace(tool, edge_radius_mm=radius_mm, edge_radius_sd_mm=sd_mm)
-        if edged != tool:
+        tool = self._sheet[self.chosen]
+        if (edged := tool.with_edge(radius_mm, sd_mm)) != tool:
             self.set_sheet({**self._sheet, self.chosen: edged}, self.chosen)
 
     def remove(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import timedelta
 
 import numpy as np
 import pyqtgraph as pg
@@ -14,8 +15,6 @@ from app.theme import theme
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.plots import apply_theme, bare_plot
-
-DAY_S = 86400.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +69,8 @@ class TimeChart(QWidget):
         self.shown: tuple[Series, ...] = ()
         self._unit = ""
         self._plot = bare_plot(bottom=pg.DateAxisItem())
-        self._plot.setLimits(minXRange=DAY_S)  # one value alone shows its day
+        # One value alone shows its day.
+        self._plot.setLimits(minXRange=timedelta(days=1).total_seconds())
         self._legend = self._plot.addLegend(offset=(8, 8))
         vbox(self._plot, of=self, margins=0)
         self._draw()

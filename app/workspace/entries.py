@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from gelpolight_core.calibration.manifest import CalibrationSummary, read_summary
@@ -75,7 +75,7 @@ class Entry:
     def age_days(self, now: datetime) -> float | None:
         """Return its age. None if unknown, never negative."""
         made = self.created
-        return None if made is None else max(0.0, (now - made).total_seconds() / 86400.0)
+        return None if made is None else max(0.0, (now - made) / timedelta(days=1))
 
 
 def read_entry(path: Path, *, in_use: bool = False) -> Entry:

@@ -21,7 +21,7 @@ from gelpolight_core.measurement.measured import Measured, length, map_errors, m
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.profile_tools import Section
 from gelpolight_core.measurement.roughness import ERROR_NODES, above_plane
-from gelpolight_core.measurement.tool import ToolResult, tool_result
+from gelpolight_core.measurement.tool import Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
@@ -44,7 +44,7 @@ LEAST_ARC_DEG = 30.0
 
 
 @dataclass(frozen=True, slots=True)
-class Pit:
+class Pit(Tool):
     """A pit or bump inside a rectangle whose margin shows the surface around it.
 
     Attributes
@@ -100,7 +100,7 @@ class Scratch(Section):
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure height against the surroundings, and width at half of it."""
-        profile = self.profile(heightmap)
+        profile = self.section(heightmap)
         there = _complete(profile)
         along, whole = profile.along_mm[there], float(profile.along_mm[-1])
         beside = (along < SURROUNDINGS * whole) | (along > (1.0 - SURROUNDINGS) * whole)
@@ -139,7 +139,7 @@ class EdgeRadius(Section):
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Fit a circle to the section."""
-        profile = self.profile(heightmap)
+        profile = self.section(heightmap)
         there = _complete(profile)
         along = profile.along_mm[there]
         circle = fit_circle(np.stack([along, profile.depth_mm[there]], axis=1))

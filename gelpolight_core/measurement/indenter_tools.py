@@ -13,7 +13,7 @@ from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.spread import MODE_ERRORS, MODE_PITCH_MM, ModeError
-from gelpolight_core.measurement.tool import Point, ToolResult
+from gelpolight_core.measurement.tool import Point, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import Mode
 from gelpolight_core.reconstruction.near_light.contact import MARGIN_DECAYS
@@ -121,7 +121,7 @@ def mode_error(heightmap: HeightMap) -> ModeError:
 
 
 @dataclass(frozen=True, slots=True)
-class FittedIndenter:
+class FittedIndenter(Tool):
     """An indenter, fitted with the drape around it.
 
     Attributes
@@ -147,6 +147,10 @@ class FittedIndenter:
             edge_radius_sd_mm=self.edge_radius_sd_mm,
         )
         return _fitted(self, fit)
+
+    def with_edge(self, radius_mm: float | None, sd_mm: float | None) -> Tool:
+        """Return it with a stated edge."""
+        return replace(self, edge_radius_mm=radius_mm, edge_radius_sd_mm=sd_mm)
 
 
 class Ball(FittedIndenter):

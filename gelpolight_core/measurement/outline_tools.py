@@ -18,7 +18,7 @@ from gelpolight_core.measurement.edges import (
 )
 from gelpolight_core.measurement.measured import Measured, flags_at, length, map_errors, measured
 from gelpolight_core.measurement.roughness import fit_plane, of_area, roughness
-from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
+from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
@@ -28,7 +28,7 @@ EDGES: tuple[Edge, ...] = ("steepest", "plain")
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class Circle(Tool):
     """A circle through three or more points of an edge.
 
     Attributes
@@ -66,7 +66,7 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True)
-class RectangleTool:
+class RectangleTool(Tool):
     """A rectangle: its sides, and depth, tilt and roughness inside.
 
     Attributes

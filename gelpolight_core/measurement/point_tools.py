@@ -21,7 +21,7 @@ from gelpolight_core.measurement.measured import (
     value_at,
 )
 from gelpolight_core.measurement.roughness import ERROR_NODES
-from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
+from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Distance:
+class Distance(Tool):
     """The distance between two places: in the plane, in space, and in depth.
 
     Attributes
@@ -55,7 +55,7 @@ class Distance:
 
 
 @dataclass(frozen=True, slots=True)
-class StepHeight:
+class StepHeight(Tool):
     """How much deeper the surface is in one rectangle than in another.
 
     Attributes
@@ -92,7 +92,7 @@ class StepHeight:
 
 
 @dataclass(frozen=True, slots=True)
-class Angle:
+class Angle(Tool):
     """The angle at an apex between two arms: in the plane, and in space.
 
     Attributes

@@ -21,7 +21,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class Section(Tool):
     """A section through the map.
 
     Attributes
@@ -34,13 +34,13 @@ class Section:
     end_mm: Point
     width_mm: float = 0.0
 
-    def profile(self, heightmap: HeightMap) -> Profile:
+    def section(self, heightmap: HeightMap) -> Profile:
         """Return the depth along it."""
         return take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
 
 
 @dataclass(frozen=True, slots=True)
-class _BetweenRanges:
+class _BetweenRanges(Tool):
     """A figure from two ranges of a profile.
 
     Attributes
@@ -59,9 +59,13 @@ class _BetweenRanges:
     second_mm: Range
     width_mm: float = 0.0
 
+    def section(self, heightmap: HeightMap) -> Profile:
+        """Return the depth along the profile."""
+        return take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
-        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        profile = self.section(heightmap)
         figure = type(self).compute(profile, self.first_mm, self.second_mm)
         return _profile_result(self, profile, (figure,), (self.first_mm, self.second_mm))
 
@@ -100,7 +104,7 @@ class ProfileWidth(Section):
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
-        profile = self.profile(heightmap)
+        profile = self.section(heightmap)
         figure = width_at(profile, self.level_mm, between=self.between_mm)
         ends = width_ends(profile, self.level_mm, between=self.between_mm)
         figures = (figure, Measured(ends[2], None, "mm", "level"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -125,6 +125,10 @@ class Measurement:
     def height_sd_mm(self) -> float:
         """Standard deviation of `height_mm`."""
         return float(self.sd.get("height_mm", math.nan))
+
+    def doubted(self, faults: tuple[Finding, ...]) -> Measurement:
+        """Return the measurement with further findings."""
+        return replace(self, findings=(*faults, *self.findings))
 
     def parts_of(self, key: str) -> tuple[tuple[str, float], ...]:
         """Return the known sources of a standard deviation, and their parts of it.

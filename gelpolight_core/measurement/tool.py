@@ -6,7 +6,7 @@ command line.
 
 from __future__ import annotations
 
-from dataclasses import Field, dataclass, fields
+from dataclasses import Field, dataclass, fields, replace
 from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
@@ -67,6 +67,16 @@ class ToolResult:
     width_ends: tuple[float, float, float] | None = None
 
     @property
+    def shape(self) -> str:
+        """The shape that was fitted; empty if none was."""
+        return "" if self.measurement is None else self.measurement.shape
+
+    def doubted(self, faults: tuple[Finding, ...]) -> ToolResult:
+        """Return the result with further findings, also in its fit."""
+        fit = self.measurement and self.measurement.doubted(faults)
+        return replace(self, findings=(*faults, *self.findings), measurement=fit)
+
+    @property
     def verdict(self) -> str:
         """``ok``, or ``doubtful`` where there are findings."""
         return "doubtful" if self.findings else "ok"
@@ -87,6 +97,7 @@ class ToolResult:
 class Tool(Protocol):
     """Geometry that can be applied to a height map."""
 
+    __slots__ = ()
     name: ClassVar[str]
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
@@ -98,6 +109,20 @@ class Tool(Protocol):
             If there is nothing to measure at this position of the map.
         """
         ...
+
+    def section(self, heightmap: HeightMap) -> Profile | None:
+        """Return the depth along the section that it reads; None: it reads none.
+
+        Raises
+        ------
+        InputError
+            If the section does not lie on the map.
+        """
+        return None
+
+    def with_edge(self, radius_mm: float | None, sd_mm: float | None) -> Tool:
+        """Return the tool for an object with a stated edge; a tool without edges, unchanged."""
+        return self
 
 
 def places(kind: type[Tool]) -> tuple[Field[Any], ...]:

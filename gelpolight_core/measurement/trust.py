@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TypeVar
 
 from gelpolight_core.finding import Finding, doubt
@@ -38,13 +37,10 @@ def judged(result: Result, height_map: HeightMap) -> Result:
         with an in-place calibration; unchanged otherwise.
     """
     faults: tuple[Finding, ...] = height_map.doubts
-    if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
+    if result.shape in WALLED and height_map.model == IN_PLACE:
         text = tr(
             "the balls of this in-place calibration have no walls: on the virtual sensor, "
             "heights are 7 to 10 % too small and sizes 2 to 11 % too large"
         )
         faults = (*faults, doubt("walls", text))
-    found = replace(result, findings=(*faults, *result.findings))
-    if isinstance(found, ToolResult) and found.measurement is not None:
-        found = replace(found, measurement=judged(found.measurement, height_map))
-    return found
+    return result.doubted(faults)
