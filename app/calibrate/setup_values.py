@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from app.widgets.fields import choice, number, text
 from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.calibration.missing import needs_only_open_sensor
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.fields import choice, number, text
 from gelpolight_core.in_place.preset import presets
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (

@@ -22,14 +22,12 @@ from app.services.file_dialogs import ask_open
 from app.services.jobs import Job
 from app.sources.bench import Scene
 from app.widgets.buttons import push_button
-from app.widgets.fields import choice, number
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
 from app.widgets.layout import vbox
 from app.widgets.meaning import set_property, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import read_entry
-from app.workspace.reference import MM, Reference, optional_length
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
@@ -39,34 +37,18 @@ from gelpolight_core.lab.trend import keep_sample, sample_of_validation
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.result import Measurement, Truth, compare
+from gelpolight_core.measurement.result import Measurement, compare
 from gelpolight_core.measurement.trust import judged
-from gelpolight_core.quantity import COVERAGE
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reference import LENGTHS, SHAPES, Truth
 from gelpolight_core.session.images import average_frames
 from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
 FRAMES = 4
 TRUTH = "truth.csv"
-SHAPES = {
-    "cylinder": tr("Cylinder, flat end"),
-    "cuboid": tr("Cuboid, flat end"),
-    "ball": tr("Ball"),
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Asked(Reference):
-    """The pressed object; a height of 0 is not known."""
-
-    shape: str = choice("cylinder", tr("Shape"), SHAPES)
-    size_mm: float = number(5.0, tr("True diameter or side"), 0.01, 500.0, MM, 3, step=0.1)
-    height_mm: float = optional_length(tr("True depth of the press"), tr("not known"))
-    edge_radius_mm: float = optional_length(
-        tr("Edge radius"), tr("fitted"), when=lambda asked: asked.shape != "ball"
-    )
+ASKED = ("shape", *LENGTHS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,8 +107,8 @@ def run_trial(
     measured = measure_heightmap(
         heightmap,
         shape=known.shape,
-        edge_radius_mm=known.edge_radius_mm,
-        edge_radius_sd_mm=known.edge_radius_sd_mm,
+        edge_radius_mm=known.edge_mm[0],
+        edge_radius_sd_mm=known.edge_mm[1],
     )
     names = (tr("side") if known.shape == "cuboid" else tr("diameter"), tr("height"))
     comparisons = tuple(
@@ -167,7 +149,7 @@ class ValidationStep(Step):
 
     def build(self) -> None:
         """Create the form of the pressed object and the button that records."""
-        self.form = Form(Asked(), "validation", at_once=True)
+        self.form = Form(Truth(size_mm=5.0), "validation", at_once=True, only=ASKED)
         self.calibration = named(
             PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
         )
@@ -246,23 +228,11 @@ class ValidationStep(Step):
 
     def on_bench(self, scene: Scene) -> None:
         """Fill in the object on the virtual bench."""
-        self.show_known(Truth(scene.item, scene.size_mm, scene.depth_mm))
+        self.show_known(Truth(scene.item, scene.size_mm, height_mm=scene.depth_mm))
 
     def show_known(self, known: Truth) -> None:
         """Fill in an object."""
-        shape = known.shape if known.shape in SHAPES else next(iter(SHAPES))
-        self.form.change(
-            shape=shape,
-            size_mm=known.size_mm,
-            size_expanded_mm=COVERAGE * (known.size_sd_mm or 0.0),
-            height_mm=known.height_mm if known.is_whole else 0.0,
-            height_expanded_mm=COVERAGE * (known.height_sd_mm or 0.0),
-            edge_radius_mm=known.edge_radius_mm or 0.0,
-            edge_radius_expanded_mm=COVERAGE * (known.edge_radius_sd_mm or 0.0),
-            certificate=known.certificate,
-            due=known.due,
-            serial=known.serial,
-        )
+        self.form.show_value(known if known.shape in SHAPES else replace(known, shape="cylinder"))
 
     # The calibration
 
@@ -325,7 +295,7 @@ class ValidationStep(Step):
 
     def _measure(self, frames: list[NDArray[Any]]) -> None:
         self._show(None)
-        known, asked = self.form.value.truth(self.form.value.shape), self._asked
+        known, asked = self.form.value, self._asked
         path, present = self.model.saved_path, self._reconstructor[1]
         if path is None:
             self._refuse(self.calibration.text())

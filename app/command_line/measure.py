@@ -22,10 +22,10 @@ from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.tools import Tool, ToolResult, result_as_dict
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reference import Truth
 from gelpolight_core.report.document import refuse_other_endings
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.translation import tr
@@ -127,7 +127,7 @@ class Measure(ToolArguments):
         assert self.shape is not None  # it or a tool is required
         edge_mm, edge_sd_mm = self.edge_radius, None
         if truth is not None and edge_mm is None:
-            edge_mm, edge_sd_mm = truth.edge_radius_mm, truth.edge_radius_sd_mm
+            edge_mm, edge_sd_mm = truth.edge_mm
         found = measure_heightmap(
             heightmap,
             shape=self.shape,

@@ -18,10 +18,10 @@ from app.sources.recording import RecordingSource
 from app.sources.source import Frame, Source
 from app.widgets.actions import make_action
 from app.widgets.dialog import Dialog
-from app.widgets.fields import folder as folder_field
-from app.widgets.fields import number, switch
 from app.widgets.forms import Form, form_dialog
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.fields import folder as folder_field
+from gelpolight_core.fields import number, switch
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr

@@ -15,7 +15,6 @@ from app.live.depth import LiveDepth
 from app.live.frame_results import Shown
 from app.widgets.buttons import Slot, push_button
 from app.widgets.dialog import Dialog
-from app.widgets.fields import choice, number
 from app.widgets.forms import Form
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
@@ -23,6 +22,7 @@ from app.widgets.naming import named
 from app.widgets.question import ask
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.live_message import pack
+from gelpolight_core.fields import choice, number
 from gelpolight_core.translation import tr
 
 HOST, PORT = "127.0.0.1", 5557

@@ -25,10 +25,10 @@ from app.view2d.quantities import Reference
 from app.view3d.saving import Played
 from app.widgets.actions import make_action
 from app.widgets.buttons import Slot
-from app.widgets.fields import as_text, from_text
 from app.widgets.fold import Fold
 from app.widgets.layout import hbox, side_panel
 from app.widgets.naming import named
+from gelpolight_core.fields import as_text, from_text
 from gelpolight_core.translation import tr
 
 

@@ -37,9 +37,9 @@ from app.view3d.saving import Played
 from app.view3d.surface import SurfaceLine
 from app.widgets.actions import icon_button, make_action
 from app.widgets.buttons import Slot
-from app.widgets.fields import choice, switch
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
+from gelpolight_core.fields import choice, switch
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr

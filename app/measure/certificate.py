@@ -20,7 +20,7 @@ def certify(
     limits: Limits,
     operator: str,
     jobs: Jobs,
-    done: Callable[[str], object],
+    done: Callable[[str], None],
 ) -> None:
     """Write the certificate of a measured object, then call `done` with a sentence.
 

@@ -5,21 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.services.preferences import Limits
-from app.workspace.reference import Reference
 from gelpolight_core.measurement.result import compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
-from gelpolight_core.quantity import COVERAGE, Quantity
+from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, verdict_of
+from gelpolight_core.reference import Truth
 
 DEPTH_FIGURES = frozenset({"step_height", "height", "depth_difference", "mean_depth", "deepest"})
 
 
-def quantities_of(result: ToolResult, reference: Reference, limits: Limits) -> tuple[Quantity, ...]:
+def quantities_of(result: ToolResult, reference: Truth, limits: Limits) -> tuple[Quantity, ...]:
     """Return the measured values of a result, with their true values where they are known."""
     fit = result.measurement
     if fit is not None:
-        return compare(fit, reference.truth(fit.shape), limits.percent)
+        return compare(fit, reference, limits.percent)
     first, *others = (Quantity(f"{f.name}_{f.unit}", f.value, f.sd) for f in result.figures)
     if not reference.size_mm:
         return (first, *others)
@@ -32,14 +32,14 @@ def quantities_of(result: ToolResult, reference: Reference, limits: Limits) -> t
         value=value,
         truth=reference.size_mm,
         limit_percent=limit,
-        truth_sd=reference.size_expanded_mm / COVERAGE or None,
+        truth_sd=reference.size_sd_mm,
     )
     return (stated, *others)
 
 
 def record_of(
     result: ToolResult,
-    reference: Reference,
+    reference: Truth,
     heightmap: HeightMap,
     *,
     limits: Limits,
@@ -53,7 +53,7 @@ def record_of(
     ----------
     result : ToolResult
         Result of a tool.
-    reference : Reference
+    reference : Truth
         The true values.
     heightmap : HeightMap
         The height map that was measured.
@@ -68,7 +68,7 @@ def record_of(
     if fit is None:
         shape, details = result.tool.name.replace("-", "_"), result_as_dict(result)
     else:
-        shape, details = fit.shape, fit.as_json(reference.truth(fit.shape), limits.percent)
+        shape, details = fit.shape, fit.as_json(reference, limits.percent)
     settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
     if reference.name:
         settings["indenter"] = reference.name

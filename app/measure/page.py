@@ -19,9 +19,10 @@ from app.services.jobs import Jobs
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.workspace.indenters import FILE as INDENTERS
-from app.workspace.indenters import Indenter, read_indenters, write_indenters
+from app.workspace.indenters import read_indenters, write_indenters
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.file_hashes import KnownFiles
 from gelpolight_core.translation import tr
 
@@ -176,7 +177,7 @@ class MeasurePage(QWidget):
 
     # The known objects
 
-    def _read_objects(self) -> tuple[Indenter, ...] | None:
+    def _read_objects(self) -> tuple[Truth, ...] | None:
         """Read the known objects, show and return them. None if they cannot be read."""
         known = None
         with self.context.toasts.errors():
@@ -196,7 +197,7 @@ class MeasurePage(QWidget):
         dialog.open()
 
     def _keep_objects(
-        self, objects: tuple[Indenter, ...], before: KnownFiles, list_file: Path
+        self, objects: tuple[Truth, ...], before: KnownFiles, list_file: Path
     ) -> None:
         with self.context.toasts.errors():
             before.refuse_changed(list_file)

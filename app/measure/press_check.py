@@ -15,9 +15,9 @@ from app.measure.placing import kind_label
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.press import Press
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.steadiness import find_contact
 from gelpolight_core.reconstruction.background_shift import background_shift
+from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 

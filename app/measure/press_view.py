@@ -358,7 +358,7 @@ class PressView(QWidget):
         if image is None or heightmap is None or fit is None or calibration is None:
             return
         digest = "" if image.path is None else file_hash(image.path)
-        truth = self.inspector.reference.stated_for(fit.shape).truth(fit.shape)
+        truth = self.inspector.reference.stated_for(fit.shape)
         certify(
             MeasuredPress(image.name, digest, heightmap, fit, truth),
             path,

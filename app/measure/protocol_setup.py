@@ -21,7 +21,6 @@ from PySide6.QtWidgets import (
 
 from app.measure.placing import kind_label
 from app.widgets.buttons import push_button
-from app.widgets.fields import choice, number
 from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
@@ -29,6 +28,7 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import heading, show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
+from gelpolight_core.fields import choice, number
 from gelpolight_core.measurement.protocol import SHAPES, Protocol
 from gelpolight_core.measurement.statistics import too_few
 from gelpolight_core.translation import tr

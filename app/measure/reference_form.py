@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QLabel, QWidget
@@ -14,8 +14,7 @@ from app.widgets.forms import Form
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
-from app.workspace.indenters import Indenter
-from app.workspace.reference import Reference
+from gelpolight_core.reference import LENGTHS, Truth
 from gelpolight_core.translation import tr
 
 AGAIN = "\0again"
@@ -38,9 +37,9 @@ class ReferenceForm(QWidget):
         named(self, "measure.reference", tr("Reference"))
         self._on_changed = on_changed
         self._kind = ""
-        self._kept: dict[str, Reference] = {}
-        self._before: dict[str, Reference] = {}
-        self._objects: tuple[Indenter, ...] = ()
+        self._kept: dict[str, Truth] = {}
+        self._before: dict[str, Truth] = {}
+        self._objects: tuple[Truth, ...] = ()
         self.known = named(ComboBox(), "measure.reference.known", tr("Known object"))
         self.known.setMinimumContentsLength(12)
         self.known.setSizeAdjustPolicy(
@@ -50,20 +49,20 @@ class ReferenceForm(QWidget):
         edit = tool_button(
             "measure.reference.edit", tr("Edit…"), on_edit, tip=tr("Edit the known objects")
         )
-        self.form = Form(Reference(), "measure.reference", at_once=True)
+        self.form = Form(Truth(""), "measure.reference", at_once=True, only=LENGTHS)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
         vbox(hbox((self.known, 1), edit, spacing=4), self.form, of=self, margins=0)
 
     @property
-    def stated(self) -> Reference:
+    def stated(self) -> Truth:
         """The true values of the chosen tool."""
         return self.form.value
 
-    def stated_for(self, kind: str) -> Reference:
+    def stated_for(self, kind: str) -> Truth:
         """Return the true values of a kind of tool on this press."""
-        return self.stated if kind == self._kind else self._kept.get(kind, Reference())
+        return self.stated if kind == self._kind else self._kept.get(kind, Truth(kind))
 
-    def show_objects(self, objects: tuple[Indenter, ...]) -> None:
+    def show_objects(self, objects: tuple[Truth, ...]) -> None:
         """Offer these known objects, and use what is corrected in the list."""
         self._objects = objects
         for kind, stated in {**self._kept, self._kind: self.stated}.items():
@@ -76,20 +75,18 @@ class ReferenceForm(QWidget):
     def new_press(self) -> None:
         """Clear the true values: the next press can be of another object. They are offered."""
         kept = {**self._kept, self._kind: self.stated}
-        self._before |= {kind: stated for kind, stated in kept.items() if stated != Reference()}
+        self._before |= {kind: stated for kind, stated in kept.items() if stated != Truth(kind)}
         self._kept = {}
-        self.state(Reference())
+        self.state(Truth(self._kind))
 
     def show_state(self, state: PressState) -> None:
         """Ask for the true values of the chosen tool. Those of this press are restored."""
         if state.kind != self._kind:
             self._kept[self._kind] = self.stated
             self._kind = state.kind
-            self.form.show_value(self._kept.get(state.kind, Reference()))
+            self.form.show_value(self._kept.get(state.kind, Truth(state.kind)))
             self._offer()
         self.setEnabled(bool(state.kind))
-        self.form.show_row("height_mm", state.has_height)
-        self.form.show_row("edge_radius_mm", state.has_edge)
         label = self.form.rows.labelForField(self.form.inputs["size_mm"])
         if isinstance(label, QLabel):
             label.setText(state.asked or tr("Size"))
@@ -97,7 +94,7 @@ class ReferenceForm(QWidget):
             if isinstance(made := self.form.inputs[name], DoubleSpinBox):
                 made.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
 
-    def state(self, stated: Reference) -> None:
+    def state(self, stated: Truth) -> None:
         """Enter values from code, as if the user had chosen them."""
         self.form.show_value(stated)
         self._offer()
@@ -115,21 +112,17 @@ class ReferenceForm(QWidget):
                     self.known.addItem(known.name, known.name)
             self.known.setCurrentIndex(max(self.known.findData(self.stated.name), 0))
 
-    def _listed(self, kind: str, name: str) -> Reference | None:
+    def _listed(self, kind: str, name: str) -> Truth | None:
         """Return the listed values of an object, or None if it is not in the list."""
-        for known in self._objects:
-            if (known.shape, known.name) == (kind, name):
-                values = {key: value for key, value in asdict(known).items() if value is not None}
-                mean = {"size_mm": known.mean_size_mm, "second_mm": 0.0, "shape": ""}
-                return Reference(**values | mean)
-        return None
+        listed = (known for known in self._objects if (known.shape, known.name) == (kind, name))
+        return next(listed, None)
 
     def _on_known(self) -> None:
         name = self.known.currentData()
         if name == AGAIN:
             self.state(self._before[self._kind])
         else:
-            self.state(self._listed(self._kind, name) or Reference())
+            self.state(self._listed(self._kind, name) or Truth(self._kind))
 
     def _on_typed(self) -> None:
         """Forget the known object: its values are no longer those."""

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 from app.live.advice import PREPARING, LiveState, advise
 from app.measure.figures_text import decimals_for, unit_behind, unit_of
 from app.measure.judging import quantities_of
-from app.measure.placing import INDENTERS, kind_label
+from app.measure.placing import kind_label
 from app.measure.work import Work
 from app.services.preferences import Limits
 from app.widgets.units import length_unit, per_mm
-from app.workspace.reference import Reference
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.quantity import Quantity, decision_word
 from gelpolight_core.records.entry import verdict_of
+from gelpolight_core.reference import Truth
 from gelpolight_core.translation import tr
 
 FIGURE_SPACE, POINT_SPACE = "\N{FIGURE SPACE}", "\N{PUNCTUATION SPACE}"
@@ -87,19 +87,9 @@ class PressState:
         """Whether there is a result to save."""
         return bool(self.rows)
 
-    @property
-    def has_height(self) -> bool:
-        """Whether the reference has a height, too."""
-        return self.kind in INDENTERS
-
-    @property
-    def has_edge(self) -> bool:
-        """Whether the reference has an edge, too."""
-        return self.has_height and self.kind != "ball"
-
 
 def resolve(
-    work: Work, reference: Reference, limits: Limits, *, freezable: bool, earlier: bool
+    work: Work, reference: Truth, limits: Limits, *, freezable: bool, earlier: bool
 ) -> PressState:
     """Return what the page shows.
 
@@ -107,7 +97,7 @@ def resolve(
     ----------
     work : Work
         The image and the tools on it.
-    reference : Reference
+    reference : Truth
         The true values of the chosen tool.
     limits : Limits
         Limits of the verdict.
@@ -128,7 +118,7 @@ def resolve(
     )
     if (found := answer.result) is not None:
         first = found.figures[0]
-        asked = tr("mean side") if found.tool.name == "cuboid" else first.label
+        asked = tr("side") if found.tool.name == "cuboid" else first.label
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
         if found.tool == tool:
             return _with_result(state, found, reference, quantities_of(found, reference, limits))
@@ -138,11 +128,11 @@ def resolve(
 
 
 def _with_result(
-    state: PressState, result: ToolResult, reference: Reference, quantities: tuple[Quantity, ...]
+    state: PressState, result: ToolResult, reference: Truth, quantities: tuple[Quantity, ...]
 ) -> PressState:
     doubtful = result.verdict != "ok"
     reasons = [tr("Doubtful: {reason}").format(reason=result.reason)] if doubtful else []
-    reasons += [finding.line for finding in reference.truth(state.kind).findings()]
+    reasons += [finding.line for finding in reference.findings()]
     return replace(
         state,
         verdict=verdict_of(quantities, doubtful=doubtful),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.widgets.fields import choice, folder, number
+from gelpolight_core.fields import choice, folder, number
 from gelpolight_core.quantity import PAPER_PERCENT
 from gelpolight_core.reconstruction.modes import MODES, Mode
 from gelpolight_core.translation import LANGUAGES, tr

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from app.widgets.fields import choice, number
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
+from gelpolight_core.fields import choice, number
 from gelpolight_core.simulation.rays import pixel_directions, trace_points
 from gelpolight_core.translation import tr
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from app.widgets.fields import choice, number, switch
 from gelpolight_core.errors import InputError
+from gelpolight_core.fields import choice, number, switch
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import (

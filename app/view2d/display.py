@@ -9,7 +9,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 
-from app.widgets.fields import choice, number, switch
+from gelpolight_core.fields import choice, number, switch
 from gelpolight_core.translation import tr
 
 LIMITS_MM = -1.0, 5.0

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.view2d.quantities import Reference
-from app.widgets.fields import choice, number
 from gelpolight_core.errors import InputError
+from gelpolight_core.fields import choice, number
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import (
     LARGEST_MEDIAN,

@@ -21,12 +21,12 @@ from app.view3d.saving import Played, ViewSaving
 from app.view3d.style import Style
 from app.view3d.surface import Surface, SurfaceLine
 from app.widgets.buttons import tool_button
-from app.widgets.fields import as_text, from_text
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from app.widgets.native import give_own_window
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.fields import as_text, from_text
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:

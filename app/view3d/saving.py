@@ -18,10 +18,10 @@ from app.services.file_dialogs import ask_save
 from app.services.settings import Settings
 from app.view3d.surface import Surface
 from app.widgets.dialog import Dialog
-from app.widgets.fields import choice, number, switch
 from app.widgets.forms import Form, form_dialog
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
+from gelpolight_core.fields import choice, number, switch
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.translation import tr
 

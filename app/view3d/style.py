@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from app.widgets.fields import switch
+from gelpolight_core.fields import switch
 from gelpolight_core.translation import tr
 
 Vector = tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""A form from a frozen dataclass of :mod:`app.widgets.fields`."""
+"""A form from a frozen dataclass of :mod:`gelpolight_core.fields`."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from PySide6.QtWidgets import (
 
 from app.theme.icons import icon
 from app.widgets.dialog import Dialog
-from app.widgets.fields import When
 from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
+from gelpolight_core.fields import When
 from gelpolight_core.translation import tr
 
 V = TypeVar("V")
@@ -41,6 +41,8 @@ class Form(QWidget, Generic[V]):
         Start of the object names of the inputs. The name of the field follows.
     at_once : bool, optional
         Whether a number counts while it is typed.
+    only : tuple of str, optional
+        The fields that are shown, if not all.
 
     Attributes
     ----------
@@ -59,7 +61,9 @@ class Form(QWidget, Generic[V]):
 
     changed = Signal(str, object)
 
-    def __init__(self, value: V, name: str, *, at_once: bool = False) -> None:
+    def __init__(
+        self, value: V, name: str, *, at_once: bool = False, only: tuple[str, ...] = ()
+    ) -> None:
         super().__init__()
         self._at_once = at_once
         self.inputs: dict[str, QWidget] = {}
@@ -70,7 +74,7 @@ class Form(QWidget, Generic[V]):
         self.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         self.rows.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for f in fields(value):  # type: ignore[arg-type]
-            if "label" in f.metadata:
+            if "label" in f.metadata and (not only or f.name in only):
                 made, meta = self._input(f), f.metadata
                 words = (meta["label"] or meta["text"]).replace("&", "")
                 named(made, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))

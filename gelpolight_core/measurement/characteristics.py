@@ -23,11 +23,11 @@ from scipy.stats import linregress
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.measurement.press import LENGTHS, Press
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.images import SUFFIXES, read_image, require_colour
 from gelpolight_core.translation import marked, tr, translated
 

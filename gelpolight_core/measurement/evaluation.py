@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from gelpolight_core.finding import Finding, QualityTable, Verdict, judge
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.press import LENGTHS, Press
-from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few
 from gelpolight_core.quantity import COVERAGE, REST, TOLERANCE_PERCENT, guarded
+from gelpolight_core.reference import Truth
 from gelpolight_core.translation import tr
 
 DIRECTIONS = tuple(LENGTHS)

@@ -15,9 +15,10 @@ from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.protocol_run import crossing_of
-from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
@@ -39,11 +40,9 @@ def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, Truth], M
         image = read_image(path, response=calibration.response)
         require_colour(image, where=str(path))
         heightmap = measurable_depth(reconstructor, image.rgb, name=path.name, where=str(path))
+        edge_mm, edge_sd_mm = truth.edge_mm
         found = measure_heightmap(
-            heightmap,
-            shape=truth.shape,
-            edge_radius_mm=truth.edge_radius_mm,
-            edge_radius_sd_mm=truth.edge_radius_sd_mm,
+            heightmap, shape=truth.shape, edge_radius_mm=edge_mm, edge_radius_sd_mm=edge_sd_mm
         )
         return judged(found, heightmap)
 

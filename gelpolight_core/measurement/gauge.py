@@ -21,13 +21,13 @@ from gelpolight_core.measurement.evaluation import (
     region_kinds,
 )
 from gelpolight_core.measurement.press import LENGTHS, Press
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.statistics import (
     Statistics,
     missing_repeats,
     statistics_of,
     too_few,
 )
+from gelpolight_core.reference import Truth
 from gelpolight_core.translation import tr
 
 Lengths = list[list[float]]

@@ -20,7 +20,8 @@ from gelpolight_core.io.atomic import append_json
 from gelpolight_core.io.reading import json_lines, plain_text
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.measurement.evaluation_run import Outcome, outcome_of
-from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.reference import Truth
 from gelpolight_core.translation import english
 
 
@@ -81,7 +82,7 @@ class Ledger:
         except OSError:  # the measurement itself reports this error
             return None
         digest = hashlib.sha256(content)
-        edge = truth.edge_radius_mm, truth.edge_radius_sd_mm
+        edge = truth.edge_mm
         stated = "" if edge[0] is None else f"\n{edge}"
         digest.update(f"\n{truth.shape}\n{self._name}{stated}".encode())
         return digest.hexdigest()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reference import Truth
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,17 +13,17 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, is_file_name
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.result import Measurement, Truth, checked_day, compare
-from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity, percent_error
+from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, percent_error
+from gelpolight_core.reference import RANGE_MM, Truth, checked_day
 from gelpolight_core.session.session import (
     INDENTERS,
-    REFERENCE_RANGE,
     parse_indenters,
     read_description,
 )
 from gelpolight_core.translation import tr
 
-LONGEST_MM, SHORTEST_MM = REFERENCE_RANGE[1], math.ulp(0.0)
+LONGEST_MM, SHORTEST_MM = RANGE_MM[1], math.ulp(0.0)
 NEEDED = ("file", "shape", "height_mm")
 INDENTER = "indenter"
 """The column that names an object of ``[indenters]``, from which a row takes its empty cells."""
@@ -234,20 +234,20 @@ def _completed(
 def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
     size = "side" if shape == "cuboid" else "diameter"
 
-    def optional(key: str) -> float | None:
-        return _length(record, key, where, 0.0) if record.get(key) else None
+    def optional(key: str) -> float:
+        return _length(record, key, where, 0.0) if record.get(key) else 0.0
 
     truth = Truth(
         shape,
         _length(record, f"{size}_mm", where),
-        _length(record, "height_mm", where),
-        optional(f"{size}_sd_mm"),
-        optional("height_sd_mm"),
-        optional("edge_radius_mm"),
-        optional("edge_radius_sd_mm"),
-        record.get("certificate", ""),
-        checked_day(record.get("due", ""), where),
-        record.get("serial", ""),
+        size_expanded_mm=COVERAGE * optional(f"{size}_sd_mm"),
+        height_mm=_length(record, "height_mm", where),
+        height_expanded_mm=COVERAGE * optional("height_sd_mm"),
+        edge_radius_mm=optional("edge_radius_mm"),
+        edge_radius_expanded_mm=COVERAGE * optional("edge_radius_sd_mm"),
+        certificate=record.get("certificate", ""),
+        due=checked_day(record.get("due", ""), where),
+        serial=record.get("serial", ""),
     )
     names = record.get("region", ""), record.get("repeat", "")
     if not record.get("position_sd_mm"):

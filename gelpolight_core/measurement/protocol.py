@@ -31,8 +31,8 @@ from gelpolight_core.io.reading import (
 )
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.press import Press
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.statistics import missing_repeats
+from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
@@ -94,7 +94,9 @@ class Protocol:
         planar = [(size, self.at_height_mm) for size in self.sizes_mm]
         depth = [(self.at_size_mm, height) for height in self.heights_mm]
         items = tuple(dict.fromkeys(planar + depth))
-        return tuple(Truth(shape, *item) for shape in self.shapes for item in items)
+        return tuple(
+            Truth(shape, size, height_mm=height) for shape in self.shapes for size, height in items
+        )
 
     @property
     def crossing(self) -> Crossing:

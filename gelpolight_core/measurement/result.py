@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from datetime import date
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import Finding, Verdict, reason_of
-from gelpolight_core.io.reading import brief
+from gelpolight_core.finding import Finding, reason_of
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.quantity import TOLERANCE_PERCENT, Quantity
+from gelpolight_core.reference import Truth
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -194,92 +192,6 @@ def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:
     return {k: list(v) if isinstance(v, tuple) else v for k, v in spread.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """The reference: what is known of a pressed object, with standard uncertainties (k = 1).
-
-    Attributes
-    ----------
-    shape : str
-        ``cylinder``, ``cuboid`` or ``ball``.
-    size_mm : float
-        Diameter, or mean side of a cuboid.
-    height_mm : float
-        Indentation depth.
-    size_sd_mm, height_sd_mm : float or None
-        Their standard uncertainties; None where they are not stated.
-    edge_radius_mm, edge_radius_sd_mm : float or None
-        Fillet of the edge and its standard uncertainty; None where they are not stated.
-    certificate, serial : str
-        Number of its calibration certificate, and its own; empty if not stated.
-    due : str
-        Day on which its calibration ends, such as ``2027-03-31``; empty if not stated.
-    """
-
-    shape: str
-    size_mm: float
-    height_mm: float
-    size_sd_mm: float | None = None
-    height_sd_mm: float | None = None
-    edge_radius_mm: float | None = None
-    edge_radius_sd_mm: float | None = None
-    certificate: str = ""
-    due: str = ""
-    serial: str = ""
-
-    @property
-    def size_key(self) -> str:
-        """The name under which the size is written: ``side_mm`` or ``diameter_mm``."""
-        return "side_mm" if self.shape == "cuboid" else "diameter_mm"
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether both sizes are known."""
-        return math.isfinite(self.size_mm) and math.isfinite(self.height_mm)
-
-    def findings(self, on: date | None = None) -> tuple[Finding, ...]:
-        """Return what is wrong with the reference on a day, by default today."""
-        if not self.due or date.fromisoformat(self.due) >= (on or date.today()):
-            return ()
-        text = tr("the calibration of the reference {number} ended on {day}").format(
-            number=self.certificate or self.serial, day=self.due
-        )
-        remedy = tr("Have the reference calibrated again, or use another one")
-        return (Finding("reference_due", text, verdict=Verdict.WARN, remedy=remedy),)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the reference as plain values, without what is not stated."""
-        more = {
-            self.size_key.replace("_mm", "_sd_mm"): self.size_sd_mm,
-            "height_sd_mm": self.height_sd_mm,
-            "edge_radius_mm": self.edge_radius_mm,
-            "edge_radius_sd_mm": self.edge_radius_sd_mm,
-            "certificate": self.certificate or None,
-            "due": self.due or None,
-            "serial": self.serial or None,
-        }
-        sizes = {"shape": self.shape, self.size_key: self.size_mm, "height_mm": self.height_mm}
-        return sizes | {key: value for key, value in more.items() if value is not None}
-
-
-def checked_day(text: str, where: Path | str) -> str:
-    """Return a day such as ``2027-03-31``, or an empty text.
-
-    Raises
-    ------
-    InputError
-        If it is another text.
-    """
-    try:
-        return text and date.fromisoformat(text).isoformat()
-    except ValueError as error:
-        raise InputError(
-            tr("'{text}' is not a day").format(text=brief(text)),
-            where,
-            tr("Write it as 2027-03-31"),
-        ) from error
-
-
 def compare(
     measurement: Measurement,
     truth: Truth | None = None,
@@ -292,7 +204,7 @@ def compare(
     measurement : Measurement
         From :func:`~gelpolight_core.measurement.measure.measure_object`.
     truth : Truth, optional
-        Nominal sizes, greater than zero; NaN where one is not known.
+        Its sizes that are stated.
     limits_percent : (float, float), optional
         Tolerances of size and height.
 
@@ -301,7 +213,7 @@ def compare(
     InputError
         If the shape differs from that of the truth, or a true size is not positive.
     """
-    truth = truth or Truth(measurement.shape, math.nan, math.nan)
+    truth = truth or Truth(measurement.shape)
     if truth.shape != measurement.shape:
         raise InputError(
             tr("the true shape is a {truth}, but a {shape} was measured").format(
@@ -310,15 +222,15 @@ def compare(
             tr("truth"),
             Remedy.CHOOSE_SHAPE,
         )
-    for value in (truth.size_mm, truth.height_mm):
-        if value <= 0.0 or math.isinf(value):
+    for value in (truth.size_mm, truth.second_mm, truth.height_mm):
+        if value < 0.0 or not math.isfinite(value):
             raise InputError(
                 tr("the true size is {value} mm, not greater than zero").format(value=value),
                 tr("truth"),
                 Remedy.CORRECT_VALUE,
             )
     rows = (
-        (truth.size_key, measurement.size_mm, measurement.size_sd_mm, truth.size_mm),
+        (truth.size_key, measurement.size_mm, measurement.size_sd_mm, truth.mean_size_mm),
         ("height_mm", measurement.height_mm, measurement.height_sd_mm, truth.height_mm),
     )
     references = truth.size_sd_mm, truth.height_sd_mm
@@ -327,7 +239,7 @@ def compare(
             name,
             value,
             finite_or_none(sd),
-            finite_or_none(true),
+            true or None,
             limit,
             reference,
             measurement.parts_of(name),

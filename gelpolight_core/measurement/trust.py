@@ -9,12 +9,10 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.tool import ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
+from gelpolight_core.reference import WALLED
 from gelpolight_core.translation import tr
 
 Result = TypeVar("Result", Measurement, ToolResult)
-
-WALLED = ("cylinder", "cuboid")
-"""Shapes whose walls are steeper than a ball and narrower than the smoothing of an image."""
 
 
 def judged(result: Result, height_map: HeightMap) -> Result:

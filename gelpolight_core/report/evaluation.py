@@ -22,9 +22,9 @@ from gelpolight_core.measurement.evaluation import (
     evaluation_errors,
 )
 from gelpolight_core.measurement.gauge import GaugeRow, Scatter, gauge_figures, gauge_rows
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.statistics import finite_or_none, too_few
 from gelpolight_core.quantity import PAPER_PERCENT
+from gelpolight_core.reference import Truth
 from gelpolight_core.report.document import (
     Listing,
     Report,

@@ -15,8 +15,9 @@ from gelpolight_core.finding import QualityTable, Verdict, worst_of
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.profile import take_profile
-from gelpolight_core.measurement.result import Truth, compare
+from gelpolight_core.measurement.result import compare
 from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, decision_word
+from gelpolight_core.reference import Truth
 from gelpolight_core.report.build import stated_validation
 from gelpolight_core.report.document import Listing, Report, Section, listing
 from gelpolight_core.report.drawing import ACCENT, MAP_PX, drawing
@@ -98,7 +99,7 @@ def _section(image: MeasuredPress, limits_percent: tuple[float, float], about: s
 
 
 def _facts(image: MeasuredPress) -> Facts:
-    found, truth = image.measurement, image.truth or Truth(image.measurement.shape, 1.0, 1.0)
+    found, truth = image.measurement, image.truth or Truth(image.measurement.shape)
     known = (
         (tr("Centre (x, y)"), "{:.3f}, {:.3f} mm".format(*found.centre_mm)),
         (tr("Edge radius"), _number(found.edge_radius_mm, ".3f", " mm")),

@@ -15,6 +15,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
 from gelpolight_core.io.reading import NAME_LIMIT, read_toml
+from gelpolight_core.reference import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
@@ -44,19 +45,6 @@ NOT_IN_A_NAME = '/\\:*?"<>|'
 """Characters that the name of a folder cannot have everywhere; files are named by the serial."""
 SCALE_RANGE = (1e-4, 10.0)
 PUNCH_RANGE = (0.1, 100.0)
-REFERENCE_LENGTHS = (
-    "diameter_mm",
-    "diameter_sd_mm",
-    "side_mm",
-    "side_sd_mm",
-    "height_mm",
-    "height_sd_mm",
-    "edge_radius_mm",
-    "edge_radius_sd_mm",
-)
-REFERENCE_TEXTS = ("shape", "certificate", "due", "serial")
-"""What ``[indenters]`` and the columns of ``truth.csv`` state of a pressed object."""
-REFERENCE_RANGE = (0.0, 1000.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,11 +292,9 @@ def parse_indenters(content: dict[str, Any], path: Path) -> dict[str, dict[str, 
     found: dict[str, dict[str, str | float]] = {}
     for name in listed.content:
         stated = listed.table(name)
-        stated.no_more(*REFERENCE_LENGTHS, *REFERENCE_TEXTS)
+        stated.no_more(*LENGTH_KEYS, *TEXT_KEYS)
         found[name] = {
-            key: stated.text(key)
-            if key in REFERENCE_TEXTS
-            else stated.number(key, *REFERENCE_RANGE)
+            key: stated.text(key) if key in TEXT_KEYS else stated.number(key, *RANGE_MM)
             for key in stated.content
         }
     return found

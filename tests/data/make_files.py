@@ -19,12 +19,12 @@ from typing import Any
 import cv2
 
 from app.command_line.main import main as gelpolight
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.quantity import Quantity
+from gelpolight_core.reference import Truth
 
 DESIGN = Path(__file__).with_name("small_sensor.toml")
 PRESS = "cylinder_s5_d100"
-TRUTH = Truth("cylinder", 5.0, 1.0)
+TRUTH = Truth("cylinder", 5.0, height_mm=1.0)
 
 
 def named(*places: str) -> Any:
@@ -111,13 +111,13 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
 
 def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: Path) -> None:
     """Write the lab's indenters, the validation of the calibration and the one in use."""
-    from app.workspace.indenters import Indenter, write_indenters
+    from app.workspace.indenters import write_indenters
     from app.workspace.workspace import Workspace
     from gelpolight_core.calibration.remarks import write_validation
     from gelpolight_core.validation import Validation
 
-    write_indenters([Indenter("Pin A", "cylinder", 5.0, height_mm=1.0),
-                     Indenter("Block", "cuboid", 4.0, 6.0)], workspace)  # fmt: skip
+    write_indenters([Truth("cylinder", 5.0, height_mm=1.0, name="Pin A"),
+                     Truth("cuboid", 4.0, second_mm=6.0, name="Block")], workspace)  # fmt: skip
     lengths = (
         Quantity("diameter", measurement.size_mm, None, 5.0, 5.0),
         Quantity("height", measurement.height_mm, None, 1.0, 8.0),

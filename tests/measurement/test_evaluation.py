@@ -27,8 +27,9 @@ from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.press import Press, read_truth
-from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reference import Truth
 from gelpolight_core.report.evaluation import (
     evaluation_document,
     evaluation_table,
@@ -65,7 +66,7 @@ def press(
 ) -> Press:
     return Press(
         name or f"{shape}_{size:g}_{height:g}_{region}_{repeat}.png",
-        Truth(shape, size, height),
+        Truth(shape, size, height_mm=height),
         region,
         repeat,
     )

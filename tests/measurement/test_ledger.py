@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.reference import Truth
 
 
 def measurement(height: float = 1.0 / 3.0) -> Measurement:
@@ -71,9 +72,11 @@ def test_a_measurement_comes_back_to_the_last_bit(
 
 def test_another_image_shape_or_calibration_is_measured_anew(tmp_path: Path, image: Path) -> None:
     ledger = Ledger(tmp_path / "m.jsonl", "one")
-    pressed = Truth("cylinder", 5.0, 1.0)
+    pressed = Truth("cylinder", 5.0, height_mm=1.0)
     edged = replace(pressed, edge_radius_mm=0.3)
-    keys = {ledger.key(image, truth) for truth in (pressed, edged, Truth("cuboid", 5.0, 1.0))}
+    keys = {
+        ledger.key(image, truth) for truth in (pressed, edged, Truth("cuboid", 5.0, height_mm=1.0))
+    }
     keys.add(Ledger(tmp_path / "m.jsonl", "other").key(image, pressed))
     image.write_bytes(b"taken again")
     keys.add(ledger.key(image, pressed))

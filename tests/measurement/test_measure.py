@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.drape import ball_depth, cuboid_depth, cylinder_depth
 from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.measurement.result import Truth
+from gelpolight_core.reference import Truth
 
 Array = NDArray[np.float64]
 
@@ -196,7 +196,7 @@ def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful() -> None:
 
 def test_json_holds_what_scripts_rely_on() -> None:
     measured = measure_object(on_grid(noisy(pressed("cuboid"), 10), X, Y), shape="cuboid")
-    plain = json.loads(json.dumps(measured.as_json(Truth("cuboid", 5.0, 1.0))))
+    plain = json.loads(json.dumps(measured.as_json(Truth("cuboid", 5.0, height_mm=1.0))))
     assert set(plain["sd"]) == {"side_mm", "height_mm", "centre_mm", "yaw_deg", "drape_decay_mm"}
     assert len(plain["side_mm"]) == len(plain["sd"]["side_mm"]) == 2
     assert plain["truth"] == {"shape": "cuboid", "side_mm": 5.0, "height_mm": 1.0}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -11,9 +12,9 @@ import pytest
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.press import read_truth
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.statistics import missing_repeats
 from gelpolight_core.quantity import Quantity
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import read_session
 
@@ -35,7 +36,16 @@ certificate = "K-2041"
 due = "2027-03-31"
 serial = "7"
 """
-PIN = Truth("cylinder", 5.002, 1.0, 0.001, None, 0.15, None, "K-2041", "2027-03-31", "7")
+PIN = Truth(
+    "cylinder",
+    5.002,
+    size_expanded_mm=0.002,
+    height_mm=1.0,
+    edge_radius_mm=0.15,
+    certificate="K-2041",
+    due="2027-03-31",
+    serial="7",
+)
 
 
 def compared(value: float, sd: float | None, truth_sd: float | None = None) -> Quantity:
@@ -102,10 +112,10 @@ def test_a_reference_is_read_with_what_its_certificate_states(tmp_path: Path) ->
         "b.png,cuboid,,4,1,,,,,,,\n"
     )
     first, second = read_truth(tmp_path).rows
-    assert first.truth == Truth(
-        "cylinder", 5.002, 1.0, 0.001, 0.002, 0.15, 0.01, "K-1", "2027-03-31", "7"
+    assert first.truth == replace(
+        PIN, height_expanded_mm=0.004, edge_radius_expanded_mm=0.02, certificate="K-1"
     )
-    assert second.truth == Truth("cuboid", 4.0, 1.0)
+    assert second.truth == Truth("cuboid", 4.0, height_mm=1.0)
 
 
 def test_a_press_takes_its_reference_from_an_indenter_of_the_session(tmp_path: Path) -> None:
@@ -140,7 +150,7 @@ def test_a_reference_says_that_its_calibration_has_ended() -> None:
     (found,) = PIN.findings(date(2027, 4, 1))
     assert (found.key, found.verdict) == ("reference_due", Verdict.WARN)
     assert "K-2041" in found.text
-    assert Truth("cylinder", 5.0, 1.0).findings(date(2999, 1, 1)) == ()
+    assert Truth("cylinder", 5.0, height_mm=1.0).findings(date(2999, 1, 1)) == ()
 
 
 def test_a_due_day_that_is_none_is_refused(tmp_path: Path) -> None:

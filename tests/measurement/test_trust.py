@@ -14,8 +14,8 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.measurement.evaluation_run import press_measurement
 from gelpolight_core.measurement.indenter_tools import Cylinder
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation import indenters
@@ -42,7 +42,7 @@ def test_a_failed_calibration_makes_every_measurement_doubtful(
     calibration = judged_as(small_calibration, value)
     path = small_session / "presses" / PRESS
     reconstructor = Reconstructor(calibration)
-    press = press_measurement(reconstructor)(path, Truth("cylinder", 5.0, 1.0))
+    press = press_measurement(reconstructor)(path, Truth("cylinder", 5.0, height_mm=1.0))
     heightmap = reconstructor.depth(read_image(path).rgb)
     on_page = apply_tool(Cylinder(), heightmap).result
     assert on_page is not None

@@ -10,9 +10,10 @@ import pytest
 
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.press import Press
-from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.records.evaluation_entry import add_once, evaluation_record
 from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.reference import Truth
 
 FIT = Measurement(
     shape="cylinder",
@@ -33,7 +34,7 @@ FIT = Measurement(
 
 
 def evaluation(*errors: tuple[float, float], failed: int = 0) -> Evaluation:
-    press = Press("p.png", Truth("cylinder", 5.0, 1.0), outcome="too dark")
+    press = Press("p.png", Truth("cylinder", 5.0, height_mm=1.0), outcome="too dark")
     good = [
         replace(press, outcome=replace(FIT, diameter_mm=5 + size / 20, height_mm=1 + depth / 100))
         for size, depth in errors

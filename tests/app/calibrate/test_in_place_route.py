@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +25,7 @@ from gelpolight_core.calibration.in_place_session import SETTLED
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.in_place.preset import preset_named
-from gelpolight_core.measurement.result import Truth
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import InPlace, SensorData, read_session
 
@@ -87,7 +86,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     technician.rest()
     assert report.is_file()
     wizard.go_to("validation")
-    step.show_known(Truth("ball", 2.0 * opened.ball_radius_mm(files[-1].name), math.nan))
+    step.show_known(Truth("ball", 2.0 * opened.ball_radius_mm(files[-1].name)))
     step.import_press(files[-1])
     technician.until(step.keep.isEnabled)
     technician.click("validation.keep")

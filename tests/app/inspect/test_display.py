@@ -9,7 +9,7 @@ from app.inspect.processing_panel import DisplayPanel
 from app.inspect.views import Views
 from app.services.jobs import Jobs
 from app.view2d.display import Display
-from app.widgets.fields import as_text, from_text
+from gelpolight_core.fields import as_text, from_text
 
 CHOSEN = Display(
     "magma",

@@ -8,10 +8,10 @@ from PySide6.QtWidgets import QDialog
 from pytestqt.qtbot import QtBot
 
 from app.measure.indenters_dialog import IndentersDialog
-from app.workspace.indenters import Indenter
+from gelpolight_core.reference import Truth
 
-BALL = Indenter("Ball 8 mm", "ball", 8.0)
-ROD = Indenter("Rod", "cylinder", 5.0, height_mm=1.0)
+BALL = Truth("ball", 8.0, name="Ball 8 mm")
+ROD = Truth("cylinder", 5.0, height_mm=1.0, name="Rod")
 
 
 def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_accepted(
@@ -33,5 +33,5 @@ def test_objects_are_added_corrected_and_removed_and_an_invalid_list_is_not_acce
     assert dialog.result() == QDialog.DialogCode.Accepted
     assert dialog.indenters == (
         replace(ROD, size_mm=5.02, size_expanded_mm=0.002, certificate="K-1", due="2027-03-31"),
-        Indenter("Block", "cuboid", 5.0, 4.0),
+        Truth("cuboid", 5.0, second_mm=4.0, name="Block"),
     )

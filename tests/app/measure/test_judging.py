@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from app.measure.judging import quantities_of, record_of
 from app.services.preferences import Limits
-from app.workspace.reference import Reference
 from gelpolight_core.finding import Verdict, doubt
 from gelpolight_core.measurement.measured import Measured
-from gelpolight_core.measurement.result import Measurement, Truth, compare
+from gelpolight_core.measurement.result import Measurement, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED, MeasurementRecord
+from gelpolight_core.reference import Truth
 
 LENGTHS = st.floats(0.01, 50.0)
 DEFAULT_LIMITS = Limits()
@@ -44,7 +44,7 @@ APART = ToolResult(Distance((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", 
 
 
 def _record(
-    result: ToolResult, reference: Reference, limits: Limits = DEFAULT_LIMITS
+    result: ToolResult, reference: Truth, limits: Limits = DEFAULT_LIMITS
 ) -> MeasurementRecord:
     flat = np.zeros((2, 2), np.float32)
     axis, flags = np.arange(2.0), flat.astype(np.uint8)
@@ -56,37 +56,37 @@ def _record(
 
 @given(size=LENGTHS, height=LENGTHS)
 def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
-    found = compare(FIT, Truth("cylinder", size, height))
-    record = _record(PRESSED, Reference(size_mm=size, height_mm=height))
+    found = compare(FIT, Truth("cylinder", size, height_mm=height))
+    record = _record(PRESSED, Truth(size_mm=size, height_mm=height))
     assert [q.error_percent for q in record.quantities] == [q.error_percent for q in found]
     assert record.details["error_percent"] == {q.name: q.error_percent for q in found}
 
 
 def test_only_what_is_known_is_judged() -> None:
-    def limits(result: ToolResult, reference: Reference) -> dict[str, float | None]:
+    def limits(result: ToolResult, reference: Truth) -> dict[str, float | None]:
         found = quantities_of(result, reference, Limits())
         return {q.name: q.limit_percent for q in found if q.verdict is not None}
 
-    assert limits(PRESSED, Reference()) == {}
-    assert limits(PRESSED, Reference(size_mm=5.0)) == {"diameter_mm": 5.0}
-    assert limits(PRESSED, Reference(height_mm=1.0)) == {"height_mm": 8.0}
-    (apart,) = quantities_of(APART, Reference(size_mm=2.0), Limits())
+    assert limits(PRESSED, Truth()) == {}
+    assert limits(PRESSED, Truth(size_mm=5.0)) == {"diameter_mm": 5.0}
+    assert limits(PRESSED, Truth(height_mm=1.0)) == {"height_mm": 8.0}
+    (apart,) = quantities_of(APART, Truth(size_mm=2.0), Limits())
     assert apart.error_percent == pytest.approx(50.0)
     assert apart.verdict is Verdict.FAIL
 
 
 def test_the_verdict_follows_the_limits() -> None:
-    reference = Reference(size_mm=5.0, height_mm=1.0)
+    reference = Truth(size_mm=5.0, height_mm=1.0)
     assert _record(PRESSED, reference).verdict == PASSED
     strict = Limits(size_percent=1.0)
     assert _record(PRESSED, reference, strict).verdict == FAILED
     doubtful = replace(PRESSED, findings=(doubt("cut", "cut"),))
     assert _record(doubtful, reference).verdict == DOUBTFUL
-    assert _record(PRESSED, Reference()).verdict == UNJUDGED
+    assert _record(PRESSED, Truth()).verdict == UNJUDGED
 
 
 def test_a_record_contains_object_calibration_and_operator() -> None:
-    record = _record(APART, Reference(size_mm=3.01, name="Gauge"))
+    record = _record(APART, Truth(size_mm=3.01, name="Gauge"))
     assert (record.serial, record.calibration_id, record.picture) == ("A", "A-1", "p.png")
     assert (record.operator, record.note) == ("Ada", "by hand")
     assert record.settings["tool"] == {"tool": "distance", "a_mm": [0.0, 0.0], "b_mm": [3.0, 0.0]}

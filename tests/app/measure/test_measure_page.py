@@ -26,7 +26,6 @@ from app.live.grips import grips_of
 from app.measure.page import MeasurePage
 from app.services.kept import settings_file
 from app.services.preferences import Limits
-from app.workspace.reference import Reference
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.measurement.tools import Distance, tool_from_dict
 from gelpolight_core.quantity import Quantity
@@ -34,6 +33,7 @@ from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
 
 PATIENCE_MS = 60_000
@@ -136,7 +136,7 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     assert press_view.work.tool.name == "cylinder"
     true = _true(press)
     press_view.inspector.reference.state(
-        Reference(size_mm=float(true["diameter_mm"]), height_mm=float(true["height_mm"]))
+        Truth(size_mm=float(true["diameter_mm"]), height_mm=float(true["height_mm"]))
     )
     press_view.inspector.remarks.change(operator="Ada", note="on the bench")
     press_view.keep()
@@ -197,7 +197,7 @@ def test_the_fit_uses_a_stated_edge_radius_and_an_ended_calibration_is_said(
     work, reference = page.press_view.work, page.press_view.inspector.reference
     fitted = work.result.measurement
     reference.state(
-        Reference(
+        Truth(
             size_mm=4.0,
             edge_radius_mm=0.3,
             edge_radius_expanded_mm=0.02,
@@ -210,7 +210,7 @@ def test_the_fit_uses_a_stated_edge_radius_and_an_ended_calibration_is_said(
     assert work.result.measurement.edge_radius_mm == pytest.approx(0.3, abs=0.03)
     assert work.result.measurement.diameter_mm > fitted.diameter_mm + 0.01
     assert "K-2041" in page.press_view.state.reason
-    reference.state(Reference())
+    reference.state(Truth())
     _measured(page, qtbot)
     assert work.result.measurement.diameter_mm == pytest.approx(fitted.diameter_mm)
 

@@ -31,9 +31,9 @@ from gelpolight_core.io.lock import RunLock
 from gelpolight_core.measurement.characteristics import LEAST_FLAT
 from gelpolight_core.measurement.press import Press
 from gelpolight_core.measurement.protocol import Protocol
-from gelpolight_core.measurement.result import Truth
 from gelpolight_core.optics.refraction import camera_to_membrane
 from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.reference import Truth
 
 WAIT_MS = 60_000
 
@@ -47,7 +47,7 @@ def frame(position_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
 @pytest.mark.parametrize("shape", ["cylinder", "cuboid"])
 def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
     calibration = scene.calibration()
-    press = Press("p.png", Truth(shape, 4.0, 1.0), "r01", "1", (3.0, -2.0), 30.0)
+    press = Press("p.png", Truth(shape, 4.0, height_mm=1.0), "r01", "1", (3.0, -2.0), 30.0)
     target = make_target(press, calibration)
     seen = np.vstack([target.outline_px, [target.centre_px]])
     back, _ = camera_to_membrane(
@@ -64,7 +64,7 @@ def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
 
 
 def test_the_live_image_is_followed_from_lifting_to_holding() -> None:
-    press = Press("p.png", Truth("cylinder", 5.0, 0.5), "r01", "1", (2.0, 1.0))
+    press = Press("p.png", Truth("cylinder", 5.0, height_mm=0.5), "r01", "1", (2.0, 1.0))
     target = make_target(press, scene.calibration())
     check = PressCheck(target, frame(None, 0))
     assert check(frame(press.position_mm, 1)).sentence == "Lift everything off the sensor."

@@ -8,11 +8,10 @@ from pytestqt.qtbot import QtBot
 
 from app.measure.reference_form import ReferenceForm
 from app.measure.state import PressState
-from app.workspace.indenters import Indenter
-from app.workspace.reference import Reference
+from gelpolight_core.reference import Truth
 
-BALL = Indenter("Ball 8 mm", "ball", 8.0)
-ROD = Indenter("Rod", "cylinder", 5.0, height_mm=1.0)
+BALL = Truth("ball", 8.0, name="Ball 8 mm")
+ROD = Truth("cylinder", 5.0, height_mm=1.0, name="Rod")
 LIVE = PressState(
     frozen=True,
     earlier=False,
@@ -23,8 +22,8 @@ LIVE = PressState(
 )
 
 
-def _form(qtbot: QtBot) -> tuple[ReferenceForm, list[Reference]]:
-    changes: list[Reference] = []
+def _form(qtbot: QtBot) -> tuple[ReferenceForm, list[Truth]]:
+    changes: list[Truth] = []
     form = ReferenceForm(lambda: changes.append(form.stated), lambda: None)
     qtbot.addWidget(form)
     return form, changes
@@ -49,23 +48,23 @@ def test_an_object_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen
     _show(form, "ball")
     _choose(form, "Ball 8 mm")
     form.show_objects((replace(BALL, size_mm=7.95), replace(ROD, height_mm=0.75)))
-    assert changes[-1] == form.stated == Reference(size_mm=7.95, name="Ball 8 mm")
+    assert changes[-1] == form.stated == Truth("ball", 7.95, name="Ball 8 mm")
     _show(form, "cylinder")
-    assert form.stated == Reference(size_mm=5.0, height_mm=0.75, name="Rod")
+    assert form.stated == Truth(size_mm=5.0, height_mm=0.75, name="Rod")
     form.form.change(size_mm=5.1)
-    assert form.stated == Reference(size_mm=5.1, height_mm=0.75)
+    assert form.stated == Truth(size_mm=5.1, height_mm=0.75)
 
 
 def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot: QtBot) -> None:
     form, changes = _form(qtbot)
     again = "Same as the press before"
     _show(form, "cylinder")
-    form.state(Reference(size_mm=5.0, height_mm=0.56))
+    form.state(Truth(size_mm=5.0, height_mm=0.56))
     assert form.known.findText(again) < 0
     form.new_press()
-    assert changes[-1] == form.stated == Reference()
+    assert changes[-1] == form.stated == Truth("cylinder")
     _show(form, "ball")
     assert form.known.findText(again) < 0  # the press before was a cylinder
     _show(form, "cylinder")
     _choose(form, again)
-    assert form.stated == Reference(size_mm=5.0, height_mm=0.56)
+    assert form.stated == Truth(size_mm=5.0, height_mm=0.56)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from app.workspace.indenters import (
     FILE,
-    Indenter,
     first_indenters,
     read_indenters,
     write_indenters,
 )
 from gelpolight_core.errors import InputError
+from gelpolight_core.reference import Truth, check_named
 
 
 def test_a_new_workspace_knows_the_papers_indenters(tmp_path: Path) -> None:
@@ -25,23 +26,25 @@ def test_a_new_workspace_knows_the_papers_indenters(tmp_path: Path) -> None:
 
 
 def test_an_edited_list_is_saved(tmp_path: Path) -> None:
-    wanted = (Indenter("Gauge block", "cuboid", 4.0, 6.0, 1.25), Indenter("Marble", "ball", 16.0))
+    wanted = (
+        Truth("cuboid", 4.0, second_mm=6.0, height_mm=1.25, name="Gauge block"),
+        Truth("ball", 16.0, name="Marble"),
+    )
     write_indenters(wanted, tmp_path)
     assert read_indenters(tmp_path) == wanted
     assert wanted[0].mean_size_mm == 5.0
 
 
-@pytest.mark.parametrize("length", [0.0, -3.0, float("nan"), float("inf")])
-def test_a_length_of_zero_or_less_is_refused(length: float) -> None:
-    with pytest.raises(InputError, match="greater than zero"):
-        Indenter("Pin", "cylinder", length)
-    with pytest.raises(InputError, match="greater than zero"):
-        Indenter("Pin", "cylinder", 3.0, height_mm=length)
+@pytest.mark.parametrize("length", [-3.0, float("nan"), float("inf")])
+def test_an_impossible_length_or_no_size_is_refused(length: float) -> None:
+    for pin in (Truth("cylinder", length), Truth("cylinder", 3.0, height_mm=length), Truth()):
+        with pytest.raises(InputError, match="mm is not from 0 to"):
+            check_named(replace(pin, name="Pin"))
 
 
 def test_equal_indenter_names_are_refused_and_the_old_list_stays(tmp_path: Path) -> None:
-    write_indenters((Indenter("Pin", "cylinder", 3.0),), tmp_path)
-    twins = (Indenter("Pin", "cylinder", 3.0), Indenter("Pin", "ball", 4.0))
+    write_indenters((Truth("cylinder", 3.0, name="Pin"),), tmp_path)
+    twins = (Truth("cylinder", 3.0, name="Pin"), Truth("ball", 4.0, name="Pin"))
     with pytest.raises(InputError, match="the name Pin"):
         write_indenters(twins, tmp_path)
     assert len(read_indenters(tmp_path)) == 1
