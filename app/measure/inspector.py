@@ -73,6 +73,10 @@ class Inspector(QWidget):
         show_meaning(self.image, "muted")
         self.table = named(MarkupLabel(wrap=True), "measure.figures", tr("Figures of the tool"))
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.sources = named(
+            MarkupLabel(), "measure.sources", tr("Standard uncertainties by source")
+        )
+        self.budget = Fold("measure.budget", tr("Uncertainty budget"), self.sources)
         self.reason = named(PlainLabel(wrap=True), "measure.reason", tr("Why it is doubtful"))
         self.reference = ReferenceForm(on_reference, on_edit)
         self.remarks = Form(Remarks(user_name()), "measure", at_once=True)
@@ -83,13 +87,13 @@ class Inspector(QWidget):
         self.busy = busy_bar("measure.busy", tr("Measuring"))
         self.message = named(MarkupLabel(wrap=True), "measure.message", tr("Last answer"))
         self.message.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.message.setFixedHeight(3 * self.message.fontMetrics().lineSpacing())
+        self.message.hide()
         self.message.linkActivated.connect(lambda _link: on_records())
         head = hbox((self.title, 1), (self.verdict, 0, Qt.AlignmentFlag.AlignTop), spacing=8)
         panel = side_panel(
             (
                 vbox(head, self.image, spacing=2),
-                self.table,
+                vbox(self.table, self.budget, spacing=2),
                 self.reason,
                 vbox(heading(tr("Reference")), self.reference, spacing=4),
                 Fold("measure.remarks", tr("Operator and note"), self.remarks),
@@ -117,6 +121,8 @@ class Inspector(QWidget):
         self.verdict.setText(verdict_word(state.verdict))
         show_ground(self.verdict, VERDICTS.get(state.verdict, ""))
         self.table.setText(_table(state.rows))
+        self.budget.setVisible(bool(state.budget))
+        self.sources.setText(_lines(state.budget))
         self.reason.setText(state.reason)
         self.reason.setVisible(bool(state.reason))
         show_meaning(self.reason, state.role)
@@ -125,6 +131,7 @@ class Inspector(QWidget):
 
     def say(self, text: str, role: str = "", *, link: str = "") -> None:
         """Show an answer of the program, until the next one."""
+        self.message.setVisible(bool(text))
         words = escaped(text)
         if role:
             words = f"<span style='color:@{role}'>{words}</span>"
@@ -146,8 +153,13 @@ def _table(rows: tuple[Row, ...]) -> str:
     )
 
 
+def _lines(budget: tuple[tuple[str, ...], ...]) -> str:
+    rows = (f"<td>{escaped(name)}</td>{''.join(map(_cell, row))}" for name, *row in budget)
+    return f"<table width='100%' cellpadding='1'><tr>{'</tr><tr>'.join(rows)}</tr></table>"
+
+
 def _row(row: Row) -> str:
-    label = f"<td>{escaped(row.label)}</td>"
+    label = f"<td style='white-space:nowrap'>{escaped(row.label)}</td>"
     if not row.reference:
         sd = f"<td colspan='2'><span style='color:@muted'>{row.sd}</span></td>"
         return f"<tr>{label}{_cell(row.measured)}{sd}</tr>"

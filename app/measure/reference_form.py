@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.measure.figures_text import UNITS
 from app.measure.state import PressState
@@ -17,6 +17,7 @@ from app.widgets.naming import named
 from gelpolight_core.reference import LENGTHS, Truth
 from gelpolight_core.translation import tr
 
+LEAST_PX = 74
 AGAIN = "\0again"
 """The entry that states the values of the press before. No name of an object is like it."""
 
@@ -50,6 +51,8 @@ class ReferenceForm(QWidget):
             "measure.reference.edit", tr("Edit…"), on_edit, tip=tr("Edit the known objects")
         )
         self.form = Form(Truth(""), "measure.reference", at_once=True, only=LENGTHS)
+        for made in self.form.inputs.values():
+            made.setMinimumWidth(LEAST_PX)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
         vbox(hbox((self.known, 1), edit, spacing=4), self.form, of=self, margins=0)
 
@@ -87,12 +90,9 @@ class ReferenceForm(QWidget):
             self.form.show_value(self._kept.get(state.kind, Truth(state.kind)))
             self._offer()
         self.setEnabled(bool(state.kind))
-        label = self.form.rows.labelForField(self.form.inputs["size_mm"])
-        if isinstance(label, QLabel):
-            label.setText(state.asked or tr("Size"))
-        for name in ("size_mm", "size_expanded_mm"):
-            if isinstance(made := self.form.inputs[name], DoubleSpinBox):
-                made.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
+        self.form.rename_row("size_mm", state.asked or tr("Size"))
+        if isinstance(made := self.form.inputs["size_mm"], DoubleSpinBox):
+            made.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
 
     def state(self, stated: Truth) -> None:
         """Enter values from code, as if the user had chosen them."""

@@ -13,6 +13,7 @@ from app.measure.work import Work
 from app.services.preferences import Limits
 from app.widgets.units import length_unit, per_mm
 from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.labels import label
 from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.quantity import Quantity, decision_word
@@ -22,6 +23,7 @@ from gelpolight_core.translation import tr
 
 FIGURE_SPACE, POINT_SPACE = "\N{FIGURE SPACE}", "\N{PUNCTUATION SPACE}"
 """As wide as a digit and as the decimal point."""
+EXPANDED = "U (k = 2)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,8 @@ class PressState:
         As of a record. Empty without a result.
     rows : tuple of Row
         The figures of the chosen tool.
+    budget : tuple of tuple of str
+        Where the uncertainty of the sizes comes from: a table, its heads first.
     reason, role : str
         Why there is no result or a doubtful one, and the meaning of the text.
     """
@@ -79,6 +83,7 @@ class PressState:
     unit: str = "mm"
     verdict: str = ""
     rows: tuple[Row, ...] = ()
+    budget: tuple[tuple[str, ...], ...] = ()
     reason: str = ""
     role: str = "muted"
 
@@ -137,9 +142,25 @@ def _with_result(
         state,
         verdict=verdict_of(quantities, doubtful=doubtful),
         rows=tuple(_aligned([_row(*named) for named in _named(result, quantities)])),
+        budget=_budget([quantity for quantity in quantities if quantity.parts]),
         reason="\n".join(reasons),
         role="warn" if reasons else "muted",
     )
+
+
+def _budget(known: list[Quantity]) -> tuple[tuple[str, ...], ...]:
+    """Return the budgets of lengths as a table, with their expanded uncertainties below."""
+    if not known:
+        return ()
+    rows = [{**dict(quantity.budget), EXPANDED: quantity.deviation_expanded} for quantity in known]
+    names = (label(quantity.name.removesuffix("_mm")) for quantity in known)
+    sources = sorted(dict.fromkeys(source for row in rows for source in row), key=EXPANDED.__eq__)
+    digits = decimals_for(per_mm() * min(row[EXPANDED] for row in rows) / 10.0, length_unit())
+    body = (
+        (label(s), *(f"{per_mm() * row[s]:.{digits}f}" if s in row else "" for row in rows))
+        for s in sources
+    )
+    return (("", *names), *body)
 
 
 def _named(result: ToolResult, quantities: tuple[Quantity, ...]) -> Iterator[tuple[str, Quantity]]:

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
+    QLabel,
     QLineEdit,
     QWidget,
 )
@@ -110,9 +111,19 @@ class Form(QWidget, Generic[V]):
 
     def show_row(self, name: str, on: bool) -> None:
         """Show or hide the row of a field."""
+        self.rows.setRowVisible(self._field(name), on)
+
+    def rename_row(self, name: str, text: str) -> None:
+        """Change the label of a field."""
+        label = self.rows.labelForField(self._field(name))
+        assert isinstance(label, QLabel)
+        label.setText(text)
+
+    def _field(self, name: str) -> QWidget:
+        """Return an input, or the row in which it has another one beside it."""
         made = self.inputs[name]
         holder = made.parentWidget()
-        self.rows.setRowVisible(made if holder in (self, None) else holder, on)
+        return made if holder in (self, None) else holder
 
     def _put_beside(self, name: str, words: str, other: QWidget) -> None:
         made, row = self.inputs[name], QWidget()

@@ -161,6 +161,10 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     qtbot.waitUntil(certificate.exists, timeout=PATIENCE_MS)
     (certified,) = report_data(certificate)["data"]["measurements"]
     assert {key: certified[key] for key in reported} == reported
+    heads, *_, expanded = press_view.state.budget
+    assert heads[1:] == ("diameter", "height")
+    for text, row in zip(expanded[1:], certified["comparisons"], strict=True):
+        assert float(text) == pytest.approx(row["deviation_expanded"], abs=0.001)
 
     with closing(sqlite3.connect(context.workspace.folder / NAME)) as records:
         calibrations = records.execute("SELECT id, model, made, verdict FROM calibrations")
