@@ -123,7 +123,7 @@ def read_image(path: AnyPath) -> NDArray[Any]:
     Parameters
     ----------
     path : path
-        PNG or TIFF, 8 or 16 bit.
+        PNG, TIFF, BMP, JPEG or WebP, 8 or 16 bit.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def read_image(path: AnyPath) -> NDArray[Any]:
     >>> image.shape, image.dtype.name
     ((240, 320, 3), 'uint8')
     """
-    return np.ascontiguousarray(read_raw_image(Path(path))[0])
+    return np.ascontiguousarray(read_raw_image(Path(path)).rgb)
 
 
 def measure(

@@ -37,7 +37,7 @@ class Remedy(StrEnum):
     CHOOSE_FILE = marked("Choose another file")
     CHOOSE_NAME = marked("Choose another name")
     CHOOSE_FOLDER = marked("Choose another folder")
-    CHOOSE_IMAGES = marked("Choose images (PNG or TIFF), recordings or folders of them")
+    CHOOSE_IMAGES = marked("Choose images, recordings or folders of them")
     CHOOSE_SESSION = marked("Choose another session")
     CHOOSE_SHAPE = marked("State the shape that is pressed, or use another tool")
     CHOOSE_OBJECT = marked("Choose one of them: --seed X Y")

@@ -539,6 +539,12 @@ class Calibration:
         return self.data.table
 
     @property
+    def loss(self) -> float:
+        """Loss by compression of its image files, grey levels of 8 bit; 0 without."""
+        files = {f.key: f.value for f in self.quality.get("files", QualityTable()).figures}
+        return files.get("compression_grey_levels", 0.0)
+
+    @property
     def open_sensor(self) -> OpenSensor:
         """Optics, lights and membrane.
 

@@ -49,7 +49,7 @@ def read_raw(path: Path) -> Rgb:
     InputError
         If it cannot be read.
     """
-    return np.ascontiguousarray(read_raw_image(path)[0])
+    return np.ascontiguousarray(read_raw_image(path).rgb)
 
 
 def refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:

@@ -198,10 +198,8 @@ class _Thumb(QStyledItemDelegate):
 def thumbnail(path: Path) -> QPixmap:
     """Return a thumbnail of an image file; an empty one if the file cannot be read."""
     try:
-        raw = decode_image(path, cv2.IMREAD_REDUCED_COLOR_8)
+        raw, _ = decode_image(path, cv2.IMREAD_REDUCED_COLOR_8)
     except InputError:  # reported where the image is used
-        raw = None
-    if raw is None:
         empty = QPixmap(THUMB)
         empty.fill(Qt.GlobalColor.darkGray)
         return empty

@@ -32,6 +32,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Finding, Verdict
+from gelpolight_core.image.linear import linear_image
 from gelpolight_core.io.user import user_name
 from gelpolight_core.lab.trend import keep_sample, sample_of_validation
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -103,7 +104,9 @@ def run_trial(
     InputError
         If no object is found.
     """
-    heightmap = measurable_depth(reconstructor, average_frames(frames), name=tr("press"))
+    response = reconstructor.calibration.response
+    press = linear_image(average_frames(frames), tr("press"), response=response)
+    heightmap = measurable_depth(reconstructor, press)
     measured = measure_heightmap(
         heightmap,
         shape=known.shape,

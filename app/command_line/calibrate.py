@@ -27,7 +27,7 @@ from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import average, read_image, require_colour
+from gelpolight_core.session.images import average, read_colours
 from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
@@ -113,9 +113,7 @@ class Refresh(Command):
         )
 
     def _with_background(self, calibration: Calibration, files: list[Path]) -> Calibration:
-        images = [read_image(file, response=calibration.response) for file in files]
-        for file, image in zip(files, images, strict=True):
-            require_colour(image, where=str(file))
+        images = [read_colours(file, response=calibration.response) for file in files]
         background = average(images, name=str(files[0]))
         return with_background(calibration, background, operator=user_name(), made=_now())
 

@@ -14,7 +14,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.recording.reader import Recording, is_recording
-from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.images import read_colours
 from gelpolight_core.translation import tr
 
 
@@ -66,7 +66,7 @@ def open_inputs(
     recordings: list[Recording] = []
     for path in paths:
         if not is_recording(path):
-            inputs.append(Input(path.name, str(path), partial(_read_file, path)))
+            inputs.append(Input(path.name, str(path), partial(read_colours, path)))
             continue
         recording = opened.enter_context(Recording.open(path))
         recordings.append(recording)
@@ -128,12 +128,6 @@ def frame_slice(text: str) -> slice:
     first, colon, end, step = match.groups()
     last = int(end) if end else int(first) + 1 if first and not colon else None
     return slice(int(first or 0), last, int(step or 1))
-
-
-def _read_file(path: Path, response: CameraResponse | None) -> LinearImage:
-    image = read_image(path, response=response)
-    require_colour(image, where=str(path))
-    return image
 
 
 def _read_frame(recording: Recording, index: int, response: CameraResponse | None) -> LinearImage:

@@ -11,7 +11,7 @@ from typing import Any
 from app.command_line.common import tolerance, tolerances
 from app.command_line.options import file, option, place, result
 from app.command_line.parser import MENDABLE
-from app.command_line.reconstructing import despite_faults, load_reconstructor, model, read_frame
+from app.command_line.reconstructing import despite_faults, load_reconstructor, model
 from app.command_line.terminal import say
 from app.command_line.tool_arguments import ToolArguments
 from gelpolight_core.errors import InputError, Remedy
@@ -28,6 +28,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
 from gelpolight_core.report.document import refuse_other_endings
 from gelpolight_core.session.file_hashes import file_hash
+from gelpolight_core.session.images import read_colours
 from gelpolight_core.translation import tr
 
 
@@ -106,8 +107,7 @@ class Measure(ToolArguments):
         """Reconstruct an image, fit the object or apply the tools. Return JSON values and text."""
         heightmap = measurable_depth(
             reconstructor,
-            read_frame(image, reconstructor),
-            name=image.name,
+            read_colours(image, response=reconstructor.calibration.response),
             where=str(image),
             despite_faults=self.despite_faults,
         )

@@ -29,10 +29,11 @@ from gelpolight_core.export.heightmap_files import FORMATS, ending, write_height
 from gelpolight_core.export.preview import write_preview
 from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.io.atomic import make_folder, write_json
+from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.recording.matching import recording_notes, require_match
-from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.images import read_colours
 from gelpolight_core.translation import tr
 
 PREVIEW = "preview"
@@ -82,12 +83,15 @@ class Reconstruct(Command):
             make_folder(self.output)
             refused = 0
             for item in tqdm(inputs, file=sys.stderr, unit=tr("image")):
-                rgb = item.read(reconstructor.calibration.response).rgb
-                health = reconstructor.health(rgb, name=item.name)
-                fault = health.meaningless
-                if fault is not None and not self.despite_faults:
+                try:
+                    image = item.read(reconstructor.calibration.response)
+                    rgb = image.rgb
+                    health = reconstructor.health(rgb, name=item.name, loss=image.loss)
+                    if not self.despite_faults:
+                        refuse_meaningless(health, where=item.where)
+                except InputError as error:  # does not stop the others
                     refused += 1
-                    say(f"gelpolight: {item.where}: {fault.line}", file=sys.stderr)
+                    say(f"gelpolight: {error}", file=sys.stderr)
                     continue
                 heightmap = reconstructor.depth(
                     rgb, name=item.name, uncertainty=self.uncertainty, health=health
@@ -152,8 +156,7 @@ class Benchmark(Command):
     def run(self) -> None:
         """Time the frame and print a table."""
         reconstructor = load_reconstructor(self.calibration, self.model, self.effort)
-        image = read_image(self.image)
-        require_colour(image, where=str(self.image))
+        image = read_colours(self.image)
         frame = np.round(image.rgb * (2**image.bit_depth - 1)).astype(f"u{image.bit_depth // 8}")
         timing = benchmark_frame(reconstructor, frame, repeats=max(self.repeats, 1))
         step, median, p95, size = tr("step"), tr("median ms"), tr("p95 ms"), tr("MB")

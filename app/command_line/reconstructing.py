@@ -20,7 +20,7 @@ from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLAC
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
 from gelpolight_core.sensor_calibration import MODELS, Calibration
-from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.images import read_colours
 from gelpolight_core.translation import tr
 
 model = partial(
@@ -87,9 +87,7 @@ def report_failure(calibration: Calibration, path: Path) -> None:
 
 def read_frame(path: Path, reconstructor: Reconstructor) -> NDArray[np.float32]:
     """Read a colour image as linear light, for a reconstructor's camera."""
-    image = read_image(path, response=reconstructor.calibration.response)
-    require_colour(image, where=str(path))
-    return image.rgb
+    return read_colours(path, response=reconstructor.calibration.response).rgb
 
 
 def trace_lines(trace: Trace) -> list[str]:

@@ -33,7 +33,7 @@ from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.images import read_colours, require_colour
 from gelpolight_core.translation import tr
 
 # Fine enough for any tool, and fast to build.
@@ -71,10 +71,9 @@ class MeasuredImage:
             If the file cannot be used, or the image is greyscale.
         """
         if self.path is not None:
-            image = read_image(self.path, response=response)
-        else:
-            assert self.frame is not None
-            image = linear_image(self.frame.rgb, self.name, response=response)
+            return read_colours(self.path, response=response)
+        assert self.frame is not None
+        image = linear_image(self.frame.rgb, self.name, response=response)
         require_colour(image, where=self.name)
         return image
 
@@ -175,7 +174,7 @@ class Measuring:
             self._image = None
             _require_sensor(request.image, request.calibration)
             image = request.image.image(request.calibration.response)
-            heightmap = measurable_depth(reconstructor, image.rgb, name=request.image.name)
+            heightmap = measurable_depth(reconstructor, image, name=request.image.name)
             self._shown = heightmap, _shown(heightmap, image)
             self._image, self._answers = request.image, {}
         return self._shown

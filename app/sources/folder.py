@@ -11,7 +11,8 @@ import numpy as np
 
 from app.sources.source import Frame, Rgb, Setting, closed
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.session.images import SUFFIXES, read_image
+from gelpolight_core.image.file import files_in
+from gelpolight_core.session.images import read_image
 from gelpolight_core.translation import tr
 
 # Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
@@ -47,12 +48,9 @@ class FolderSource:
             return
         self._closed.clear()
         self._number, self._due_s = 0, math.nan
-        found = self.folder.glob("[!.]*") if self.folder.is_dir() else ()
-        files = tuple(sorted(path for path in found if path.suffix.lower() in SUFFIXES))
+        files = files_in(self.folder).images
         if not files:
-            raise InputError(
-                tr("there are no PNG or TIFF images"), self.folder, Remedy.CHOOSE_IMAGES
-            )
+            raise InputError(tr("there are no images"), self.folder, Remedy.CHOOSE_IMAGES)
         self.size = read_image(files[0]).size
         self._files = files
 

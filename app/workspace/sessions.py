@@ -55,15 +55,10 @@ def read_session_entry(folder: Path) -> SessionEntry:
         If the folder cannot be read.
     """
     from gelpolight_core.calibration.recipes import recipe_of
-    from gelpolight_core.session.images import SUFFIXES
+    from gelpolight_core.image.file import files_in
 
     folders = [path for path in folder.iterdir() if path.is_dir()]
-    images = [
-        path
-        for stage in folders
-        for path in stage.iterdir()
-        if path.suffix.lower() in SUFFIXES and not path.name.startswith(".")
-    ]
+    images = [path for stage in folders for path in files_in(stage).images]
     session = _described(folder)
     recipe = recipe_of(session)
     missing = recipe.missing(session)

@@ -11,11 +11,11 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image.file import SUFFIXES, names_of
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import SUFFIXES
 from gelpolight_core.translation import tr
 
 
@@ -187,12 +187,9 @@ class _Finder:
                 self.sources.append(_images(Path(root), images, place))
             for name in recordings:
                 self._add_recording(Path(root, name), place)
-            if others := len(names) - len(images) - len(recordings):
-                self.notes.append(
-                    tr(
-                        "{folder}: {n} files are neither PNG, TIFF nor recordings and were left out"
-                    ).format(folder=root, n=others)
-                )
+            if others := [Path(name) for name in names if name not in {*images, *recordings}]:
+                text = tr("{folder}: {n} files are neither images nor recordings: {names}")
+                self.notes.append(text.format(folder=root, n=len(others), names=names_of(others)))
 
     def _add_recording(self, path: Path, output: str) -> None:
         started, numbers = "", np.zeros(1, np.int64)

@@ -32,7 +32,7 @@ from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
-from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.images import read_colours
 from gelpolight_core.translation import tr
 
 
@@ -111,8 +111,7 @@ class _Worker:
         row = FrameRow(job.output, job.stamp, str(job.path), job.index)
         response = self._reconstructor.calibration.response
         if job.index is None:
-            image = read_image(job.path, response=response)
-            require_colour(image, where=str(job.path))
+            image = read_colours(job.path, response=response)
         else:
             frame = self._recorded(job, job.index)
             image = linear_image(frame.rgb, job.name, response=response)
@@ -123,7 +122,7 @@ class _Worker:
             name=job.name,
             normals=shape is None,
             uncertainty=shape is not None,
-            health=self._reconstructor.health(image.rgb, name=job.name),
+            health=self._reconstructor.health(image.rgb, name=job.name, loss=image.loss),
         )
         return _described(row, heightmap, shape), heightmap
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from gelpolight_core.calibration.in_place import IN_PLACE
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image.file import files_in, names_of
 from gelpolight_core.session.session import IN_PLACE as CLOSED
 from gelpolight_core.session.session import (
     SensorData,
@@ -58,6 +59,9 @@ def refuse_missing(
     if not missing:
         return
     found = tr("the session has no images of: {stages}").format(stages=", ".join(missing))
+    if others := [path for name in missing for path in files_in(folder / name).others]:
+        text = tr(" ({n} files there are not images: {names})")
+        found += text.format(n=len(others), names=names_of(others))
     if absent_tables:
         found += tr("; session.toml lacks the tables {tables}").format(
             tables=", ".join(f"[{name}]" for name in absent_tables)

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gelpolight_core.calibration.editable_session import EditableSession
+from gelpolight_core.calibration.image_files import judge_image_files
 from gelpolight_core.calibration.missing import refuse_missing, session_to_calibrate
 from gelpolight_core.calibration.provenance import provenance_of
-from gelpolight_core.calibration.recipe import Progress, Recipe, Results, Stage, StageInputs
+from gelpolight_core.calibration.recipe import FILES, Progress, Recipe, Results, Stage, StageInputs
 from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.causes import with_one_cause
@@ -118,6 +119,7 @@ def assemble(
         for stage in recipe.of(session)
         for table in stage.all_tables
     }
+    tables[FILES.key] = judge_image_files(session, recipe.folders(session))
     quality = {key: table for key, table in tables.items() if table.figures}
     text = recipe.all_inputs(session, inputs or recipe.inputs(session))
     made = provenance_of(session, recipe.files(session), inputs=text)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
+from gelpolight_core.image.file import names_of
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.translation import tr
 
@@ -71,8 +72,7 @@ class StageInputs:
             ([n for n in new if n in old and new[n] != old[n]], tr("{names} changed")),
         ):
             if names:
-                more = tr(" and {n} more").format(n=len(names) - 3) if len(names) > 3 else ""
-                changes.append(text.format(names=", ".join(names[:3]) + more))
+                changes.append(text.format(names=names_of(names)))
         if before.stated != self.stated:
             changes.append(tr("a stated value or a manual correction changed"))
         if before.earlier != self.earlier:
@@ -101,6 +101,10 @@ class Table:
     of: Callable[[Any], QualityTable] = lambda result: result.quality
     about: str = ""
     facts: Callable[[Any], Facts] = lambda _data: ()
+
+
+FILES = Table("files", tr("Image files"), about=tr("Reads the images of all stages"))
+"""Of every recipe; it has figures only where something is unusual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +281,8 @@ class Recipe:
     @property
     def tables(self) -> dict[str, Table]:
         """The tables of all stages, by their keys."""
-        return {table.key: table for stage in self.stages for table in stage.all_tables}
+        own = (table for stage in self.stages for table in stage.all_tables)
+        return {table.key: table for table in (*own, FILES)}
 
     @property
     def own_folders(self) -> tuple[str, ...]:

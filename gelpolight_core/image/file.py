@@ -1,17 +1,23 @@
-"""Check that an image file is complete before a decoder reads what it can of it."""
+"""Image files: their formats, and whether they are complete, before a decoder reads them.
+
+An image is never turned: what a file says about its orientation is about the camera's housing.
+"""
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import missing_file, read_file
+from gelpolight_core.io.reading import brief, missing_file, read_file
 from gelpolight_core.translation import tr
 
 MAX_PIXELS = 64_000_000
@@ -19,33 +25,86 @@ MAX_PIXELS = 64_000_000
 FILE_LIMIT = 6 * MAX_PIXELS + (1 << 20)
 
 
-def is_complete_image(data: bytes) -> bool:
-    """Return whether the bytes are a PNG with intact chunks, or a TIFF.
+@dataclass(frozen=True, slots=True)
+class ImageFormat:
+    """A format of image files.
 
-    Other formats such as JPEG are lossy or not linear and are refused even under a wrong file
-    extension. TIFF has no checksums; its decoder reports missing data.
-
-    References
+    Attributes
     ----------
-    PNG specification (third edition), 5.3 "Chunk layout".
+    name : str
+        As people call it.
+    suffixes : tuple of str
+        Of its files.
+    starts : callable
+        Takes the bytes and returns whether they are of this format.
+    complete : callable
+        Takes the bytes and returns whether none are missing, as far as the format tells. The
+        decoder reports the rest.
+    sizes : callable
+        Takes the bytes and yields every (width, height) for which its decoder allocates memory.
+    loss : callable
+        Takes the bytes and returns the standard deviation by which compression may have changed a
+        value, in grey levels of 8 bit; 0 without loss.
     """
-    if data.startswith(TIFF_HEADS):
-        return True
-    if not data.startswith(PNG_HEAD):
-        return False
-    view, position = memoryview(data), len(PNG_HEAD)
-    while position + 12 <= len(data):
-        end = position + 8 + int.from_bytes(view[position : position + 4], "big")
-        if zlib.crc32(view[position + 4 : end]) != int.from_bytes(view[end : end + 4], "big"):
-            return False
-        if data[position + 4 : position + 8] == b"IEND":
-            return True
-        position = end + 4
-    return False
+
+    name: str
+    suffixes: tuple[str, ...]
+    starts: Callable[[bytes], bool]
+    complete: Callable[[bytes], bool]
+    sizes: Callable[[bytes], Iterator[tuple[int, int]]]
+    loss: Callable[[bytes], float] = lambda _data: 0.0
 
 
-def decode_image(path: Path, flags: int | None = None) -> np.ndarray[Any, Any] | None:
-    """Return the values of an image file in OpenCV's order; None if the file is not complete.
+def format_of(data: bytes) -> ImageFormat | None:
+    """Return the format of an image by its content, whatever its name; None if it is no other."""
+    return next((form for form in FORMATS if form.starts(data)), None)
+
+
+class Files(NamedTuple):
+    """The files of a folder in the order of their names, hidden ones left out.
+
+    Attributes
+    ----------
+    images, others : tuple of Path
+        By their suffixes.
+    """
+
+    images: tuple[Path, ...]
+    others: tuple[Path, ...]
+
+
+def files_in(folder: Path) -> Files:
+    """Return the images and the other files of a folder; none where it does not exist.
+
+    Raises
+    ------
+    PermissionError
+        If it cannot be listed.
+    """
+    if not folder.is_dir():
+        return Files((), ())
+    found = sorted(p for p in folder.iterdir() if not p.name.startswith(".") and not p.is_dir())
+    return Files(
+        tuple(path for path in found if path.suffix.lower() in SUFFIXES),
+        tuple(path for path in found if path.suffix.lower() not in SUFFIXES),
+    )
+
+
+def names_of(files: Sequence[Path] | Sequence[str]) -> str:
+    """Return the names of files for a message: the first three, and how many more there are."""
+    more = tr(" and {n} more").format(n=len(files) - 3) if len(files) > 3 else ""
+    return ", ".join(brief(Path(file).name) for file in files[:3]) + more
+
+
+def _strange(data: bytes) -> str:
+    for name, place, mark in STRANGERS:
+        if data[place : place + len(mark)] == mark:
+            return tr("The file is a {kind}, not an image that can be measured").format(kind=name)
+    return tr("The file is not an image")
+
+
+def decode_image(path: Path, flags: int | None = None) -> tuple[np.ndarray[Any, Any], float]:
+    """Return the values of an image file in OpenCV's order, and their loss as by its format.
 
     Parameters
     ----------
@@ -57,20 +116,37 @@ def decode_image(path: Path, flags: int | None = None) -> np.ndarray[Any, Any] |
     Raises
     ------
     InputError
-        If the file is missing, cannot be read, or declares more pixels than any camera has.
+        If the file is missing, is no image of :data:`FORMATS`, is not complete, or declares more
+        pixels than any camera has.
     """
     import cv2
 
     flags = cv2.IMREAD_UNCHANGED if flags is None else flags
     data = read_image_file(path)
-    _check_declared_size(path, data)
-    if not is_complete_image(data):
-        return None
-    try:
-        raw = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except cv2.error:
-        return None
-    return None if raw is None or (raw.ndim == 3 and raw.shape[2] not in (3, 4)) else raw
+    form = format_of(data)
+    if form is None:
+        raise InputError(_strange(data), path, Remedy.PNG)
+    for width, height in form.sizes(data):
+        if width * height > MAX_PIXELS:
+            raise InputError(
+                tr("The image declares {w} x {h} pixels, more than {n} megapixels").format(
+                    w=width, h=height, n=MAX_PIXELS // 10**6
+                ),
+                path,
+                Remedy.SMALLER_IMAGES,
+            )
+    raw = None
+    if form.complete(data):
+        with suppress(cv2.error):
+            values = np.frombuffer(_upright(data), np.uint8)
+            raw = cv2.imdecode(values, flags | cv2.IMREAD_IGNORE_ORIENTATION)
+    if raw is None or (raw.ndim == 3 and raw.shape[2] not in (3, 4)):
+        raise InputError(
+            tr("The {format} image is not complete").format(format=form.name),
+            path,
+            Remedy.CAPTURE_AGAIN,
+        )
+    return raw, form.loss(data)
 
 
 def read_image_file(path: Path) -> bytes:
@@ -87,40 +163,24 @@ def read_image_file(path: Path) -> bytes:
         raise missing_file(path) from error
 
 
-def _check_declared_size(path: Path, data: bytes) -> None:
-    """Refuse an image that declares more pixels than any camera has, before memory is allocated."""
-    for width, height in declared_sizes(data):
-        if width * height > MAX_PIXELS:
-            raise InputError(
-                tr("The image declares {w} x {h} pixels, more than {n} megapixels").format(
-                    w=width, h=height, n=MAX_PIXELS // 10**6
-                ),
-                path,
-                Remedy.SMALLER_IMAGES,
-            )
-
-
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 TIFF_HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _KINDS = {1: "B", 3: "H", 4: "I", 16: "Q"}
 _TAGS = {256: "width", 257: "height", 277: "samples", 322: "tile_width", 323: "tile_height"}
+_ORIENTATION = 274
 
 
-def declared_sizes(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yield every (width, height) for which a PNG or TIFF makes its decoder allocate memory.
-
-    These are the sizes of the image, of the frames of an animated PNG, and of a TIFF's tiles. A
-    TIFF with more than four samples per pixel counts as correspondingly wider.
-
-    References
-    ----------
-    PNG specification (third edition), 11.2.1 "IHDR" and 11.3.6.2 "fcTL"; TIFF 6.0, section 2;
-    BigTIFF.
-    """
-    if data.startswith(PNG_HEAD):
-        yield from _png_sizes(data)
-    elif data.startswith(TIFF_HEADS):
-        yield from _tiff_sizes(data)
+def _png_complete(data: bytes) -> bool:
+    """Return whether all chunks are there and intact (PNG specification, 5.3 "Chunk layout")."""
+    view, position = memoryview(data), len(PNG_HEAD)
+    while position + 12 <= len(data):
+        end = position + 8 + int.from_bytes(view[position : position + 4], "big")
+        if zlib.crc32(view[position + 4 : end]) != int.from_bytes(view[end : end + 4], "big"):
+            return False
+        if data[position + 4 : position + 8] == b"IEND":
+            return True
+        position = end + 4
+    return False
 
 
 def _png_sizes(data: bytes) -> Iterator[tuple[int, int]]:
@@ -135,22 +195,142 @@ def _png_sizes(data: bytes) -> Iterator[tuple[int, int]]:
         position += 12 + length
 
 
-def _tiff_sizes(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yield the sizes in the first directory, which is the one that is decoded."""
+def _tiff_entries(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield tag, value and place of the value of the first directory, which is the one decoded."""
     order, big = "<" if data[:2] == b"II" else ">", 43 in data[2:4]
     offset, count, entry, room = ("Q", "Q", 20, 8) if big else ("I", "H", 12, 4)
     try:
         (position,) = struct.unpack_from(order + offset, data, 8 if big else 4)
         (entries,) = struct.unpack_from(order + count, data, position)
         position += struct.calcsize(order + count)
-        values: dict[str, int] = {}
         for at in range(position, min(position + entries * entry, len(data) - entry + 1), entry):
             tag, kind = struct.unpack_from(order + "HH", data, at)
-            if tag in _TAGS and kind in _KINDS:
-                (value,) = struct.unpack_from(order + _KINDS[kind], data, at + entry - room)
-                values[_TAGS[tag]] = max(value, values.get(_TAGS[tag], 0))
+            if kind in _KINDS:
+                place = at + entry - room
+                yield tag, struct.unpack_from(order + _KINDS[kind], data, place)[0], place
     except struct.error:
         return  # truncated: the decoder will report it
+
+
+def _tiff_sizes(data: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the sizes of a TIFF and of its tiles; more than four samples count as wider."""
+    values: dict[str, int] = {}
+    for tag, value, _place in _tiff_entries(data):
+        if tag in _TAGS:
+            values[_TAGS[tag]] = max(value, values.get(_TAGS[tag], 0))
     wider = max(1, -(-values.get("samples", 1) // 4))
     yield wider * values.get("width", 0), values.get("height", 0)
     yield wider * values.get("tile_width", 0), values.get("tile_height", 0)
+
+
+def _upright(data: bytes) -> bytes:
+    """Return a file whose decoder does not turn it; only that of TIFF does."""
+    if not data.startswith(TIFF_HEADS):
+        return data
+    for tag, value, place in _tiff_entries(data):
+        if tag == _ORIENTATION and value != 1:
+            one = (1).to_bytes(2, "little" if data[:2] == b"II" else "big")
+            return data[:place] + one + data[place + 2 :]
+    return data
+
+
+def _jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield marker and content of the segments before the pixels (ITU-T T.81, annex B)."""
+    position = 2
+    while position + 4 <= len(data) and data[position] == 0xFF:
+        marker, length = (
+            data[position + 1],
+            int.from_bytes(data[position + 2 : position + 4], "big"),
+        )
+        yield marker, data[position + 4 : position + 2 + length]
+        if marker == 0xDA or length < 2:
+            return
+        position += 2 + length
+
+
+def _jpeg_sizes(data: bytes) -> Iterator[tuple[int, int]]:
+    for marker, content in _jpeg_segments(data):
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC) and len(content) >= 5:
+            height, width = struct.unpack_from(">HH", content, 1)
+            yield width, height
+
+
+def _jpeg_loss(data: bytes) -> float:
+    """Return the root mean square of the rounding of the coefficients: at most the loss.
+
+    Each coefficient is rounded to a multiple q of its table: q / sqrt(12); the transform keeps the
+    sum of squares. The first table is the one of brightness.
+    """
+    for marker, content in _jpeg_segments(data):
+        if marker == 0xDB and content:
+            kind = ">u2" if content[0] >> 4 else "u1"
+            steps = np.frombuffer(
+                content[1:], kind, min(64, len(content[1:]) // np.dtype(kind).itemsize)
+            )
+            return float(np.sqrt(np.mean(steps.astype(np.float64) ** 2) / 12.0))
+    return 0.0
+
+
+def _bmp_sizes(data: bytes) -> Iterator[tuple[int, int]]:
+    if len(data) >= 26:
+        width, height = struct.unpack_from("<ii", data, 18)
+        yield abs(width), abs(height)
+
+
+def _bmp_complete(data: bytes) -> bool:
+    return len(data) >= 30 and int.from_bytes(data[2:6], "little") <= len(data)
+
+
+def _webp_sizes(data: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the size by the first chunk (RFC 9649, 2)."""
+    kind, body = data[12:16], data[20:30]
+    if len(body) < 10:
+        return
+    if kind == b"VP8X":
+        yield 1 + int.from_bytes(body[4:7], "little"), 1 + int.from_bytes(body[7:10], "little")
+    elif kind == b"VP8L":
+        packed = int.from_bytes(body[1:5], "little")
+        yield 1 + (packed & 0x3FFF), 1 + (packed >> 14 & 0x3FFF)
+    else:
+        width, height = struct.unpack_from("<HH", body, 6)
+        yield width & 0x3FFF, height & 0x3FFF
+
+
+WEBP_LOSS = 157.0 / math.sqrt(12.0)
+"""Of a WebP with losses: at most, because its step is inside its pixels (RFC 6386, 14.1)."""
+FORMATS = (
+    ImageFormat("PNG", (".png",), lambda d: d.startswith(PNG_HEAD), _png_complete, _png_sizes),
+    ImageFormat(
+        "TIFF", (".tif", ".tiff"), lambda d: d.startswith(TIFF_HEADS), lambda _d: True, _tiff_sizes
+    ),
+    ImageFormat(
+        "JPEG",
+        (".jpg", ".jpeg"),
+        lambda d: d.startswith(b"\xff\xd8\xff"),
+        lambda d: b"\xff\xd9" in d[-1024:],
+        _jpeg_sizes,
+        _jpeg_loss,
+    ),
+    ImageFormat("BMP", (".bmp",), lambda d: d.startswith(b"BM"), _bmp_complete, _bmp_sizes),
+    ImageFormat(
+        "WebP",
+        (".webp",),
+        lambda d: d[:4] == b"RIFF" and d[8:12] == b"WEBP",
+        lambda d: int.from_bytes(d[4:8], "little") + 8 <= len(d),
+        _webp_sizes,
+        lambda d: 0.0 if b"VP8L" in d[12:64] else WEBP_LOSS,
+    ),
+)
+SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes)
+"""Of the names of image files."""
+STRANGERS = (
+    ("GIF", 0, b"GIF8"),
+    (tr("video"), 8, b"AVI "),
+    (tr("video"), 0, b"\x1a\x45\xdf\xa3"),
+    ("HEIC", 4, b"ftypheic"),
+    ("AVIF", 4, b"ftypavif"),
+    (tr("video"), 4, b"ftyp"),
+    ("PDF", 0, b"%PDF"),
+    ("ZIP", 0, b"PK\3\4"),
+)
+"""Name, place and mark of other files that are taken for images."""

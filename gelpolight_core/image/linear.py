@@ -31,6 +31,9 @@ class LinearImage:
         Number of frames that were averaged.
     grey : bool
         Whether the file had a single channel (repeated three times in `rgb`).
+    loss : float
+        Standard deviation by which the compression of the file may have changed a value, in grey
+        levels of 8 bit; 0 without loss.
     """
 
     name: str
@@ -38,6 +41,7 @@ class LinearImage:
     bit_depth: int = 8
     frame_count: int = 1
     grey: bool = False
+    loss: float = 0.0
 
     @property
     def size(self) -> tuple[int, int]:

@@ -14,7 +14,7 @@ from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.io.reading import read_file
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import create_session
-from gelpolight_core.session.images import SUFFIXES, read_raw_image
+from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.session.session import InPlace, SensorData, Session
 from gelpolight_core.translation import tr
 
@@ -129,14 +129,12 @@ def _scale(found: ForeignFolder, stated: Stated, background: Path) -> tuple[floa
 
 
 def _pixels(path: Path) -> tuple[int, int]:
-    image = read_raw_image(path)[0]
+    image = read_raw_image(path).rgb
     return int(image.shape[0]), int(image.shape[1])
 
 
 def _copy(source: Path, target: Path) -> None:
     """Copy an image of a format that a session can contain."""
-    if source.suffix.lower() not in SUFFIXES:
-        raise InputError(tr("The image is neither PNG nor TIFF"), source, Remedy.PNG)
     read_raw_image(source)
     data = read_file(source, FILE_LIMIT)
     make_folder(target.parent)

@@ -31,6 +31,7 @@ KEYS = (
     "bad_pixels",
     "bad_line",
     "not_recovered",
+    "file_compressed",
 )
 """Keys of all faults."""
 

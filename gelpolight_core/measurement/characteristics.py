@@ -21,6 +21,7 @@ from scipy.special import ndtr, stdtrit
 from scipy.stats import linregress
 
 from gelpolight_core.finding import Finding
+from gelpolight_core.image.file import files_in
 from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.measurement.press import LENGTHS, Press
 from gelpolight_core.measurement.roughness import above_plane
@@ -28,7 +29,7 @@ from gelpolight_core.measurement.statistics import finite_or_none
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
-from gelpolight_core.session.images import SUFFIXES, read_image, require_colour
+from gelpolight_core.session.images import read_colours
 from gelpolight_core.translation import marked, tr, translated
 
 Array = NDArray[np.float64]
@@ -142,10 +143,9 @@ def flat_maps(reconstructor: Reconstructor, presses: Path) -> tuple[Array, ...]:
         If an image cannot be read, or something is wrong with it.
     """
     found = []
-    for path in sorted(p for p in (presses / FLAT).glob("[!.]*") if p.suffix.lower() in SUFFIXES):
-        image = read_image(path, response=reconstructor.calibration.response)
-        require_colour(image, where=str(path))
-        health = reconstructor.health(image.rgb, name=path.name)
+    for path in files_in(presses / FLAT).images:
+        image = read_colours(path, response=reconstructor.calibration.response)
+        health = reconstructor.health(image.rgb, name=path.name, loss=image.loss)
         refuse_meaningless(health, where=str(path))
         heightmap = reconstructor.depth(image.rgb, normals=False, everywhere=True, health=health)
         outside = heightmap.flags & np.uint8(Flag.OUTSIDE) != 0

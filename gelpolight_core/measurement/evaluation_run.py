@@ -19,7 +19,7 @@ from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reference import Truth
-from gelpolight_core.session.images import read_image, require_colour
+from gelpolight_core.session.images import read_colours
 from gelpolight_core.translation import tr
 
 Outcome = Measurement | str
@@ -37,9 +37,8 @@ def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, Truth], M
     calibration = reconstructor.calibration
 
     def measure(path: Path, truth: Truth) -> Measurement:
-        image = read_image(path, response=calibration.response)
-        require_colour(image, where=str(path))
-        heightmap = measurable_depth(reconstructor, image.rgb, name=path.name, where=str(path))
+        image = read_colours(path, response=calibration.response)
+        heightmap = measurable_depth(reconstructor, image, where=str(path))
         edge_mm, edge_sd_mm = truth.edge_mm
         found = measure_heightmap(
             heightmap, shape=truth.shape, edge_radius_mm=edge_mm, edge_radius_sd_mm=edge_sd_mm

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from numpy.typing import NDArray
-
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -13,9 +10,9 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 def measurable_depth(
     reconstructor: Reconstructor,
-    frame: NDArray[Any],
+    image: LinearImage,
     *,
-    name: str,
+    name: str = "",
     where: str = "",
     despite_faults: bool = False,
 ) -> HeightMap:
@@ -25,10 +22,10 @@ def measurable_depth(
     ----------
     reconstructor : Reconstructor
         With the calibration.
-    frame : (height, width, 3)
-        As for :meth:`Reconstructor.depth`.
-    name : str
-        Of the image, kept in the result.
+    image : LinearImage
+        Of the camera.
+    name : str, optional
+        Of the image, kept in the result; by default its own.
     where : str, optional
         Name of the image in messages; by default `name`.
     despite_faults : bool, optional
@@ -39,7 +36,8 @@ def measurable_depth(
     InputError
         If the depth would be meaningless, or as :meth:`Reconstructor.depth`.
     """
-    health = reconstructor.health(frame, name=name)
+    name = name or image.name
+    health = reconstructor.health(image.rgb, name=name, loss=image.loss)
     if not despite_faults:
         refuse_meaningless(health, where=where or name)
-    return reconstructor.depth(frame, name=name, normals=False, uncertainty=True, health=health)
+    return reconstructor.depth(image.rgb, name=name, normals=False, uncertainty=True, health=health)

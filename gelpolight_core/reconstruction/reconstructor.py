@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.finding import calibration_fault
+from gelpolight_core.finding import Finding, Verdict, calibration_fault
 from gelpolight_core.light.finding import Health
 from gelpolight_core.light.samples import light_over_image
 from gelpolight_core.masks import SATURATED
@@ -309,7 +309,7 @@ class Reconstructor:
         wanted = Wanted(self.effort, self.terms, normals, uncertainty)
         return replace(wanted, light=health.light, untouched=health.untouched == 1.0)
 
-    def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
+    def health(self, frame: NDArray[Any], *, name: str = "", loss: float = 0.0) -> Health:
         """Return the faults of a frame, each with cause and remedy.
 
         The whole image is searched for bad pixels, and large movements of the camera are followed.
@@ -319,6 +319,8 @@ class Reconstructor:
         ----------
         frame, name
             As in :meth:`depth`.
+        loss : float, optional
+            By compression of its file, as of :class:`~gelpolight_core.image.linear.LinearImage`.
 
         Raises
         ------
@@ -326,7 +328,24 @@ class Reconstructor:
             As in :meth:`depth`.
         """
         frame = self._accepted(frame, name)
-        return self.solver.check(frame, whole=True)
+        health = self.solver.check(frame, whole=True)
+        return replace(health, findings=(*health.findings, *self._compressed(loss)))
+
+    def _compressed(self, loss: float) -> tuple[Finding, ...]:
+        """Return what is said of a loss beyond the noise and that of the calibration's images."""
+        usual = max(self.calibration.loss, 255.0 * float(self.calibration.data.noise.max()))
+        if loss <= usual:
+            return ()
+        coarse = Finding(
+            "file_compressed",
+            tr("the compression of the image file rounds its values by more than their noise"),
+            loss,
+            "grey levels",
+            warn_limit=usual,
+            verdict=Verdict.WARN,
+            remedy=tr("Save images without loss, as at calibration: PNG or TIFF"),
+        )
+        return (coarse,)
 
     def _evened(self, frame: NDArray[Any], health: Health | None) -> NDArray[Any]:
         """Return a frame without bad pixels, and without an uneven change of its light.

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.image.file import decode_image
+from gelpolight_core.image.file import decode_image, files_in, names_of
 from gelpolight_core.image.linear import LinearImage, linear_image, require_size
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.decisions import Decisions
 from gelpolight_core.translation import tr
-
-SUFFIXES = (".png", ".tif", ".tiff")
 
 
 class SessionImages:
@@ -45,8 +44,7 @@ class SessionImages:
 
     def captured(self, stage: str) -> tuple[Path, ...]:
         """Return all image files of a stage in the order of their names, also excluded ones."""
-        folder = self.folder / stage
-        return tuple(sorted(p for p in folder.glob("[!.]*") if p.suffix.lower() in SUFFIXES))
+        return files_in(self.folder / stage).images
 
     def found(self, stage: str) -> tuple[Path, ...]:
         """Return the image files of a stage that are used; there may be none."""
@@ -59,17 +57,18 @@ class SessionImages:
         Raises
         ------
         InputError
-            If the stage's folder is missing or has no PNG or TIFF image, or all are excluded.
+            If the stage's folder is missing or has no image, or all are excluded.
         """
         found = self.found(stage)
         if not found:
-            raise InputError(
-                tr("The stage has no images")
-                if not self.captured(stage)
-                else tr("All images of the stage are excluded"),
-                self.folder / stage,
-                Remedy.CAPTURE_STAGE,
-            )
+            others = files_in(self.folder / stage).others
+            text = tr("The stage has no images")
+            if self.captured(stage):
+                text = tr("All images of the stage are excluded")
+            elif others:
+                text = tr("The stage has no images, but {n} other files ({names})")
+                text = text.format(n=len(others), names=names_of(others))
+            raise InputError(text, self.folder / stage, Remedy.CAPTURE_STAGE)
         return found
 
     def images(self, stage: str) -> tuple[LinearImage, ...]:
@@ -209,6 +208,7 @@ def average(images: Sequence[LinearImage], *, name: str) -> LinearImage:
         bit_depth=max(p.bit_depth for p in images),
         frame_count=sum(p.frame_count for p in images),
         grey=all(p.grey for p in images),
+        loss=float(np.max([p.loss for p in images])),
     )
 
 
@@ -218,7 +218,7 @@ def read_image(path: Path, *, response: CameraResponse | None = None) -> LinearI
     Parameters
     ----------
     path : Path
-        PNG or TIFF, 8 or 16 bit.
+        PNG, TIFF, BMP, JPEG or WebP, 8 or 16 bit.
     response : CameraResponse, optional
         Response of the camera, which is corrected; without it the camera is linear.
 
@@ -227,35 +227,58 @@ def read_image(path: Path, *, response: CameraResponse | None = None) -> LinearI
     InputError
         As :func:`read_raw_image`.
     """
-    rgb, grey = read_raw_image(path)
-    return linear_image(rgb, path.name, response=response, grey=grey)
+    raw = read_raw_image(path)
+    image = linear_image(raw.rgb, path.name, response=response, grey=raw.grey)
+    return replace(image, loss=raw.loss)
 
 
-def read_raw_image(path: Path) -> tuple[NDArray[Any], bool]:
-    """Read a PNG or TIFF image, 8 or 16 bit, as the camera encoded it.
+def read_colours(path: Path, response: CameraResponse | None = None) -> LinearImage:
+    """Read an image of the lit membrane; arguments as for :func:`read_image`.
 
-    Returns
-    -------
-    (rows, columns, 3) uint8 or uint16, bool
-        RGB, and whether the file contains a single grey channel, which is then repeated.
+    Raises
+    ------
+    InputError
+        As :func:`read_image`, or if the image is grey or saturated.
+    """
+    image = read_image(path, response=response)
+    require_colour(image, where=str(path))
+    return image
+
+
+class RawImage(NamedTuple):
+    """An image as its file has it.
+
+    Attributes
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        As the camera encoded it; a single grey channel is repeated.
+    grey : bool
+        Whether the file contains a single channel.
+    loss : float
+        As of :class:`LinearImage`.
+    """
+
+    rgb: NDArray[Any]
+    grey: bool
+    loss: float
+
+
+def read_raw_image(path: Path) -> RawImage:
+    """Read an image file, 8 or 16 bit, as the camera encoded it.
 
     Raises
     ------
     InputError
         If the file is missing, is not an image, or is neither 8 nor 16 bit.
     """
-    raw = decode_image(path)
-    if raw is None:
-        raise InputError(
-            tr("The file is not a complete PNG or TIFF image"), path, Remedy.CAPTURE_AGAIN
-        )
+    raw, loss = decode_image(path)
     if raw.dtype not in (np.uint8, np.uint16):
         raise InputError(
             tr("The image contains {kind} values").format(kind=raw.dtype), path, Remedy.PNG
         )
     grey = raw.ndim == 2
     bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
-    return bgr[:, :, ::-1], grey
+    return RawImage(bgr[:, :, ::-1], grey, loss)
 
 
 def require_colour(image: LinearImage, *, where: str) -> None:

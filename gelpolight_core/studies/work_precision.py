@@ -190,7 +190,7 @@ def measure_session(
     errors: dict[str, list[tuple[float, ...]]] = {name: [] for name in solvers}
     for number, row in enumerate(rows):
         progress(row.file, number / len(rows))
-        frame, _ = read_raw_image(folder / "presses" / row.file)
+        frame = read_raw_image(folder / "presses" / row.file).rgb
         truth = read_true_depth((folder / "truth" / row.file).with_suffix(".npz"))
         for repeat in range(1 + repeats):
             for name, solver in solvers.items():

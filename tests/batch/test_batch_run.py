@@ -140,7 +140,7 @@ def test_frames_that_cannot_be_used_are_noted_and_the_others_done(
     progress = go(day, out=out)
     assert (progress.done, progress.bad, progress.internal) == (4, 4, 0)
     errors = {row["output"]: row["error"] for row in table(out) if row["error"]}
-    assert "not a complete PNG" in errors["day/left/a"]
+    assert "PNG image is not complete" in errors["day/left/a"]
     assert "the calibration is for" in errors["day/left/small"]
     assert "Frame 3 is damaged" in errors["day/run/run_000003"]
     assert "not a recording" in errors["day/torn/torn_000000"]

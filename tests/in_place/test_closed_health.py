@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gelpolight_core import measure
 from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.linear import linear_image
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_raw_image
@@ -136,7 +137,7 @@ def test_images_without_light_are_refused(
     frame = np.rint(presses[0] * np.array(share)).astype(np.uint8)
     assert reconstructor.health(frame).keys == (key,)
     with pytest.raises(InputError):
-        measurable_depth(reconstructor, frame, name="press")
+        measurable_depth(reconstructor, linear_image(frame, "press"))
 
 
 @pytest.mark.parametrize("order", [(2, 1, 0), (1, 2, 0), (0, 2, 1)])

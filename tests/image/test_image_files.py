@@ -1,0 +1,137 @@
+"""Image files of every format are read as they are, or refused by what they are."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gelpolight_core.calibration.image_files import judge_image_files
+from gelpolight_core.errors import InputError
+from gelpolight_core.image.file import FORMATS, SUFFIXES, files_in, format_of, names_of
+from gelpolight_core.session.images import read_image, read_raw_image
+from gelpolight_core.session.session import SensorData, Session
+
+
+def encoded(ending: str, *options: int) -> bytes:
+    """Return a smooth image of 24 x 40 pixels in a format: red grows to the right, green down."""
+    y, x = np.mgrid[:24, :40]
+    rgb = np.stack([40 + 4 * x, 30 + 6 * y, 90 + 0 * x], axis=-1).astype(np.uint8)
+    return bytes(cv2.imencode(ending, rgb[..., ::-1], list(options))[1])
+
+
+@pytest.mark.parametrize(
+    ("ending", "options", "name", "lossy"),
+    [
+        (".png", (), "PNG", False),
+        (".tiff", (), "TIFF", False),
+        (".bmp", (), "BMP", False),
+        (".jpg", (cv2.IMWRITE_JPEG_QUALITY, 95), "JPEG", True),
+        (".webp", (cv2.IMWRITE_WEBP_QUALITY, 101), "WebP", False),
+        (".webp", (cv2.IMWRITE_WEBP_QUALITY, 90), "WebP", True),
+    ],
+)
+def test_an_image_is_read_by_its_content_whatever_its_name(
+    tmp_path: Path, ending: str, options: tuple[int, ...], name: str, lossy: bool
+) -> None:
+    data = encoded(ending, *options)
+    form = format_of(data)
+    assert form is not None
+    assert form.name == name
+    assert (40, 24) in set(form.sizes(data))
+    assert (form.loss(data) > 0.0) is lossy
+    path = tmp_path / "image.png"
+    path.write_bytes(data)
+    raw = read_raw_image(path)
+    assert raw.rgb.shape == (24, 40, 3)
+    error = np.abs(raw.rgb[12, 5:35, 0] - (40.0 + 4.0 * np.arange(5, 35))).max()
+    assert error <= (6 if lossy else 0)
+    assert read_image(path).loss == form.loss(data)
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(InputError, match=rf"{name} image is not complete"):
+        read_raw_image(path)
+
+
+def test_the_loss_of_a_jpeg_grows_with_its_rounding() -> None:
+    (jpeg,) = (form for form in FORMATS if form.name == "JPEG")
+    losses = [jpeg.loss(encoded(".jpg", cv2.IMWRITE_JPEG_QUALITY, q)) for q in (100, 95, 90, 50)]
+    assert losses[0] == pytest.approx(1.0 / np.sqrt(12.0))
+    assert losses == sorted(losses)
+
+
+@pytest.mark.parametrize("orientation", [3, 6, 8])
+def test_no_image_is_turned(tmp_path: Path, orientation: int) -> None:
+    """Neither by the tag of a TIFF nor by the Exif data of a JPEG."""
+    tiff = bytearray(encoded(".tiff"))
+    (place,) = struct.unpack_from("<I", tiff, 4)
+    entries = [
+        tiff[at : at + 12]
+        for at in range(place + 2, place + 2 + 12 * tiff[place], 12)
+        if struct.unpack_from("<H", tiff, at)[0] != 274
+    ]
+    entries.append(bytearray(struct.pack("<HHIHH", 274, 3, 1, orientation, 0)))
+    entries.sort(key=lambda entry: struct.unpack_from("<H", entry)[0])
+    tiff[4:8] = struct.pack("<I", len(tiff))
+    tiff += struct.pack("<H", len(entries)) + b"".join(entries) + bytes(4)
+    body = b"Exif\0\0II*\0" + struct.pack("<IHHHIHHI", 8, 1, 274, 3, 1, orientation, 0, 0)
+    jpeg = encoded(".jpg")
+    jpeg = jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(body) + 2) + body + jpeg[2:]
+    for name, data in (("a.tif", bytes(tiff)), ("a.jpg", jpeg)):
+        (tmp_path / name).write_bytes(data)
+        rgb = read_raw_image(tmp_path / name).rgb
+        assert rgb.shape == (24, 40, 3)
+        assert int(rgb[3, 35, 0]) > int(rgb[3, 5, 0]) + 60
+        assert int(rgb[20, 3, 1]) > int(rgb[3, 3, 1]) + 60
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (b"RIFF\0\0\0\0AVI LIST", "video"),
+        (b"\0\0\0\x20ftypisom", "video"),
+        (b"\x1a\x45\xdf\xa3\x01", "video"),
+        (b"GIF89a", "GIF"),
+        (b"\0\0\0\x20ftypheic", "HEIC"),
+        (b"", "not an image"),
+        (b"hello", "not an image"),
+    ],
+)
+def test_what_is_no_image_is_refused_by_what_it_is(tmp_path: Path, data: bytes, kind: str) -> None:
+    (tmp_path / "p.png").write_bytes(data)
+    with pytest.raises(InputError, match=kind):
+        read_raw_image(tmp_path / "p.png")
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b"BM" + bytes(16) + struct.pack("<ii", 1 << 20, -(1 << 20)) + bytes(8),
+        b"\xff\xd8\xff\xc0\0\x0b\x08\xff\xff\xff\xff\x03\0\0\0",
+        b"RIFF\x1e\0\0\0WEBPVP8X\x0a\0\0\0\0\0\0\0" + b"\xff" * 6,
+    ],
+)
+def test_a_gigantic_size_is_refused_before_it_is_decoded(tmp_path: Path, head: bytes) -> None:
+    (tmp_path / "p.png").write_bytes(head)
+    with pytest.raises(InputError, match="declares"):
+        read_raw_image(tmp_path / "p.png")
+
+
+def test_what_a_session_cannot_read_is_counted_and_named(tmp_path: Path) -> None:
+    folder = tmp_path / "balls"
+    folder.mkdir()
+    session = Session(tmp_path, SensorData("s"))
+    for name in ("a.heic", "b.raw", "c.txt", "d.gif"):
+        (folder / name).write_bytes(b"x")
+    with pytest.raises(InputError, match=r"4 other files \(a\.heic, b\.raw, c\.txt and 1 more\)"):
+        session.files("balls")
+    for ending in SUFFIXES:
+        (folder / f"image{ending}").write_bytes(encoded(ending))
+    (folder / ".hidden").write_bytes(b"x")
+    assert [path.suffix for path in files_in(folder).images] == sorted(SUFFIXES)
+    assert names_of(files_in(folder).others) == "a.heic, b.raw, c.txt and 1 more"
+    found = {figure.key: figure for figure in judge_image_files(session, ["balls"]).figures}
+    assert found["files_not_read"].value == 4.0
+    assert found["compression_grey_levels"].value > 0.0
