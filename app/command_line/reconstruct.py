@@ -29,7 +29,6 @@ from gelpolight_core.export.heightmap_files import FORMATS, ending, write_height
 from gelpolight_core.export.preview import write_preview
 from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.io.atomic import make_folder, write_json
-from gelpolight_core.light.finding import refuse_meaningless
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.recording.matching import recording_notes, require_match
@@ -81,17 +80,22 @@ class Reconstruct(Command):
                 for note in recording_notes(recording):
                     say(f"{recording.path}: {note}", file=sys.stderr)
             make_folder(self.output)
-            refused = 0
+            refused, unread = 0, 0
             for item in tqdm(inputs, file=sys.stderr, unit=tr("image")):
                 try:
                     image = item.read(reconstructor.calibration.response)
                     rgb = image.rgb
                     health = reconstructor.health(rgb, name=item.name, loss=image.loss)
-                    if not self.despite_faults:
-                        refuse_meaningless(health, where=item.where)
-                except InputError as error:  # does not stop the others
-                    refused += 1
+                except InputError as error:
+                    if len(inputs) == 1:
+                        raise
+                    unread += 1
                     say(f"gelpolight: {error}", file=sys.stderr)
+                    continue
+                fault = health.meaningless
+                if fault is not None and not self.despite_faults:
+                    refused += 1
+                    say(f"gelpolight: {item.where}: {fault.line}", file=sys.stderr)
                     continue
                 heightmap = reconstructor.depth(
                     rgb, name=item.name, uncertainty=self.uncertainty, health=health
@@ -103,12 +107,15 @@ class Reconstruct(Command):
                     tqdm.write(f"{item.where}: {finding.line}", file=sys.stderr)
                 if PREVIEW in self.format:
                     write_preview(heightmap, rgb, self.output / f"{item.stem}.png")
-        saved = len(inputs) - refused
+        saved = len(inputs) - refused - unread
         say(tr("{n} depth maps saved to {folder}").format(n=saved, folder=self.output))
+        if unread:
+            text = tr("{n} images cannot be used, as said above.").format(n=unread)
+            say(f"gelpolight: {text}", file=sys.stderr)
         if refused:
             text = tr("{n} images were refused. Add --despite-faults to use them anyway.")
             say(f"gelpolight: {text.format(n=refused)}", file=sys.stderr)
-        return MENDABLE if refused else 0
+        return MENDABLE if refused or unread else 0
 
 
 _end = partial(option, tr("an end of the line, in mm"), metavar=("X", "Y"))

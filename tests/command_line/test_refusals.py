@@ -92,7 +92,7 @@ DAMAGES: list[tuple[str, Callable[[Path], None], str]] = [
     (
         "no image",
         lambda f: next((f / "mirror").iterdir()).write_bytes(b"\x89PNG broken"),
-        "not complete",
+        "not an image",
     ),
 ]
 
