@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import struct
 import zlib
 from collections.abc import Mapping
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Heights, Verdict
 from gelpolight_core.io.npy import read_arrays
-from gelpolight_core.io.reading import check_version, refusing
+from gelpolight_core.io.reading import check_version, refusing, written_text
 from gelpolight_core.io.texts import text_of_file
 from gelpolight_core.reconstruction.height_map import (
     FLAG_NAMES,
@@ -25,6 +26,7 @@ from gelpolight_core.reconstruction.height_map import (
     SENSOR_NUMBERS,
     Flag,
     HeightMap,
+    surface_slopes,
 )
 from gelpolight_core.translation import english, tr
 
@@ -32,10 +34,15 @@ GREY_LEVELS = 65_535
 """Largest 16-bit value, as one value is reserved for unknown depths."""
 NPZ_MAPS = ("depth_mm", "normals", *SD_MAPS)
 NPZ_NUMBERS = ("pitch_mm", "lateral_per_mm", *SENSOR_NUMBERS)
-NPZ_TEXTS = ("calibration_id", "model", "source", "notes", "faults", "doubts", "flag_names")
+NPZ_ORIGIN = ("calibration_id", "model", "source")
+NPZ_TEXTS = (*NPZ_ORIGIN, "notes", "faults", "doubts", "flag_names")
 NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags")
 HEAD = ("format", "version", "sha256")
 FORMAT, VERSION = "gelpolight-height-map", 1
+NORMAL_ROUNDING = 1e-3
+"""Deviation of a unit normal's length, far more than float32 rounds."""
+UNIT_FACTOR = math.sqrt(10.0)
+"""Slopes of depths and of normals differ by less, and units of length by at least its square."""
 LEAST_STEP_MM = 1e-6
 """Step for a map with constant depth."""
 
@@ -86,9 +93,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         for name in names
         if (values := getattr(heightmap, name)) is not None
     }
-    arrays |= {
-        name: np.array(getattr(heightmap, name)) for name in (*NPZ_TEXTS[:3], "x_mm", "y_mm")
-    }
+    arrays |= {name: np.array(getattr(heightmap, name)) for name in (*NPZ_ORIGIN, "x_mm", "y_mm")}
     arrays["flags"] = heightmap.flags.astype(np.uint8, copy=False)
     arrays["flag_names"] = np.array(flag_names())
     arrays["notes"] = np.array(list(map(_note, heightmap.findings)), dtype=np.str_)
@@ -129,6 +134,8 @@ def read_npz(path: Path) -> HeightMap:
             if head["sha256"] != _checksum(stored):
                 raise ValueError("the checksum is wrong")
         texts = {name: stored[name].tolist() for name in NPZ_TEXTS if name in stored}
+        for name in NPZ_ORIGIN:
+            written_text(texts[name])
         # Files of one earlier state of the program have the faults under another name.
         faults = [*texts.pop("faults", ()), *texts.pop("doubts", ())]
         findings = _findings(texts.pop("notes", []), faults)
@@ -174,14 +181,37 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
         # Written in float64: a hundredth of the pitch is far more than rounding.
         if not np.abs(places - expected).max() <= 0.01 * heightmap.pitch_mm:
             raise ValueError(f"{name} contradicts pitch_mm")
-    depths = heightmap.depth_mm[np.isfinite(heightmap.depth_mm)]
-    width_mm = heightmap.pitch_mm * max(heightmap.depth_mm.shape)
-    if depths.size and np.abs(depths).max() > width_mm:
+    there, depth_mm = _known(heightmap), heightmap.depth_mm
+    if np.isinf(depth_mm).any() or np.isnan(depth_mm[_unflagged(heightmap)]).any():
+        raise ValueError("depth_mm is not finite where flags states a depth")
+    width_mm = heightmap.pitch_mm * max(depth_mm.shape)
+    if np.abs(depth_mm[there]).max(initial=0.0) > width_mm:
         raise ValueError("depth_mm is larger than the sensor: another unit?")
-    for name in (*SD_MAPS, *SENSOR_NUMBERS):
+    for name in SD_MAPS:
         values = getattr(heightmap, name)
-        if values is not None and np.any(np.asarray(values) < 0.0):
+        if values is not None and np.any(values < 0.0):
             raise ValueError(f"{name} is negative")
+    for name in (*SENSOR_NUMBERS, "lateral_per_mm"):
+        number = getattr(heightmap, name)
+        if number is not None and not 0.0 <= number < math.inf:
+            raise ValueError(f"{name} is {number}")
+    if heightmap.normals is not None and there.any() and min(there.shape) > 1:
+        _refuse_other_slopes(heightmap, heightmap.normals[there].astype(np.float64))
+
+
+def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> None:
+    """Raise ValueError where the normals of the known points are not those of the depths."""
+    if not np.all(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < NORMAL_ROUNDING):
+        raise ValueError("normals are not unit vectors")
+    if not np.all(normals[:, 2] < 0.0):
+        raise ValueError("normals point away from the camera")
+    slopes = np.stack(surface_slopes(heightmap.depth_mm, heightmap.pitch_mm), axis=-1)
+    slopes = slopes[_known(heightmap)].astype(np.float64)
+    finite = np.isfinite(slopes).all(axis=1)
+    stated = normals[finite, :2] / normals[finite, 2:]
+    of_depth, of_normals = (float(np.sqrt(np.sum(s**2))) for s in (slopes[finite], stated))
+    if not of_normals / UNIT_FACTOR <= of_depth <= UNIT_FACTOR * of_normals:
+        raise ValueError("depth_mm contradicts normals: another unit?")
 
 
 def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
@@ -320,5 +350,8 @@ def write_xyz(heightmap: HeightMap, file: BinaryIO) -> None:
 
 
 def _known(heightmap: HeightMap) -> NDArray[np.bool_]:
-    out = np.uint8(Flag.OUTSIDE | Flag.INVALID)
-    return np.asarray(np.isfinite(heightmap.depth_mm) & ((heightmap.flags & out) == 0))
+    return np.asarray(np.isfinite(heightmap.depth_mm) & _unflagged(heightmap))
+
+
+def _unflagged(heightmap: HeightMap) -> NDArray[np.bool_]:
+    return np.asarray((heightmap.flags & np.uint8(Flag.OUTSIDE | Flag.INVALID)) == 0)

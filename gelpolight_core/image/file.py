@@ -208,7 +208,7 @@ def _tiff_entries(data: bytes) -> Iterator[tuple[int, int, int]]:
             if kind in _KINDS:
                 place = at + entry - room
                 yield tag, struct.unpack_from(order + _KINDS[kind], data, place)[0], place
-    except struct.error:
+    except (struct.error, OverflowError):
         return  # truncated: the decoder will report it
 
 

@@ -6,11 +6,10 @@ Three forms are known: ``catalog.csv`` with a folder for each press (gs_sdk), ``
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from os.path import isfile
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import brief, parse_json, read_file
+from gelpolight_core.io.table import read_csv
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr
 
@@ -114,7 +114,7 @@ def _catalog(folder: Path, table: Path) -> ForeignFolder:
         press = _inside(folder, row["experiment_reldir"], where)
         radius = 0.5 * _number(row["diameter(mm)"], where, *(2.0 * r for r in RADIUS_RANGE))
         label = press / "label.npz"
-        circle = _label(label) if label.is_file() else None
+        circle = _label(label) if isfile(label) else None
         presses.append(ForeignPress(_image(press / "gelsight.png", where), radius, circle))
     return ForeignFolder(table.name, tuple(presses), _if_there(folder / "background.png"))
 
@@ -150,9 +150,9 @@ def _annotations(folder: Path, table: Path) -> ForeignFolder:
 def _annotate(folder: Path, table: Path) -> ForeignFolder:
     """Read digit-depth's form: lines of image, x, y and radius of the contact in pixels."""
     presses = []
-    for number, row in enumerate(csv.reader(io.StringIO(_text(table))), start=1):
+    for number, row in read_csv(table, TABLE_LIMIT):
         where = f"{table}, {tr('line {n}').format(n=number)}"
-        if not row or (number == 1 and len(row) == 4 and not _is_number(row[1])):
+        if number == 1 and len(row) == 4 and not _is_number(row[1]):
             continue
         if len(row) != 4:
             needed = tr("The line has {n} values, not image, x, y and radius")
@@ -160,7 +160,7 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
         # The table contains paths of the computer on which it was made.
         name = PureWindowsPath(PurePosixPath(row[0]).name).name
         paths = (folder / name, folder / "images" / name)
-        image = next((path for path in paths if path.is_file()), paths[0])
+        image = next((path for path in paths if isfile(path)), paths[0])
         circle = PlacedCircle(*(_number(value, where, 0.0, 1e5) for value in row[1:]))
         presses.append(ForeignPress(_image(image, where), None, circle))
     return ForeignFolder(table.name, tuple(presses), _if_there(folder / "background.png"))
@@ -168,24 +168,16 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
 
 def _rows(table: Path, columns: tuple[str, ...]) -> list[tuple[int, Mapping[str, str]]]:
     """Return the lines of a table with their numbers; `columns` must be there."""
-    reader = csv.DictReader(io.StringIO(_text(table)), skipinitialspace=True)
-    missing = [name for name in columns if name not in (reader.fieldnames or ())]
-    if missing:
-        raise _unusable(tr("The table has no column {name}").format(name=missing[0]), table)
-    rows: list[tuple[int, Mapping[str, str]]] = []
-    for row in reader:
-        if any(row[name] is None for name in columns):
-            where = f"{table}, {tr('line {n}').format(n=reader.line_num)}"
+    (_, head), *lines = read_csv(table, TABLE_LIMIT) or [(1, [])]
+    for name in columns:
+        if name not in head:
+            raise _unusable(tr("The table has no column {name}").format(name=name), table)
+    places = {name: head.index(name) for name in columns}
+    for number, line in lines:
+        if len(line) <= max(places.values()):
+            where = f"{table}, {tr('line {n}').format(n=number)}"
             raise _wrong_line(tr("The line has too few values"), where)
-        rows.append((reader.line_num, row))
-    return rows
-
-
-def _text(table: Path) -> str:
-    try:
-        return read_file(table, TABLE_LIMIT).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise _unusable(tr("The file is not text in UTF-8"), table) from error
+    return [(number, {key: line[i] for key, i in places.items()}) for number, line in lines]
 
 
 def _label(path: Path) -> PlacedCircle:
@@ -213,8 +205,9 @@ def _inside(folder: Path, name: str, where: str) -> Path:
 
 
 def _image(path: Path, where: str) -> Path:
-    if not path.is_file():
-        raise _wrong_line(tr("The image {path} does not exist").format(path=path), where)
+    if not isfile(path):  # False for any name that no disk takes
+        found = tr("The image {path} does not exist")
+        raise _wrong_line(found.format(path=brief(str(path), 300)), where)
     return path
 
 

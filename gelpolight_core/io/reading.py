@@ -12,6 +12,7 @@ import math
 import os
 import re
 import stat
+import struct
 import tomllib
 import zipfile
 import zlib
@@ -79,7 +80,8 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
     with open_file(path) as stream:
         size = os.fstat(stream.fileno()).st_size
         try:
-            data = stream.read(limit + 1) if size <= limit else b""
+            # Python allocates what is asked for, whatever the size of the file.
+            data = stream.read(size + 1) if size <= limit else b""
         except OSError as error:
             raise unreadable(error, path) from error
     if size > limit or len(data) > limit:
@@ -91,23 +93,6 @@ def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
             Remedy.CHOOSE_FILE,
         )
     return data
-
-
-def refuse_bomb(members: Collection[zipfile.ZipInfo]) -> None:
-    """Refuse members that declare far more than an archive of their packed size can contain.
-
-    Raises
-    ------
-    ValueError
-        If they do, or if one is compressed in a way that this program does not use.
-    """
-    for info in members:
-        # Other compression methods declare the memory that they need.
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise ValueError(f"{brief(info.filename)} uses an unknown compression method")
-    declared = sum(info.file_size for info in members)
-    if declared > max(DECLARED_LIMIT, DECLARED_TIMES * sum(i.compress_size for i in members)):
-        raise ValueError(f"its arrays declare {declared} bytes")
 
 
 @contextmanager
@@ -124,9 +109,23 @@ def opened_zip(path: Path) -> Iterator[zipfile.ZipFile]:
     stream = open_file(path)
     try:
         with stream, zipfile.ZipFile(stream) as archive:
+            _refuse_bomb(archive.infolist(), os.fstat(stream.fileno()).st_size)
             yield archive
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
+    except (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, RuntimeError) as error:
         raise ValueError(str(error) or type(error).__name__) from error
+
+
+def _refuse_bomb(members: Collection[zipfile.ZipInfo], size: int) -> None:
+    """Raise ValueError if members declare far more than an archive of this size can contain."""
+    for info in members:
+        # Other compression methods declare the memory that they need.
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{brief(info.filename)} uses an unknown compression method")
+    if sum(info.compress_size for info in members) > size:
+        raise ValueError("its parts declare more bytes than it has")
+    declared = sum(info.file_size for info in members)
+    if declared > max(DECLARED_LIMIT, DECLARED_TIMES * size):
+        raise ValueError(f"its arrays declare {declared} bytes")
 
 
 def read_member(archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
@@ -134,9 +133,8 @@ def read_member(archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
     info = archive.getinfo(name)
     if info.file_size > limit:
         raise ValueError(f"{name} declares {info.file_size} bytes")
-    refuse_bomb((info,))
     with archive.open(info) as stream:
-        data = stream.read(limit + 1)
+        data = stream.read(info.file_size + 1)
     if len(data) != info.file_size:
         raise ValueError(f"{name} is truncated")
     return data

@@ -7,8 +7,8 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.io.reading import read_file
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.io.reading import TEXT_LIMIT, brief, read_file
 from gelpolight_core.translation import tr
 
 
@@ -26,7 +26,7 @@ def csv_of(rows: Sequence[Mapping[str, object]]) -> str:
     return csv_text(list(rows[0]), (row.values() for row in rows))
 
 
-def read_csv(path: Path) -> list[tuple[int, list[str]]]:
+def read_csv(path: Path, limit: int = TEXT_LIMIT) -> list[tuple[int, list[str]]]:
     """Return the lines of a CSV file that are not empty, each with its number.
 
     Raises
@@ -34,14 +34,17 @@ def read_csv(path: Path) -> list[tuple[int, list[str]]]:
     FileNotFoundError
         If there is no such file.
     InputError
-        If it is not a table in UTF-8.
+        If it is not a table in UTF-8, or is larger than `limit` bytes.
     """
     try:
-        reader = csv.reader(read_file(path).decode("utf-8-sig").splitlines())
+        text = read_file(path, limit).decode("utf-8-sig")
+        if "\0" in text:  # no name of a file contains it
+            raise csv.Error("line contains NUL")
+        reader = csv.reader(text.splitlines(), skipinitialspace=True)
         return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(
-            tr("the file is not a table ({error})").format(error=error),
-            str(path),
-            tr("Save it again as CSV in UTF-8"),
+            tr("the file is not a table ({error})").format(error=brief(str(error), 200)),
+            path,
+            Remedy.SAVE_CSV,
         ) from error

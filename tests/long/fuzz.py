@@ -17,6 +17,7 @@ import shutil
 import signal
 import sys
 import tempfile
+import time
 import traceback
 import warnings
 from collections import Counter
@@ -77,12 +78,15 @@ def limit() -> None:
 def fuzz(kind: Kind, options: argparse.Namespace, folder: Path) -> int:
     """Try inputs of one kind; return how many were neither read nor refused."""
     results: Counter[str] = Counter()
+    longest_s = 0.0
     for number in range(options.first, options.first + options.count):
         data = spoilt_input(kind, options.seed, number)
         stem = options.findings / f"{kind.name.replace(' ', '-')}-{number}"
         stem.write_bytes(data)  # it stays where reading it ends this process
         signal.setitimer(signal.ITIMER_PROF, TIME_S)  # of the processor: it ends the process
+        begun = time.process_time()
         result = try_one(kind, data, folder)
+        longest_s = max(longest_s, time.process_time() - begun)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         if result in ("good", "refused"):
             stem.unlink()
@@ -90,7 +94,7 @@ def fuzz(kind: Kind, options: argparse.Namespace, folder: Path) -> int:
             stem.with_suffix(".txt").write_text(result, encoding="utf-8")
             result = "findings"
         results[result] += 1
-    print(kind.name, dict(results), flush=True)
+    print(kind.name, dict(results), f"longest {longest_s:.2f} s", flush=True)
     return results["findings"]
 
 

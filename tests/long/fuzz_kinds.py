@@ -22,8 +22,12 @@ from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.export.heightmap_files import write_heightmap
+from gelpolight_core.export.raster import read_npz
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.response import gamma_response
+from gelpolight_core.in_place.foreign import read_foreign
+from gelpolight_core.in_place.import_session import Stated, import_session
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.protocol import (
@@ -39,6 +43,7 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import build_resampling_table
 from gelpolight_core.quantity import Quantity
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
@@ -109,6 +114,10 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
              (*BYTES, *(partial(_forged_records, folder / "forge.sqlite"),) * 4)),
         Kind("true depth", "t.npz", (_true_depth(),), read_true_depth,
              (*BYTES, *(spoil.forged_archive,) * 3)),
+        Kind("height map", "map.npz", (_height_map(folder),), read_npz,
+             (*BYTES, *(spoil.forged_archive,) * 5)),
+        Kind("label", "label.npz", (_label(),), _use_foreign,
+             (*BYTES, *(spoil.forged_archive,) * 5)),
         *(Kind(name, file, (data,), use, TEXT) for name, file, data, use in texts),
     )  # fmt: skip
 
@@ -222,6 +231,34 @@ def _true_depth() -> bytes:
     return stream.getvalue()
 
 
+def _height_map(folder: Path) -> bytes:
+    nodes = 0.1 * np.arange(30.0)
+    depth = np.full((30, 30), 0.5, np.float32)
+    normals = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), (30, 30, 3))
+    flags = np.zeros((30, 30), np.uint8)
+    height_map = HeightMap(depth, nodes, nodes, 0.1, normals, flags, "c", "full", "p.png",
+                           slope_sd=0.1 * depth, depth_scale_sd=0.01)  # fmt: skip
+    (path,) = write_heightmap(height_map, folder, formats=("npz",))
+    return path.read_bytes()
+
+
+def _label() -> bytes:
+    stream = io.BytesIO()
+    np.savez(stream, center=np.array([6.0, 5.0]), radius=np.array(2.5))
+    return stream.getvalue()
+
+
+def _use_foreign(path: Path) -> None:
+    """Import the folder of another program in which this is one file, beside good ones."""
+    folder = path.parent
+    for name in ("gelsight.png", "background.png", "a.png"):
+        (folder / name).write_bytes(_pngs()[0])
+    if path.suffix == ".npz":
+        (folder / "catalog.csv").write_text(_CATALOG)
+    import_session(read_foreign(folder), Stated("A", 0.05, 3.0), folder / "session")
+
+
+_CATALOG = 'experiment_reldir,diameter(mm)\n".",4.0\n"./",6.35\n'
 _SIZES = (
     "[camera]\nwidth_px = 640\nheight_px = 480\ndistortion = [-0.08, 0.03, 0.0008, -0.0006]\n"
     'bit_depth = 16\nresponse = "srgb"\n[layers]\ntilt_deg = 1.5\n'
@@ -274,6 +311,9 @@ def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]
          lambda p: validation_in({"identity": "c"}, p.with_name("c.gplcal"))),
         ("workspace", "workspace.json", json.dumps({"in_use": "sensors/A/c.gplcal"}).encode(),
          lambda p: Workspace(p.parent).in_use),
+        ("catalog", "catalog.csv", _CATALOG.encode(), _use_foreign),
+        ("annotations", "annotate.csv", b'image,x,y,radius\n"a.png",6,5,2.5\n/home/b/a.png,5,5,2\n',
+         _use_foreign),
         ("settings", "desktop.ini", settings.encode(), _use_settings),
     ]  # fmt: skip
 

@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 NAMES = (
-    "calibration", "recording", "PNG image", "TIFF image", "records", "true depth", "session",
+    "calibration", "recording", "PNG image", "TIFF image", "records", "true depth", "height map",
+    "label", "session",
     "decisions", "design", "protocol", "truth", "ledger", "tools", "indenters", "validation",
-    "workspace", "settings",
+    "workspace", "catalog", "annotations", "settings",
 )  # fmt: skip
 
 

@@ -135,7 +135,7 @@ def test_a_pickle_in_an_array_is_never_run(tmp_path: Path) -> None:
         def __reduce__(self) -> tuple[object, tuple[str]]:
             return os.mkdir, (str(tmp_path / "harm"),)
 
-    with pytest.raises(ValueError, match=r"version|magic"):
+    with pytest.raises(ValueError, match="header"):
         array_of(pickle.dumps(Harm()))
     assert not (tmp_path / "harm").exists()
 
