@@ -24,8 +24,8 @@ INDEX_SD = 0.01
 """The same of each layer's refractive index: 0.014 of a silicone's."""
 HEIGHT_BY_RADIUS = 0.66
 """Relative change of a height by that of all ball radii (docs/studies/stability.md)."""
-WALL_OVER_BALL = 1.68
-"""How much steeper the walls of that object, 1 mm deep in a drape of 0.7 mm, are than balls."""
+HEIGHT_BY_LATERAL = 1.0 + HEIGHT_BY_RADIUS
+"""The same by that of all lateral lengths: slopes follow from lateral lengths over radii."""
 SHOWN_SD = 0.01
 """Relative standard deviation of a common factor on all radii that one ball press shows: seven
 calibrations with ten presses each, of sensors with exact radii, are off by 0.3 % (rms)."""
@@ -37,7 +37,7 @@ class StatedSd(NamedTuple):
     Attributes
     ----------
     depth : float
-        Of depths, on slopes that occur on the balls.
+        Of depths: the same share of shallow and deep ones.
     lateral : float
         Of lateral lengths.
     """
@@ -69,8 +69,7 @@ def stated_sd(stack: LayerStack, shown: tuple[float, float] | None = None) -> St
     by_index = INDEX_SD * (thickness / index)[made]
     lateral = float(np.linalg.norm([by_square, *by_thickness, *by_index])) / apparent_mm
     covariance = np.diag([lateral, RADIUS_SD]) ** 2
-    # Slopes follow from lateral lengths over the balls' radii, heights from slopes times lengths.
-    effects = np.array([[1.0 + HEIGHT_BY_RADIUS, -HEIGHT_BY_RADIUS], [1.0, 0.0]])
+    effects = np.array([[HEIGHT_BY_LATERAL, -HEIGHT_BY_RADIUS], [1.0, 0.0]])
     square = ((effects @ covariance) * effects).sum(axis=1)
     if shown is not None:
         off, off_sd = shown
@@ -78,5 +77,4 @@ def stated_sd(stack: LayerStack, shown: tuple[float, float] | None = None) -> St
         variance = float(looks @ [1.0, -1.0]) + off_sd**2
         # What is seen narrows the spread; it is not corrected, and remains an error itself.
         square += (effects @ looks / variance) ** 2 * (off**2 - variance)
-    height, lateral = np.sqrt(square).tolist()
-    return StatedSd(height / WALL_OVER_BALL, lateral)
+    return StatedSd(*np.sqrt(square).tolist())

@@ -12,7 +12,6 @@ from gelpolight_core.stated_lengths import (
     RADIUS_SD,
     SQUARE_SD,
     THICKNESS_SD,
-    WALL_OVER_BALL,
     stated_sd,
 )
 
@@ -42,8 +41,7 @@ def test_lengths_across_follow_the_rays_of_a_sensor_that_is_otherwise_than_state
     found = stated_sd(stack())
     assert found.lateral == pytest.approx(float(np.linalg.norm(moved)), rel=0.02)
     assert found.depth == pytest.approx(
-        float(np.hypot((1.0 + HEIGHT_BY_RADIUS) * found.lateral, HEIGHT_BY_RADIUS * RADIUS_SD))
-        / WALL_OVER_BALL,
+        float(np.hypot((1.0 + HEIGHT_BY_RADIUS) * found.lateral, HEIGHT_BY_RADIUS * RADIUS_SD)),
         rel=1e-9,
     )
 
@@ -60,7 +58,7 @@ def test_balls_that_look_as_stated_leave_as_much_doubt_as_drawn_sensors(off_sd: 
         alike = np.abs(looks - off) < 2e-4
         found = stated_sd(stack(), (off, off_sd))
         seen = np.sqrt([np.mean(height[alike] ** 2), np.mean(lateral[alike] ** 2)])
-        assert found.depth * WALL_OVER_BALL == pytest.approx(seen[0], rel=0.03)
+        assert found.depth == pytest.approx(seen[0], rel=0.03)
         assert found.lateral == pytest.approx(seen[1], rel=0.03)
     assert stated_sd(stack(), (0.0, off_sd)).lateral < prior.lateral
     blind = stated_sd(stack(), (0.0, 1e6))

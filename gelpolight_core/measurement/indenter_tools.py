@@ -12,7 +12,7 @@ from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.spread import MODE_ERRORS, MODE_PITCH_MM, ModeError
+from gelpolight_core.measurement.spread import MODE_ERRORS, ModeError
 from gelpolight_core.measurement.tool import Point, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.modes import Mode
@@ -110,7 +110,6 @@ def mode_error(heightmap: HeightMap) -> ModeError:
     hidden_mm = math.exp(-MARGIN_DECAYS) * (heightmap.visible_depth_mm or 0.0)
     return replace(
         found,
-        depth_per_slope=found.depth_per_slope * (heightmap.pitch_mm / MODE_PITCH_MM) ** 2,
         lateral_per_mm=heightmap.lateral_per_mm,
         node_mm=node_mm,
         blur_mm2=found.blur_mm2 * blur_mm2,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.finding import Verdict
 from gelpolight_core.lights.positions import direction_condition
+from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.indenter_tools import mode_error
 from gelpolight_core.measurement.score import TrueDepth, scored_radius_mm
 from gelpolight_core.measurement.spread import BALL_SLOPE
@@ -171,8 +171,8 @@ def own_share(found: HeightMap) -> float:
     These are part of the stated standard deviation. Above `MOST_OWN_SHARE`, the map must have a
     note.
     """
-    own = mode_error(found)
-    return min(math.hypot(own.depth, own.depth_per_slope * BALL_SLOPE), MOST_OWN_SHARE)
+    own = mode_error(found).depth_share(BALL_SLOPE, TYPICAL_DECAY_MM)
+    return min(own, MOST_OWN_SHARE)
 
 
 def warnings_of(found: HeightMap) -> tuple[str, ...]:

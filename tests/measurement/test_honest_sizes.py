@@ -40,7 +40,7 @@ def measured(
     depth += 2e-4 * np.random.default_rng(0).standard_normal(depth.shape)
     # A reconstruction's errors hang together over the drape.
     pixel_mm2 = surface.pitch_mm**2
-    mode = ModeError(0.0, 0.0, blur_mm2=blur_mm**2, blur_sd_mm2=pixel_mm2) if known else None
+    mode = ModeError(blur_mm2=blur_mm**2, blur_sd_mm2=pixel_mm2) if known else None
     x, y = surface.x_mm, surface.y_mm
     return measure_object(
         on_grid(depth, x, y),
@@ -201,3 +201,14 @@ def test_a_calibration_says_less_of_walls_steeper_than_its_balls() -> None:
     # h exp(-x / decay) has come down by this share after share * decay, on either side.
     x = -0.5 * np.log(1.0 - share)
     assert steep["diameter_mm"] == pytest.approx(2.0 * x, rel=0.02)
+
+
+def test_stated_lengths_scale_an_object_and_do_not_move_its_walls() -> None:
+    """Depths and lengths across that are wrong together were counted as independent errors."""
+    values = dict.fromkeys(("x_mm", "y_mm"), 0.0)
+    values |= {"height_mm": 1.0, "drape_decay_mm": 0.5, "diameter_mm": 5.0}
+    flat = calibration_sd("cylinder", values, 0.016, 0.01, common=1.6)
+    assert flat["diameter_mm"] == pytest.approx(0.01 * 5.0)
+    assert flat["height_mm"] == pytest.approx(0.016)
+    ball = calibration_sd("ball", values, 0.016, 0.01, common=1.6)
+    assert ball["diameter_mm"] == pytest.approx((2.0 - 1.6) * 0.01 * 5.0)

@@ -11,7 +11,7 @@ import pytest
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
-from tests.studies import ablation, explain, integrators, rivals
+from tests.studies import ablation, coverage, explain, integrators, rivals
 from tests.studies.presses import show, true_presses
 
 
@@ -102,3 +102,16 @@ def test_the_other_least_squares_are_what_they_claim() -> None:
     slope = np.tile(2.0 * np.pi / 6.4 * np.cos(2.0 * np.pi * np.arange(64) / 64), (64, 1))
     found = integrators.frankot_chellappa(slope, np.zeros_like(slope), 0.1)
     assert found[5] == pytest.approx(wave, abs=1e-9)
+
+
+def test_stated_uncertainties_hold_the_truth_with_lengths_stated_wrongly(tmp_path: Path) -> None:
+    found = list(coverage.measured(0, tmp_path / "session", 2, 3, 0.25))
+    assert len(found) == 12
+    rows = {row["what"]: row for row in coverage.table(found)}
+    assert list(rows)[:2] == ["cylinder size", "cylinder height"]
+    assert rows["all"]["n"] == 12 and rows["all"]["held %"] >= 80.0
+    # The objects of a sensor are the same with each calibration, and the budget is complete.
+    height = rows["cylinder height"]
+    assert height["n"] == 2 and height["between um"] > 0.0
+    parts = [height[f"{part} um"] for part in ("noise", "calibration", "model", "fit")]
+    assert float(np.linalg.norm(parts)) == pytest.approx(height["sd um"])
