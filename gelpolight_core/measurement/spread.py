@@ -115,10 +115,11 @@ MODE_ERRORS: Mapping[Mode, ModeError] = MappingProxyType(
         **{Mode(PAPER, effort): ModeError(depth=0.03) for effort in SETTINGS},
     }
 )
-"""On a grid of pitch 1: `node_mm` in pitches, `blur_mm2` over a third of its square. On virtual
-sensors with exact calibrations, glossy or matt, `depth_by_nodes` is 0.008 to 0.027 (rms) with nodes
-of 0.025 to 0.2 mm; in place it covers presses into virtual sensors. The paper's model uses the
-lights of the undeformed surface, and the point where a ray meets that surface."""
+"""On a grid of pitch 1: `node_mm` in pitches, `blur_mm2` over a third of its square. On three
+virtual sensors with exact calibrations (one glossy and two matt at a quarter and half of the size,
+one matt at full size), `depth_by_nodes` is 0.008 to 0.027 (rms). That of a closed sensor is not
+measured: it is the former number for pixels of 0.063 mm. The paper's model uses the lights of the
+undeformed surface, and the point where a ray meets that surface."""
 
 
 def noise_of_fit(
