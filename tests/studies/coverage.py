@@ -23,9 +23,10 @@ import numpy as np
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
-from gelpolight_core.measurement.result import Truth, compare
+from gelpolight_core.measurement.result import compare
 from gelpolight_core.quantity import Quantity
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reference import Truth
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder
 from gelpolight_core.simulation.session import pressed_membrane, simulate_session
@@ -94,7 +95,7 @@ def measured(
             state = pressed_membrane(design, indenter, x_mm=x, y_mm=y, yaw_deg=yaw)
             frame = sensor.frame(state, stream=f"{item} {turn}")
             found = measure_heightmap(reconstructor.depth(frame, uncertainty=True), shape=shape)
-            for quantity in compare(found, Truth(shape, size, indenter.depth_mm)):
+            for quantity in compare(found, Truth(shape, size, height_mm=indenter.depth_mm)):
                 what = f"{shape} {'height' if 'height' in quantity.name else 'size'}"
                 yield Compared(number, item, what, quantity, fillet)
 
