@@ -93,6 +93,7 @@ class Remedy(StrEnum):
     PRESS_MIDDLE = marked("Press nearer to the middle of the sensor")
     ONE_BALL = marked("Press a single clean ball straight down")
     CHECK_RADIUS = marked("Check the stated diameter of the ball (session.toml holds its radius)")
+    CHECK_SIZES = marked("Check the ball diameters and the scale (mm per pixel)")
     SWAP_IMAGES = marked("Swap the two images, or capture the background again without contact")
     STATE_SCALE = marked("Press it straight and deeper, or state mm_per_px")
     # Places on a map

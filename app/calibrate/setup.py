@@ -155,7 +155,7 @@ class SetupForm(QScrollArea):
 
     def _check(self) -> None:
         values, problem = self.values.value, ""
-        self.facts.setText(preset_text(values.preset))
+        self.facts.setText(preset_text(values))
         known = values.preset != OTHER and not values.optics
         self.facts.setVisible(known or values.source == "stated")
         self._prints.setVisible(values.optics)

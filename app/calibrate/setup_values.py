@@ -11,7 +11,7 @@ from gelpolight_core.calibration.missing import needs_only_open_sensor
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.fields import choice, number, text
-from gelpolight_core.in_place.preset import presets
+from gelpolight_core.in_place.preset import presets, stated_sizes
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
     IN_PLACE,
@@ -294,11 +294,11 @@ def _region(words: str) -> tuple[int, int, int, int] | None:
     )
 
 
-def preset_text(kind: str) -> str:
-    """Return the images that a preset is made for, as sentences."""
-    if kind == OTHER:
+def preset_text(values: SetupValues) -> str:
+    """Return the images that a preset is made for, and sizes to be confirmed, as sentences."""
+    if values.preset == OTHER:
         return tr("State the size of a pixel on the membrane: image an object of known size.")
-    preset = PRESETS[kind]
+    preset = PRESETS[values.preset]
     words = tr("For images of {w} x {h} pixels").format(w=preset.image_px[0], h=preset.image_px[1])
     if any(preset.cropped):
         words += tr(", with {c:.0f} % of the camera image cut off on each side").format(
@@ -311,7 +311,10 @@ def preset_text(kind: str) -> str:
     if any(preset.marker_pitches_mm):
         markers = tr(" Printed markers are found and left out.")
     limits = f" {preset.limits}." if preset.limits else ""
-    return f"{words}. {area}{markers}{limits}"
+    pixel = values.scale, values.scale_y or values.scale
+    sizes = stated_sizes((0.5 * values.ball_mm,), pixel, preset.image_px)
+    confirm = tr("Confirm: {sizes}.").format(sizes=sizes)
+    return f"{words}. {area}{markers}{limits} {confirm}"
 
 
 def in_place_offer(folder: Path) -> Session | None:

@@ -16,6 +16,8 @@ from gelpolight_core.finding import Finding, QualityTable, joined_tables, judge
 from gelpolight_core.image.linear import LinearImage, require_size
 from gelpolight_core.in_place.ball import Ball
 from gelpolight_core.in_place.calibrate import LEAST_PRESSES, InPlaceResult, calibrate_in_place
+from gelpolight_core.in_place.kind import judge_kind
+from gelpolight_core.in_place.preset import stated_sizes
 from gelpolight_core.in_place.press_light import PressImage
 from gelpolight_core.in_place.roundness import judge_stretch
 from gelpolight_core.in_place.scale import (
@@ -77,6 +79,11 @@ class Slopes:
         x, y = found.next_position_mm
         return (
             tr("model: in-place (closed sensor: background and balls only)"),
+            stated_sizes(
+                (radius for *_, radius in self.balls),
+                found.model.grid.pixel_mm.tolist(),
+                (found.model.grid.image.width, found.model.grid.image.height),
+            ),
             tr("not known: {what}").format(what=", ".join(UNKNOWN)),
             tr("balls: {n} used, {m} left out; slopes seen up to {deg:.0f} deg").format(
                 n=len(found.presses),
@@ -275,7 +282,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
     caps, widths = caps[np.isfinite(caps)], widths[np.isfinite(widths)]
     used, refused = len(result.presses), len(result.refused)
     more = tr("Press more balls at more positions")
-    sizes = tr("Check the ball diameters and the scale (mm per pixel)")
+    sizes = Remedy.CHECK_SIZES
     grid = result.model.grid
     scale = judge_scale(grid.pixel_mm.tolist(), result.model.scale_sd, grid.lens).figures
     return {
@@ -305,6 +312,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     float(np.degrees(np.arctan(result.model.steepest))),
                     "deg",
                 ),
+                *judge_kind(result),
             )
         ),
         "in_place": QualityTable(

@@ -8,7 +8,8 @@ disagree with the others are left out and listed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import compress
@@ -33,9 +34,9 @@ from gelpolight_core.in_place.fit import (
 )
 from gelpolight_core.in_place.held_out import (
     HeldOutPress,
-    amplitude_of,
     error_curve,
     held_out_presses,
+    slope_ratios,
 )
 from gelpolight_core.in_place.next_ball import learning_curve, next_position
 from gelpolight_core.in_place.press_light import PressImage, PressLights, press_lights
@@ -56,9 +57,9 @@ from gelpolight_core.reconstruction.in_place.model import (
     colour_cells,
     evaluate,
 )
-from gelpolight_core.reflectance.ball_detection import find_indentation
+from gelpolight_core.reflectance.ball_detection import detect_ball, find_indentation
 from gelpolight_core.reflectance.indentation import Indentation
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import tr, translated
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -88,11 +89,14 @@ class FoundPress:
         Position and contact, nodes of the working grid.
     held_out : HeldOutPress
         Its errors in a calibration without it.
+    width : float
+        Radius of the contact's edge over the ball's, as seen; `ball` is limited.
     """
 
     name: str
     ball: Ball
     held_out: HeldOutPress
+    width: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +119,9 @@ class InPlaceResult:
         Best position of the next ball: farthest from all presses.
     stretch : Stretch or None
         Height over width of the contacts; None where too few edges are seen.
+    sizes : tuple of (float, float, float)
+        Radius of each size of ball, mm, the ratio of its slopes by the presses of all other sizes
+        to the true ones, and its standard deviation. Empty if all balls are alike.
     """
 
     model: InPlaceModel
@@ -124,6 +131,7 @@ class InPlaceResult:
     learning: tuple[tuple[int, float], ...] = ()
     next_position_mm: tuple[float, float] = (0.0, 0.0)
     stretch: Stretch | None = None
+    sizes: tuple[tuple[float, float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +143,7 @@ class _Press:
     start: Ball
     ball: Ball
     stretches: tuple[float, ...]
+    width: float
 
 
 def calibrate_in_place(
@@ -195,7 +204,7 @@ def calibrate_in_place(
     say(0.85)
     without = left_out(sums, ridge, towards=towards)
     seen, balls = [press.seen for press in found], [press.ball for press in found]
-    share = amplitude_of(seen, balls, without)
+    share = float(np.median(slope_ratios(seen, balls, without)))
     held_out = held_out_presses(seen, balls, [c / share for c in without])
     model = InPlaceModel(
         grid,
@@ -210,12 +219,15 @@ def calibrate_in_place(
     say(1.0)
     return InPlaceResult(
         model,
-        tuple(FoundPress(p.name, p.ball, own) for p, own in zip(found, held_out, strict=True)),
+        tuple(
+            FoundPress(p.name, p.ball, own, p.width) for p, own in zip(found, held_out, strict=True)
+        ),
         refused,
         ridge,
         learning_curve(sums, ridge),
         next_position(balls, grid, base.known),
         stretch,
+        _sizes(found, sums, lambda rest: solve(rest, ridge, towards=towards) / share, grid),
     )
 
 
@@ -253,6 +265,9 @@ def _begin(
 ) -> tuple[list[_Press], dict[str, InputError]]:
     """Find the contact in each reduced image; return the presses, and why others are refused."""
 
+    def seen_radius(image: Map) -> float:
+        return detect_ball(image, base.background, markers=base.markers).radius_px or 0.0
+
     def find(item: tuple[PressImage, Map]) -> _Press | InputError:
         press, image = item
         radius = press.radius_mm / grid.pitch_mm
@@ -264,10 +279,13 @@ def _begin(
                 contact = contact_in(image, base, radius=radius, name=press.name)
                 edge, stretches = contact.circle, contact.stretches
         except InputError as fault:
-            return fault
+            wide = seen_radius(image)
+            return fault if wide <= radius else _wider(press, wide * grid.pitch_mm)
         ball = Ball(edge.x, edge.y, edge.radius, radius).limited()
+        # Only a ball's radius limits the edge that is found.
+        wide = max(edge.radius, seen_radius(image)) if edge.radius > radius else edge.radius
         seen = colour_change(image, base, 1.0 + lights[press.name][0].gain)
-        return _Press(press.name, seen, ball, ball, stretches)
+        return _Press(press.name, seen, ball, ball, stretches, wide / radius)
 
     found: list[_Press] = []
     refused: dict[str, InputError] = {}
@@ -282,17 +300,24 @@ def _begin(
     return found, refused
 
 
+def _wider(press: PressImage, contact_mm: float) -> InputError:
+    words = tr("with the stated scale the contact is {c:.3g} mm wide, its ball only {d:.3g} mm")
+    sizes = words.format(c=2.0 * contact_mm, d=2.0 * press.radius_mm)
+    return InputError(sizes, press.name, Remedy.CHECK_SIZES)
+
+
 def _require_presses(found: Sequence[_Press], refused: Mapping[str, InputError]) -> None:
     if len(found) >= LEAST_PRESSES:
         return
     reasons = sorted({fault.found for fault in refused.values()})
+    wide = [fault.advice for fault in refused.values()].count(translated(Remedy.CHECK_SIZES))
     sentence = tr("{n} of {total} images show a pressed ball, {least} are needed").format(
         n=len(found), total=len(found) + len(refused), least=LEAST_PRESSES
     )
     raise InputError(
         f"{sentence} ({'; '.join(reasons[:2])})" if reasons else sentence,
         "balls",
-        Remedy.PRESS_BALLS,
+        Remedy.CHECK_SIZES if 2 * wide > len(refused) else Remedy.PRESS_BALLS,
     )
 
 
@@ -311,6 +336,8 @@ def _placed(presses: Sequence[_Press], coefficients: Sequence[Array]) -> list[_P
         by_slopes = placed_by_slopes(slope_x, slope_y, press.ball)
         away = float(np.hypot(by_slopes.x - start.x, by_slopes.y - start.y))
         edge = (1.0 - trust) / (1.0 + (away / (DISAGREES * start.contact)) ** 2)
+        # A centre outside the contact that is seen is not that of its ball.
+        edge = edge if away < start.contact else 1.0
         x, y = (
             edge * a + (1.0 - edge) * b for a, b in ((start.x, by_slopes.x), (start.y, by_slopes.y))
         )
@@ -320,6 +347,27 @@ def _placed(presses: Sequence[_Press], coefficients: Sequence[Array]) -> list[_P
         return replace(press, ball=ball)
 
     return list(in_parallel(moved, list(zip(presses, coefficients, strict=True))))
+
+
+def _sizes(
+    presses: Sequence[_Press],
+    sums: Sequence[PressSums],
+    fit: Callable[[Iterable[PressSums]], Array],
+    grid: WorkingGrid,
+) -> tuple[tuple[float, float, float], ...]:
+    """Return radius (mm), ratio of its slopes by the presses of other sizes, and its deviation."""
+    radii = [press.ball.radius for press in presses]
+    found = []
+    for radius in sorted(set(radii)):
+        own = [press for press in presses if press.ball.radius == radius]
+        rest = [part for part, other in zip(sums, radii, strict=True) if other != radius]
+        if len(own) > 1 and len(rest) >= LEAST_PRESSES:
+            seen, balls = [press.seen for press in own], [press.ball for press in own]
+            ratios = slope_ratios(seen, balls, [fit(rest)] * len(own))
+            # Of the median of normal values.
+            sd = float(ratios.std(ddof=1)) * math.sqrt(0.5 * math.pi / len(own))
+            found.append((radius * grid.pitch_mm, float(np.median(ratios)), sd))
+    return tuple(found)
 
 
 def _explained(

@@ -45,6 +45,8 @@ class HeldOutPress:
         Root mean square error of the slope's components there.
     floor : float
         Root mean square of the depth far from the contact, nodes.
+    colour_per_slope : float
+        Root mean square change of colour over that of the ball's slope, inside the contact.
     """
 
     normal_deg: float
@@ -53,6 +55,7 @@ class HeldOutPress:
     slope: Array
     error: Array
     floor: float
+    colour_per_slope: float
 
 
 def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldOutPress:
@@ -83,6 +86,7 @@ def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldO
         np.hypot(wanted[:, 0], wanted[:, 1]),
         np.sqrt(0.5 * ((found - wanted) ** 2).sum(axis=1)),
         float(np.sqrt(np.mean(far**2))) if far.size else np.nan,
+        float(np.sqrt((seen.change[inside] ** 2).sum() / max((wanted**2).sum(), 1e-12))),
     )
 
 
@@ -119,10 +123,10 @@ def held_out_presses(
     )
 
 
-def amplitude_of(
+def slope_ratios(
     seen: Sequence[ColourChange], balls: Sequence[Ball], coefficients: Sequence[Array]
-) -> float:
-    """Return the median ratio of found to true slopes of presses that were left out.
+) -> Array:
+    """Return the ratio (presses,) of found to true slopes of presses that were left out.
 
     Regression on noisy colours underestimates slopes.
 
@@ -141,9 +145,7 @@ def amplitude_of(
         total = (found_x[inside] * wanted[:, 0] + found_y[inside] * wanted[:, 1]).sum()
         return float(total / max((wanted**2).sum(), 1e-12))
 
-    return float(
-        np.median(list(in_parallel(share, list(zip(seen, balls, coefficients, strict=True)))))
-    )
+    return np.array(list(in_parallel(share, list(zip(seen, balls, coefficients, strict=True)))))
 
 
 def error_curve(presses: Sequence[HeldOutPress], *, pitch_mm: float) -> ErrorCurve:

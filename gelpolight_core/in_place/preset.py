@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +11,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief, read_toml
 from gelpolight_core.session.session import SCALE_RANGE
 from gelpolight_core.session.table import Table
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, tr
 
 FOLDER = Path(__file__).with_name("presets")
 FORMAT, VERSION = "gelpolight-preset", 1
@@ -44,6 +46,9 @@ class Preset:
         Width and height of the membrane that is seen.
     marker_pitches_mm : tuple of float
         Distances of printed markers of its gels; 0 is a plain gel.
+    colour_per_slope, colour_per_slope_sd : float
+        Root mean square change of colour over that of the slope on pressed balls, and how much
+        sensors of this kind differ; 0 where fewer than two sensors were measured.
     """
 
     key: str
@@ -56,6 +61,8 @@ class Preset:
     mm_per_px_sd: float
     working_area_mm: tuple[float, float]
     marker_pitches_mm: tuple[float, ...]
+    colour_per_slope: float = 0.0
+    colour_per_slope_sd: float = 0.0
 
     @property
     def limits(self) -> str:
@@ -93,6 +100,7 @@ class Preset:
         return self.mm_per_px * share, self.mm_per_px_sd * share
 
 
+@functools.cache
 def presets() -> tuple[Preset, ...]:
     """Return the presets that come with the program, by name."""
     found = (read_preset(path) for path in FOLDER.glob("*.toml"))
@@ -139,8 +147,18 @@ def read_preset(path: Path) -> Preset:
         top.table(name) for name in ("camera", "image", "working_area", "markers")
     )
     top.no_more(
-        "format", "version", "name", "light_colours", "camera", "image", "working_area", "markers"
+        "format",
+        "version",
+        "name",
+        "light_colours",
+        "camera",
+        "image",
+        "working_area",
+        "markers",
+        "gel",
     )
+    gel = top.table("gel") if "gel" in top.content else Table({}, "gel", path)
+    gel.no_more("colour_per_slope", "colour_per_slope_sd")
     camera.no_more("width_px", "height_px", "cropped")
     image.no_more("width_px", "height_px", "mm_per_px", "mm_per_px_sd")
     area.no_more("width_mm", "height_mm")
@@ -157,8 +175,30 @@ def read_preset(path: Path) -> Preset:
         image.number("mm_per_px_sd", 0.0, SCALE_RANGE[1]),
         (area.number("width_mm", 0.1, 1000.0), area.number("height_mm", 0.1, 1000.0)),
         markers.numbers("pitch_mm", 0.0, 100.0),
+        gel.number("colour_per_slope", 0.0, 100.0, default=0.0),
+        gel.number("colour_per_slope_sd", 0.0, 100.0, default=0.0),
     )
 
 
 def _size(table: Table) -> tuple[int, int]:
     return int(table.number("width_px", 32, MOST_PX)), int(table.number("height_px", 32, MOST_PX))
+
+
+def stated_sizes(
+    radii_mm: Iterable[float], pixel_mm: Sequence[float], image_px: tuple[int, int]
+) -> str:
+    """Return what is stated of lengths in a form that a person can confirm.
+
+    Parameters
+    ----------
+    radii_mm : iterable of float
+        Of the balls.
+    pixel_mm : (x, y)
+        Size of a pixel on the membrane.
+    image_px : (width, height)
+        Of the images.
+    """
+    width, height = (size * n for size, n in zip(pixel_mm, image_px, strict=True))
+    words = tr("balls {d} mm across, {s:.4g} mm per pixel: the image shows {w:.3g} x {h:.3g} mm")
+    across = joined(", ", [f"{2.0 * r:.4g}" for r in sorted({round(r, 6) for r in radii_mm})])
+    return words.format(d=across, s=pixel_mm[0], w=width, h=height)

@@ -153,7 +153,8 @@ def uneven_change(samples: Samples, change: Array, common: CommonChange) -> Unev
         What that has found.
     """
     at, shapes = common.untouched, samples.shapes[:, 1:]
-    if common.share < LEAST_START:
+    # Of few large cells, several lie in one line.
+    if common.share < LEAST_START or np.linalg.matrix_rank(samples.shapes[at]) <= shapes.shape[1]:
         return None
     by_light = samples.normal[:, [0, 2, 4]].sum(axis=1)
     size = samples.normal[:, [0, 2, 4], [0, 2, 4]].sum(axis=1)

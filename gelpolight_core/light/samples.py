@@ -29,6 +29,8 @@ Mask = NDArray[np.bool_]
 CELL_MM = 1.15
 CELL_NODES = 10
 """Least width of a cell in nodes."""
+CELLS_ACROSS = 8
+"""Least number of cells across the field, also where a wrong scale makes it look small."""
 RUN = 8
 """Neighbouring nodes that are sampled together: they share the camera's rows."""
 RUNS_OF_CELL = 4
@@ -206,7 +208,8 @@ def _neighbours(used: NDArray[np.intp], across: int) -> Index:
 
 
 def _cell_nodes(table: ResamplingTable) -> int:
-    return max(round(CELL_MM / table.grid.pitch_mm), CELL_NODES)
+    widest = int(min(table.u_px.shape)) // CELLS_ACROSS
+    return max(min(round(CELL_MM / table.grid.pitch_mm), widest), CELL_NODES)
 
 
 def _runs(

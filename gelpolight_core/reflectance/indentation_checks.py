@@ -50,7 +50,7 @@ _LEAST_VISIBLE = 0.4
 MOST_HIDDEN = 0.7
 _MUCH_HIDDEN = 0.45
 # Shadows widen a contact; the camera's scale and the ball's radius are known to some per cent.
-_LARGEST_OF_BALL = 1.3
+LARGEST_OF_BALL = 1.3
 
 
 class Reason(StrEnum):
@@ -227,7 +227,7 @@ def check_shading(
             ),
             name,
         )
-    if ball_radius_px is not None and circle.radius > _LARGEST_OF_BALL * ball_radius_px:
+    if ball_radius_px is not None and circle.radius > LARGEST_OF_BALL * ball_radius_px:
         _refuse_shape(
             Reason.TOO_LARGE,
             tr("the contact is {c:.0f} px wide, the ball only {d:.0f} px").format(

@@ -12,10 +12,12 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import make_folder, write_text
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
+    DEFAULT_RADIUS,
     ELASTOMER,
     FORMAT,
     IN_PLACE,
     INDENTERS,
+    RADIUS_OF_FILES,
     VERSION,
     InPlace,
     Session,
@@ -38,14 +40,13 @@ def write_description(session: Session) -> None:
         raise InputError(
             tr("The serial number {what}").format(what=fault), session.folder, Remedy.CORRECT_VALUE
         )
-    radii: dict[str, float] = dict(session.ball_radii_mm)
-    if session.ball_default_radius_mm is not None:
-        radii["default"] = session.ball_default_radius_mm
+    usual, radii = session.ball_default_radius_mm, dict(session.ball_radii_mm)
+    stated = {DEFAULT_RADIUS: usual, RADIUS_OF_FILES: radii or None}
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     content |= _opened(session) if session.in_place is None else _closed(session, session.in_place)
     if session.elastomer:
         content["sensor"][ELASTOMER] = session.elastomer
-    content["balls"] = radii
+    content["balls"] = {key: value for key, value in stated.items() if value is not None}
     if camera := _camera(session):
         content["camera"] = camera
     if session.indenters:

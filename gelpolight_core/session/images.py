@@ -164,7 +164,9 @@ class SessionImages:
             self._refuse_misspelt_ball(name)
         if radius is None:
             raise InputError(
-                tr('[balls] has neither "{name}" = radius in mm nor a default').format(name=name),
+                tr('[balls] has neither "{name}" in radius_mm nor default_radius_mm').format(
+                    name=name
+                ),
                 self.folder / "session.toml",
                 Remedy.STATE_IN_SESSION,
             )

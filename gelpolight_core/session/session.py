@@ -27,6 +27,8 @@ FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
 INDENTERS = "indenters"
+DEFAULT_RADIUS, RADIUS_OF_FILES = RADIUS_KEYS = ("default_radius_mm", "radius_mm")
+"""Of ``[balls]``: the radius of most balls, and the table with those of single files."""
 COMMON = ("format", "version", "sensor", "balls", "camera", INDENTERS)
 """Tables and keys of every session.toml."""
 # Diamond has 2.42; no clear elastomer or window has a higher index.
@@ -365,8 +367,21 @@ def _optional(table: Table, key: str, limits: tuple[float, float]) -> float | No
 
 
 def parse_radii(balls: Table) -> tuple[dict[str, float], float | None]:
-    """Return the radius (mm) of each named ball, and the default."""
-    radii = {name: balls.number(name, 0.05, 500.0) for name in balls.file_names()}
+    """Return the radius (mm) of each named ball, and the default.
+
+    Older descriptions have ``default`` and the names of the files in ``[balls]`` itself.
+    """
+    older = {key: value for key, value in balls.content.items() if key not in RADIUS_KEYS}
+    stated = balls.content.get(RADIUS_OF_FILES, {})
+    if not isinstance(stated, dict):
+        raise balls.wrong(RADIUS_OF_FILES, tr("is not a table"))
+    new = dict(stated)
+    if DEFAULT_RADIUS in balls.content:
+        new["default"] = balls.content[DEFAULT_RADIUS]
+    for key in new.keys() & older.keys():
+        raise balls.wrong(key, tr("is stated twice"))
+    known = Table(older | new, "balls", balls.path)
+    radii = {name: known.number(name, 0.05, 500.0) for name in known.file_names()}
     return radii, radii.pop("default", None)
 
 

@@ -329,7 +329,7 @@ square_mm = {_VIEW_SQUARE_MM}
 inner_corners = {corners}
 square_mm = {_TOP_SQUARE_MM}
 
-[balls]
+[balls.radius_mm]
 {balls}
 {response_tables(design)}"""
 
@@ -370,6 +370,6 @@ serial = {json.dumps(design.serial)}
 mm_per_px = {scale:.7f}
 mm_per_px_sd = {spread:.7f}
 
-[balls]
+[balls.radius_mm]
 {balls}
 {camera_table(design)}"""

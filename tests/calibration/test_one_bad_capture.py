@@ -46,7 +46,7 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
         text = (project.session.folder / "session.toml").read_text()
         rows = "".join(f'"{name}" = 3.0\n' for name in reasons)
         (project.session.folder / "session.toml").write_text(
-            text.replace("[balls]\n", f"[balls]\n{rows}")
+            text.replace("[balls.radius_mm]\n", f"[balls.radius_mm]\n{rows}")
         )
         project.reload()
     status = project.compute(stage)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import cv2
@@ -30,7 +31,8 @@ square_mm = 3.0
 inner_corners = [7, 5]
 square_mm = 2.0
 [balls]
-default = 3.0
+default_radius_mm = 3.0
+[balls.radius_mm]
 "ball_03.png" = 4.0
 """
 
@@ -50,6 +52,17 @@ def test_a_good_description_is_read_with_its_defaults(tmp_path: Path) -> None:
     assert session.top_pose.square_mm == 2.0
     assert session.ball_radius_mm("ball_00.png") == 3.0
     assert session.ball_radius_mm("ball_03.png") == 4.0
+
+
+def test_radii_of_older_descriptions_are_read_and_written_with_their_unit(tmp_path: Path) -> None:
+    new = read_session(session_folder(tmp_path))
+    older = GOOD.replace("default_radius_mm", "default").replace("[balls.radius_mm]\n", "")
+    session = read_session(session_folder(tmp_path, older))
+    assert session == new
+    write_description(session)
+    balls = tomllib.loads((tmp_path / "session.toml").read_text())["balls"]
+    assert balls == {"default_radius_mm": 3.0, "radius_mm": {"ball_03.png": 4.0}}
+    assert read_session(tmp_path) == new
 
 
 def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> None:
@@ -76,7 +89,9 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> 
         ("[balls]", "[colours]\nx = 1\n[balls]", "colours"),
         ("inner_corners = [9, 6]", "inner_corners = [9]", "inner_corners"),
         ("inner_corners = [9, 6]", "inner_corners = [9, 2.5]", "inner_corners"),
-        ("default = 3.0", "default = 0", "default"),
+        ("default_radius_mm = 3.0", "default_radius_mm = 0", "default is 0"),
+        ("default_radius_mm = 3.0", "default_radius_mm = 3.0\ndefault = 3.0", "stated twice"),
+        ("[balls.radius_mm]\n", "radius_mm = 3.0\n[balls.other]\n", "radius_mm is not a table"),
         ("[sensor]", "[sensor", "TOML"),
     ],
 )
@@ -98,7 +113,7 @@ def test_a_folder_without_a_session_and_a_stage_without_images_are_named(tmp_pat
 
 
 def test_a_ball_without_a_radius_is_named(tmp_path: Path) -> None:
-    session = read_session(session_folder(tmp_path, GOOD.replace("default = 3.0\n", "")))
+    session = read_session(session_folder(tmp_path, GOOD.replace("default_radius_mm = 3.0\n", "")))
     with pytest.raises(InputError, match=r"ball_00\.png"):
         session.ball_radius_mm("ball_00.png")
 

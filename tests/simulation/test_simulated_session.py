@@ -78,7 +78,7 @@ def test_a_closed_sensor_shows_background_balls_and_scale_only(
 def test_description_and_truth_say_what_was_simulated(session: Path) -> None:
     text = tomllib.loads((session / "session.toml").read_text())
     assert text["sensor"]["elastomer_refractive_index"] == 1.41
-    assert text["balls"] == {"ball_00.png": 3.0, "ball_01.png": 4.0}
+    assert text["balls"]["radius_mm"] == {"ball_00.png": 3.0, "ball_01.png": 4.0}
     truth = json.loads((session / "truth.json").read_text())
     assert truth["camera"]["fx"] == pytest.approx(1385.6 * SCALE)
     # The position of an LED in the camera frame keeps its height below the plane.

@@ -1,0 +1,109 @@
+"""Whether scale and ball diameters are possible, by what is known of other sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from gelpolight_core.errors import Remedy
+from gelpolight_core.finding import Finding, judge
+from gelpolight_core.in_place.calibrate import InPlaceResult
+from gelpolight_core.in_place.preset import Preset, presets
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
+from gelpolight_core.reflectance.indentation_checks import LARGEST_OF_BALL
+from gelpolight_core.translation import joined, pattern, tr
+
+COLOUR_OVER_WIDTH = (2.14, 1.64, 2.69, 0.68)
+"""Colour per slope over the contact's width in ball diameters: two GelSight Mini, a DIGIT and a
+home-made sensor with markers. A diameter that is stated too large makes slope and width too small,
+so that the number changes by the square of the mistake."""
+DOUBTFUL_SDS, IMPOSSIBLE_SDS = 2.0, 4.0
+"""Limits of a mistake, in standard deviations of the sensors that are known."""
+SIZE_LIMITS = 8.0, 25.0
+"""Percent between the slopes of balls of two sizes: the limits of the height of a press."""
+SAME_SCALE = 1e-3
+"""Relative difference of a scale from that of a preset that is meant: three digits are stated."""
+
+
+def preset_of(grid: WorkingGrid) -> Preset | None:
+    """Return the kind of sensor whose nominal scale is stated; None if it is that of no preset."""
+    size = grid.image
+    for preset in presets():
+        width, height = preset.image_px
+        nominal = preset.mm_per_px * width / size.width
+        same_shape = size.width * height == size.height * width
+        if same_shape and abs(grid.mm_per_px / nominal - 1.0) < SAME_SCALE:
+            return preset
+    return None
+
+
+def judge_kind(result: InPlaceResult) -> tuple[Finding, ...]:
+    """Judge scale and ball diameters by the contacts, the colours, and the balls among themselves.
+
+    Parameters
+    ----------
+    result : InPlaceResult
+        With its presses.
+    """
+    widths = np.array([press.width for press in result.presses])
+    colours = np.array([press.held_out.colour_per_slope for press in result.presses])
+    wide = judge(
+        "contact_over_ball",
+        tr("Width of the contacts over that of the balls, median"),
+        float(np.median(widths)),
+        fail=LARGEST_OF_BALL,
+        remedy=Remedy.CHECK_SIZES,
+    )
+    preset = preset_of(result.model.grid)
+    if preset is not None and preset.colour_per_slope:
+        mistake = float(np.median(colours)) / preset.colour_per_slope
+        sd = preset.colour_per_slope_sd / preset.colour_per_slope
+    else:
+        known = np.log(COLOUR_OVER_WIDTH)
+        mistake = math.exp(0.5 * float(np.median(np.log(colours / widths)) - known.mean()))
+        sd = 0.5 * float(known.std(ddof=1))
+    times = max(mistake, 1.0 / mistake)
+    remedy = (
+        tr("Balls look {n:.1f} times too large for the scale, compared with other sensors")
+        if mistake > 1.0
+        else tr("Balls look {n:.1f} times too small for the scale, compared with other sensors")
+    )
+    return (
+        wide,
+        judge(
+            "ball_size_factor",
+            tr("Size of the balls against what colours of other sensors suggest, factor"),
+            times,
+            warn=math.exp(DOUBTFUL_SDS * sd),
+            fail=math.exp(IMPOSSIBLE_SDS * sd),
+            remedy=pattern(
+                "{what}. {remedy}", what=remedy.format(n=times), remedy=Remedy.CHECK_SIZES.format()
+            ),
+        ),
+        *_judge_sizes(result.sizes),
+    )
+
+
+def _judge_sizes(sizes: Sequence[tuple[float, float, float]]) -> tuple[Finding, ...]:
+    """Judge balls of several sizes by each other."""
+    if not sizes:
+        return ()
+    # Fits with fewer presses have smaller slopes, alike for all sizes.
+    common = math.exp(np.mean([math.log(max(ratio, 1e-3)) for _, ratio, _ in sizes]))
+    radius, ratio, sd = max(sizes, key=lambda size: abs(math.log(max(size[1], 1e-3) / common)))
+    other = joined(", ", [f"{2.0 * r:.3g}" for r, *_ in sizes if r != radius])
+    words = tr("The balls of {d:.3g} mm contradict those of {other} mm: check their diameters")
+    doubtful, impossible = (limit + DOUBTFUL_SDS * 100.0 * sd for limit in SIZE_LIMITS)
+    return (
+        judge(
+            "ball_sizes_percent",
+            tr("Slopes of balls of one size by those of the others, largest difference"),
+            100.0 * abs(ratio / common - 1.0),
+            "%",
+            warn=doubtful,
+            fail=impossible,
+            remedy=words.format(d=2.0 * radius, other=other),
+        ),
+    )

@@ -1,0 +1,104 @@
+"""Wrong scales and ball diameters are found, as far as they can be known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.calibration.in_place import BALLS
+from gelpolight_core.calibration.in_place_session import Slopes, find_slopes
+from gelpolight_core.calibration.project import Run
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.finding import Verdict
+from gelpolight_core.in_place.kind import preset_of
+from gelpolight_core.in_place.preset import stated_sizes
+from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
+from gelpolight_core.session.session import Session
+
+FACTORS = st.floats(-1.0, 1.0).map(lambda power: 10.0**power)
+
+
+def with_sizes(session: Session, scale: float, radius: float) -> Session:
+    """Return a session of five presses with another scale and other radii, by factors."""
+    stated = session.in_place
+    assert stated is not None and stated.mm_per_px is not None
+    x, y = stated.mm_per_px
+    names = [path.name for path in session.files("balls")]
+    excluded = frozenset(f"balls/{name}" for name in names[5:])
+    return replace(
+        session,
+        in_place=replace(stated, mm_per_px=(scale * x, scale * y)),
+        ball_radii_mm={name: radius * session.ball_radius_mm(name) for name in names},
+        decisions=replace(session.decisions, excluded=excluded),
+    )
+
+
+def slopes_with(session: Session, scale: float, radius: float) -> Slopes:
+    """Return what such a session gives."""
+    changed = with_sizes(session, scale, radius)
+    return find_slopes(changed, changed.averaged("background"))
+
+
+@settings(
+    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(scale=FACTORS, radius=FACTORS)
+def test_every_scale_and_radius_gives_a_result_or_a_refusal(
+    closed_session: Session, scale: float, radius: float
+) -> None:
+    try:
+        found = slopes_with(closed_session, scale, radius)
+    except InputError as refusal:
+        assert refusal.advice
+    else:
+        assert len(found.result.presses) >= 3
+
+
+@pytest.mark.parametrize(("scale", "radius"), [(0.1, 1.0), (1.0, 10.0), (10.0, 1.0), (1.0, 0.1)])
+def test_ten_times_too_much_fails_and_names_scale_and_balls(
+    closed_session: Session, scale: float, radius: float
+) -> None:
+    try:
+        quality = slopes_with(closed_session, scale, radius).quality
+    except InputError as refusal:
+        assert refusal.advice == Remedy.CHECK_SIZES.format()
+    else:
+        assert quality.verdict is Verdict.FAIL
+        assert any(Remedy.CHECK_SIZES.format() in remedy for remedy in quality.remedies)
+
+
+def test_a_radius_that_is_the_diameter_is_doubted_and_the_right_one_is_not(
+    closed_session: Session, closed_run: Run
+) -> None:
+    doubled = slopes_with(closed_session, 1.0, 2.0).quality
+    right = closed_run.results[BALLS].quality
+    assert doubled["ball_size_factor"].value / right["ball_size_factor"].value > 1.7
+    for key in ("ball_size_factor", "contact_over_ball", "ball_sizes_percent"):
+        assert right[key].verdict is Verdict.PASS
+
+
+def test_one_wrong_size_among_several_is_named(closed_session: Session) -> None:
+    radii = {
+        path.name: closed_session.ball_radius_mm(path.name)
+        for path in closed_session.files("balls")
+    }
+    largest = max(radii.values())
+    wrong = {name: 2.0 * r if r == largest else r for name, r in radii.items()}
+    changed = replace(closed_session, ball_radii_mm=wrong)
+    found = find_slopes(changed, changed.averaged("background"))
+    named = {name for name, fault in found.result.refused.items()}
+    assert named == {name for name, r in radii.items() if r == largest} or (
+        found.quality["ball_sizes_percent"].verdict is not Verdict.PASS
+    )
+
+
+def test_the_stated_sizes_are_shown_to_be_confirmed() -> None:
+    grid = WorkingGrid(ImageSize(320, 240), 0.0634)
+    assert preset_of(grid) is not None
+    assert preset_of(replace(grid, mm_per_px=0.00634)) is None
+    sentence = stated_sizes([12.7, 9.5, 12.7], (0.0634, 0.0634), (320, 240))
+    for number in ("19", "25.4", "0.0634", "20.3", "15.2"):
+        assert number in sentence
