@@ -21,6 +21,7 @@ from app.sources.camera.driver import (
     Device,
     Format,
     compression_warning,
+    has_placeholder,
     without_port,
 )
 from app.sources.source import SourceInfo
@@ -118,7 +119,7 @@ class CameraManager(QObject):
     def key(self, identity: str) -> str:
         """Return what identifies a camera: with its port only if others have the same serial."""
         alone = without_port(identity)
-        return identity if alone in self._shared else alone
+        return identity if alone in self._shared or has_placeholder(identity) else alone
 
     def is_same(self, stored: str, present: str) -> bool:
         """Return whether two identities are those of one camera."""

@@ -98,7 +98,7 @@ def run_batch(
     make_folder(out)
     with RunLock(out):
         begin_or_go_on(settings, out)
-        for folder in {source.output for source in plan.sources}:
+        for folder in {"", *(source.output for source in plan.sources)}:
             make_folder(out / folder)
             for part in (out / folder).glob(".*.part"):  # left by a killed process
                 part.unlink(missing_ok=True)

@@ -6,12 +6,15 @@ names; its scheduler distributes the frames.
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,6 +25,8 @@ from gelpolight_core.translation import tr
 
 T = TypeVar("T")
 ANSWER_S = 10.0
+EMPTY_S = 60.0
+"""How long a cluster may have no workers; one that grows with its work starts them meanwhile."""
 TASKS_PER_CORE = 3
 """Tasks in the scheduler for each core, running and waiting, so that no core waits for its next."""
 THREADS = (
@@ -124,13 +129,23 @@ def cluster(address: str) -> Iterator[Workers]:
     """
     try:
         from distributed import Client, KilledWorker
+        from distributed.comm import connect
     except ImportError as error:
         raise InputError(
             tr("Dask is not installed"),
             "--workers",
             Remedy.INSTALL.format(package="gelpolight-studio[dask]"),
         ) from error
+
+    for name in ("distributed", "distributed.client"):  # what they would print, the error says
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+    async def call() -> None:
+        reached = connect(address, timeout=ANSWER_S)
+        await (await asyncio.wait_for(reached, ANSWER_S)).close()
+
     try:
+        asyncio.run(call())  # a client without an answer would print an error when it is collected
         client = Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
@@ -141,12 +156,26 @@ def cluster(address: str) -> Iterator[Workers]:
     with client:
         # Not pure: the same frames may have to be repeated, and the result is the files.
         submit = client.get_executor(pure=False).submit
+        full_s = time.monotonic()
+
+        def most() -> int:
+            nonlocal full_s
+            cores, now = int(sum(client.ncores().values())), time.monotonic()
+            if cores:
+                full_s = now
+            elif now - full_s > EMPTY_S:
+                text = tr("The cluster has had no workers for {s:.0f} seconds")
+                raise InputError(text.format(s=EMPTY_S), address, Remedy.CLUSTER)
+            return TASKS_PER_CORE * max(cores, 1)
+
         try:
-            yield Workers(
-                submit, lambda: TASKS_PER_CORE * max(sum(client.ncores().values()), 1), KilledWorker
-            )
+            yield Workers(submit, most, KilledWorker)
         except InputError:
             raise
+        except (OSError, CancelledError) as error:  # tasks are cancelled without a scheduler
+            raise InputError(
+                tr("The connection to the scheduler was lost"), address, Remedy.CLUSTER
+            ) from error
         except Exception as error:  # workers record all errors of frames: the cluster fails
             raise InputError(
                 tr("The cluster does not work ({reason})").format(

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import csv
 import errno
+import gc
 import multiprocessing
 import os
 import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +29,7 @@ from gelpolight_core.batch.results import FrameRow
 from gelpolight_core.batch.run import run_batch
 from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.work import work
-from gelpolight_core.batch.workers import cluster, processes
+from gelpolight_core.batch.workers import Workers, cluster, processes
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import write_heightmap
@@ -109,9 +116,12 @@ def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> Non
     text = (out / ROWS).read_bytes()
     (out / ROWS).write_bytes(text[: len(text) - 40])
     part = out / "day" / "run" / ".run_000000.npz.0123abcd.part"
-    part.write_bytes(b"half")
+    table_part = out / ".batch.csv.0123abcd.part"
+    for each in (part, table_part):
+        each.write_bytes(b"half")
     assert (go(day, out=out).before, len(table(out))) == (2, 6)
     assert not part.exists()
+    assert not table_part.exists()
     assert {name: results(out)[name] for name in before} == before
     assert go(day, out=out).before == 6
 
@@ -272,6 +282,81 @@ def test_a_scheduler_that_does_not_answer_is_refused(
     monkeypatch.setattr(workers, "ANSWER_S", 0.3)
     with pytest.raises(InputError, match="No Dask scheduler responds"):
         go(day, out=tmp_path / "out", workers=cluster("tcp://127.0.0.1:9"))
+
+
+@pytest.mark.parametrize("address", ["nonsense", "foo://bar", "tcp://127.0.0.1:9"])
+def test_an_address_without_a_scheduler_is_one_error(
+    address: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing is printed beside the error, also later when memory is collected."""
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "ANSWER_S", 0.3)
+    with pytest.raises(InputError) as refused, cluster(address):
+        pass
+    assert refused.value.where == address
+    del refused
+    gc.collect()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_silent_server_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "ANSWER_S", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(InputError, match="No Dask scheduler responds"), cluster(address):
+            pass
+
+
+def test_a_cluster_without_workers_is_refused_after_a_time(
+    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "EMPTY_S", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None) as local,
+        pytest.raises(InputError, match=r"no workers for .* 0 of 6 frames are done"),
+    ):
+        go(day, out=tmp_path / "out", workers=cluster(local.scheduler_address))
+
+
+def test_a_lost_scheduler_is_one_error_with_one_remedy(
+    go,
+    day: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "ANSWER_S", 60.0)  # the scheduler may be slow to start
+    own = "from distributed.cli.dask_scheduler import main; main()"
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    command = [sys.executable, "-c", own, "--port", str(port), "--no-dashboard"]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as scheduler:
+        try:
+            with pytest.raises(InputError, match="scheduler was lost") as refused:
+                killed = killed_once_open(cluster(f"tcp://127.0.0.1:{port}"), scheduler)
+                go(day, out=tmp_path / "out", workers=killed)
+        finally:
+            scheduler.kill()
+    assert refused.value.advice.count("again") == 1
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@contextmanager
+def killed_once_open(
+    workers: AbstractContextManager[Workers], scheduler: subprocess.Popen[bytes]
+) -> Iterator[Workers]:
+    """Yield the workers of a cluster whose scheduler ends as soon as it has a task."""
+    with workers as opened:
+
+        def submit(*task: object) -> Future[object]:
+            future: Future[object] = opened.submit(*task)
+            scheduler.kill()
+            return future
+
+        yield replace(opened, submit=submit)
 
 
 def test_a_long_running_worker_detects_a_replaced_recording(

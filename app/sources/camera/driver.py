@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -132,6 +133,17 @@ class CameraDriver(Protocol):
 def without_port(identity: str) -> str:
     """Return the part of an identity that stays when a camera is plugged into another port."""
     return identity.partition(PORT)[0]
+
+
+def has_placeholder(identity: str) -> bool:
+    """Return whether makers give the serial number of a camera to all of them.
+
+    Its digits are all 0, count up from 1 (``SN0001``, ``0123456789``), or are a New Year's Day and
+    the number 1 (``200901010001``); or it has none, as a word has.
+    """
+    serial = without_port(identity).partition("@")[2].rpartition("/")[0]
+    number = re.sub(r"^(19|20)\d\d0101(?=0*1$)", "", re.sub(r"\D", "", serial)).lstrip("0")
+    return PORT in identity and "1234567890".startswith(number)
 
 
 def find_device(

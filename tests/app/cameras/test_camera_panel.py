@@ -92,13 +92,13 @@ def test_two_cameras_with_one_serial_number_are_two_cameras(
 ) -> None:
     """Also after one of them is unplugged, and after a restart."""
     one, two = (
-        FakeCamera(device=replace(C310, identity=f"046d:081b@200901010001/1.0 at 1-{port}"))
+        FakeCamera(device=replace(C310, identity=f"046d:081b@SN7734/1.0 at 1-{port}"))
         for port in (2, 3)
     )
     cameras, identities = context.cameras, (one.device.identity, two.device.identity)
     cameras.driver = FakeDriver(one)
     assert cameras.is_same(*identities)  # as far as is known: one camera at another port
-    assert cameras.is_same("046d:081b@200901010001/1.0", identities[0])  # of an older file
+    assert cameras.is_same("046d:081b@SN7734/1.0", identities[0])  # of an older file
     cameras.driver = FakeDriver(one, two)
     infos = cameras.infos()
     assert [info.name for info in infos] == [f"{C310.name} (1-2)", f"{C310.name} (1-3)"]
@@ -108,10 +108,10 @@ def test_two_cameras_with_one_serial_number_are_two_cameras(
     again = CameraManager(settings=context.settings, status=context.status, toasts=context.toasts)
     for manager in (cameras, again):
         assert not manager.is_same(*identities)
-        assert not manager.is_same("046d:081b@200901010001/1.0", identities[0])
-    again.accept_same("046d:081b@200901010001/1.0", identities[0])
+        assert not manager.is_same("046d:081b@SN7734/1.0", identities[0])
+    again.accept_same("046d:081b@SN7734/1.0", identities[0])
     later = CameraManager(settings=context.settings, status=context.status, toasts=context.toasts)
-    assert later.is_same("046d:081b@200901010001/1.0", identities[0])
+    assert later.is_same("046d:081b@SN7734/1.0", identities[0])
     context.source.choose_again("camera", identities[0], cameras)
     assert context.source.info is None  # only the other one is connected
 

@@ -110,16 +110,25 @@ def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: Liv
     assert switched == [reconstructor, None]
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("1-2:1.0", "1-3:1.0"),
+        ("3F2A9C10/1.0 at 1-2", "77B01C35/1.0 at 1-2"),
+        ("200901010001/1.0 at 1-2", "200901010001/1.0 at 1-3"),
+    ],
+    ids=["ports", "numbers at one port", "one placeholder"],
+)
 def test_a_calibration_of_another_camera_is_used_only_if_the_user_says_that_it_is_the_same(
-    depth: LiveDepth,
+    depth: LiveDepth, first: str, second: str
 ) -> None:
     """Two cameras of one model with different identities; only the second is connected."""
     context = depth._context
-    there = replace(C310, identity="046d:081b@1-3:1.0")
+    there = replace(C310, identity=f"046d:081b@{second}")
     context.cameras.driver = FakeDriver(FakeCamera(device=there))
     context.source.choose(context.cameras.infos()[0])
     calibration = SimpleNamespace(camera=SimpleNamespace(width=6, height=4), serial="A")
-    texts = {"name": C310.name, "identity": "046d:081b@1-2:1.0", "model": C310.model}
+    texts = {"name": C310.name, "identity": f"046d:081b@{first}", "model": C310.model}
     calibration.provenance = SimpleNamespace(camera_settings=texts)
     reconstructor: Any = SimpleNamespace(calibration=calibration)
     depth.choose(reconstructor, reconstructor)
@@ -127,7 +136,7 @@ def test_a_calibration_of_another_camera_is_used_only_if_the_user_says_that_it_i
     assert depth.live_reconstructor is None
     assert advice is not None and advice.verdict is Verdict.FAIL
     assert action_of(advice) == "same_camera"
-    assert "046d:081b@1-2:1.0" in advice.text and there.identity in advice.text
+    assert f"046d:081b@{first}" in advice.text and there.identity in advice.text
     depth.act(action_of(advice))
     assert depth.live_reconstructor is reconstructor
     assert action_of(advise(depth.state)) != "same_camera"

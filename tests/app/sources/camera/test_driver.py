@@ -13,6 +13,7 @@ from app.sources.camera.driver import (
     best_format,
     compression_warning,
     find_device,
+    has_placeholder,
     without_port,
 )
 
@@ -59,3 +60,16 @@ def test_a_camera_is_found_at_another_port_by_its_serial_number() -> None:
     assert find_device((other, there), here.identity, same) == there
     assert find_device((there, third), here.identity, same) is None
     assert find_device((device("046d:081b@1-6:1.0"),), other.identity, same) is None
+
+
+PLACEHOLDERS = "200901010001", "SN0001", "0000000000", "0123456789", "12345678", "1", "none"
+NUMBERS = "3F2A9C10", "SN0002", "28GH-EJZ8", "D20235", "200901010002", "200904170001", "2019010112"
+
+
+def test_a_serial_number_that_makers_give_to_every_camera_is_known() -> None:
+    def identity(serial: str) -> str:
+        return f"046d:081b@{serial}/1.0 at 1-2"
+
+    assert [one for one in PLACEHOLDERS if not has_placeholder(identity(one))] == []
+    assert [one for one in NUMBERS if has_placeholder(identity(one))] == []
+    assert not has_placeholder("046d:081b@1-1:1.0")  # a port alone
