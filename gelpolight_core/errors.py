@@ -33,6 +33,7 @@ class Remedy(StrEnum):
     CHECK_NAME = marked("Check the name")
     CHECK_DISK = marked("Check the name, the permissions and the disk")
     FREE_SPACE = marked("Free some disk space, or choose another disk")
+    MAY_READ = marked("Ask its owner for permission to read it, or choose another one")
     ASK_PERMISSION = marked("Choose a folder of your own, or ask for permission")
     CHOOSE_FILE = marked("Choose another file")
     CHOOSE_NAME = marked("Choose another name")
@@ -69,6 +70,7 @@ class Remedy(StrEnum):
     CHECK_EXPOSURE = marked("Check the exposure of whiteboard, background and press")
     SAME_LIGHT = marked("Keep light and exposure constant, and capture background and press again")
     SAME_CAMERA = marked("Use the same camera and image size for all images")
+    LESS_MEMORY = marked("Use smaller images or fewer jobs, or close other programs")
     SMALLER_IMAGES = marked("Use smaller images")
     PNG = marked("Use PNG or TIFF images of 8 or 16 bit")
     LINEAR_ARRAY = marked("Use unsigned 8 or 16 bit integers, or floats of linear light 0..1")
@@ -157,3 +159,33 @@ def _printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+OPENCV_NO_MEMORY = -4
+"""Its error code StsNoMem."""
+NO_MEMORY = marked("There is too little free memory for this")
+REFUSED = marked("The operating system refused it ({reason})")
+COMPUTER = marked("This computer")
+INTERNAL = marked("Internal error: {kind}; see the log.")
+
+
+def machine_fault(error: BaseException) -> InputError | None:
+    """Return the sentence for an error of the input or the computer; None for one of the program.
+
+    Too little memory, a missing permission and a full disk are no mistakes in the program.
+    """
+    if isinstance(error, InputError):
+        return error
+    of_opencv = (type(error).__module__, getattr(error, "code", 0)) == ("cv2", OPENCV_NO_MEMORY)
+    if of_opencv or isinstance(error, MemoryError):
+        return InputError(translated(NO_MEMORY), translated(COMPUTER), Remedy.LESS_MEMORY)
+    if isinstance(error, OSError):
+        found = translated(REFUSED).format(reason=error.strerror or error)
+        return InputError(found, error.filename or translated(COMPUTER), Remedy.CHECK_DISK)
+    return None
+
+
+def sentence_of(error: BaseException) -> str:
+    """Return the sentence that a person reads about any error."""
+    internal = translated(INTERNAL).format(kind=type(error).__name__)
+    return str(machine_fault(error) or internal)

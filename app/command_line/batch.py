@@ -19,6 +19,7 @@ from app.command_line.options import Command, option, output, place
 from app.command_line.reconstructing import effort, formats, load_reconstructor, model
 from app.command_line.terminal import say
 from gelpolight_core.batch.plan import plan_batch
+from gelpolight_core.batch.results import FILE as ROWS
 from gelpolight_core.batch.results import SUMMARY, FrameRow, last_line
 from gelpolight_core.batch.run import BatchProgress, run_batch
 from gelpolight_core.batch.settings import BatchSettings
@@ -126,6 +127,9 @@ def _bad_line(row: FrameRow, *, last: bool) -> str:
 def _report(progress: BatchProgress, out: Path) -> None:
     """Print a summary, or raise an error."""
     done = progress.before + progress.done
+    if progress.damaged:
+        text = tr("{n} damaged lines of {file} were left out; their frames were computed again")
+        say(text.format(n=progress.damaged, file=out / ROWS), file=sys.stderr)
     if progress.left:
         tqdm.write(
             tr("{n} of {total} frames are done. Run the same command again to continue").format(

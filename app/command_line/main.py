@@ -19,7 +19,7 @@ import platformdirs
 from app.command_line.parser import DEMO, MENDABLE, build_parser
 from app.command_line.terminal import say
 from gelpolight_core import __version__
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.errors import InputError, Remedy, machine_fault
 from gelpolight_core.translation import tr, use_language
 
 OUR_FAULT = 1
@@ -49,10 +49,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output has closed the pipe, so nothing more can be written.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as error:  # a name too long, no permission, a full disk
-        say(_environment_fault(error), file=sys.stderr)
-        return MENDABLE
-    except Exception:  # the outermost level: the user sees one line, the log gets the traceback
+    except Exception as error:  # the user sees one line, the log gets the traceback
+        if fault := machine_fault(error):
+            _write_log(traceback.format_exc())
+            say(f"gelpolight: {fault}", file=sys.stderr)
+            return MENDABLE
         say(_report_fault(), file=sys.stderr)
         return OUR_FAULT
     return status
@@ -102,17 +103,6 @@ def _open_closed_streams() -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
-
-
-def _environment_fault(error: OSError) -> str:
-    """Log the traceback, and return the line for the user."""
-    _write_log(traceback.format_exc())
-    found = InputError(
-        tr("The operating system refused it ({reason})").format(reason=error.strerror or error),
-        error.filename or tr("Files"),
-        Remedy.CHECK_DISK,
-    )
-    return f"gelpolight: {found}"
 
 
 def _report_fault() -> str:

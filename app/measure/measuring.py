@@ -21,7 +21,7 @@ from app.view2d.display import Display
 from app.view2d.quantities import depth_scale, difference_scale
 from app.view2d.shading import map_image
 from app.view3d.surface import surface_of
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.errors import InputError, Remedy, sentence_of
 from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.measurement.fitted import fit_residual
@@ -243,5 +243,4 @@ def apply_tool(tool: Tool, heightmap: HeightMap) -> Answer:
         return Answer(refused=str(error))
     except Exception as error:  # a tool that fails must not remove the figures of the others
         _LOG.exception("The tool %s failed", tool.name)
-        text = tr("Internal error: {kind}. See the log for details.")
-        return Answer(refused=text.format(kind=type(error).__name__))
+        return Answer(refused=sentence_of(error))

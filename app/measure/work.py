@@ -13,7 +13,7 @@ from app.measure.measuring import Answer, ImageResults, MeasuredImage, MeasureRe
 from app.measure.placing import kind_label
 from app.services.newest_wins import Finished, NewestWins
 from app.widgets.timers import timer
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, sentence_of
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools import Ball, Cuboid, Cylinder, Tool, ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -253,8 +253,7 @@ class Work(QObject):
             self.refused = str(finished.error)
         elif finished.error is not None:
             _LOG.error("Measuring failed", exc_info=finished.error)
-            kind = type(finished.error).__name__
-            self.refused = tr("Internal error: {k}. See the log for details.").format(k=kind)
+            self.refused = sentence_of(finished.error)
         elif finished.result is not None:
             self.image_results = finished.result
             if request.propose and self._propose:

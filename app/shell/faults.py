@@ -18,7 +18,7 @@ from PySide6.QtCore import (
 )
 
 from app.services.toasts import Toasts
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import machine_fault
 from gelpolight_core.translation import tr
 
 log = logging.getLogger(__name__)
@@ -70,9 +70,9 @@ class Faults(QObject):
         where: str = "",
     ) -> None:
         """Log an error and show it once. The sentence of an InputError is shown unchanged."""
-        if isinstance(error, InputError):
-            log.warning("%s", error, exc_info=(kind, error, trace))
-            self._reported.emit(str(error), False)
+        if fault := machine_fault(error):
+            log.warning("%s", fault, exc_info=(kind, error, trace))
+            self._reported.emit(str(fault), False)
             return
         log.critical("Internal error%s", where and f" in {where}", exc_info=(kind, error, trace))
         lines = str(error).splitlines()

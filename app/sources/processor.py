@@ -11,8 +11,7 @@ from typing import Generic, TypeVar
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame
 from app.sources.stopping import PROCESSING, Worker, lower_priority
-from gelpolight_core.errors import InputError
-from gelpolight_core.translation import tr
+from gelpolight_core.errors import InputError, sentence_of
 
 _LOG = logging.getLogger(__name__)
 
@@ -126,8 +125,4 @@ class Processor(Worker, Generic[T]):
             if generation != self._reported:
                 self._reported = generation
                 _LOG.exception("Processing a frame failed")
-            return Failure(
-                generation,
-                frame,
-                tr("Internal error: {kind}; see the log.").format(kind=type(error).__name__),
-            )
+            return Failure(generation, frame, sentence_of(error))

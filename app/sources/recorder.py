@@ -14,7 +14,7 @@ from typing import Any
 from app.sources.source import Frame, Source
 from app.sources.stopping import join
 from app.sources.stream import Stream
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, sentence_of
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.translation import tr
@@ -168,7 +168,7 @@ class Recorder:
             _LOG.error("Recording ended: %s", error)
         except Exception as error:
             _LOG.exception("Recording %s failed", self.path)
-            failure = tr("Internal error: {kind}; see the log.").format(kind=type(error).__name__)
+            failure = sentence_of(error)
         self.stream.remove_tap(self._take)
         with self._changed:
             self._ending = True

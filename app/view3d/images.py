@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -136,7 +137,8 @@ def write_movie(path: Path, rate_hz: float, images: Iterable[Rgb]) -> int:
     """
     if path.suffix.lower() == ".gif":
         return _write_gif(path, rate_hz, images)
-    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
+    # A name that nobody can have given to a link before.
+    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
     video, count = cv2.VideoWriter(), 0
     try:
         for rgb in images:

@@ -12,6 +12,7 @@ import numpy as np
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import SUFFIXES, names_of
+from gelpolight_core.io.reading import unreadable
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import ENDING
@@ -229,4 +230,4 @@ def _images(folder: Path, names: Sequence[str], output: str) -> Source:
 
 
 def _raise(error: OSError) -> None:
-    raise error
+    raise unreadable(error, Path(error.filename)) from error

@@ -84,7 +84,13 @@ def finished_frames(out: Path) -> set[tuple[str, str]]:
     InputError
         If the file of the rows cannot be read.
     """
-    return {(row.output, row.stamp) for _, row in _lines(out / FILE) if not row.error}
+    rows = (row for _, row in _lines(out / FILE))
+    return {(row.output, row.stamp) for row in rows if row is not None and not row.error}
+
+
+def damaged_lines(out: Path) -> int:
+    """Return how many lines of a run's file are damaged; their frames count as not finished."""
+    return sum(row is None for _, row in _lines(out / FILE))
 
 
 def keep_rows(rows: Sequence[FrameRow], out: Path) -> None:
@@ -114,7 +120,7 @@ def write_summary(out: Path, *, measured: bool) -> None:
         If the file cannot be written, or the rows cannot be read.
     """
     # Only the positions are kept in memory: there may be millions of frames.
-    positions = {row.output: position for position, row in _lines(out / FILE)}
+    positions = {row.output: at for at, row in _lines(out / FILE) if row is not None}
     columns = [field.name for field in fields(FrameRow) if field.name not in LEFT_OUT]
 
     def write(stream: BinaryIO) -> None:
@@ -140,11 +146,13 @@ def write_summary(out: Path, *, measured: bool) -> None:
     write_atomically(out / SUMMARY, write)
 
 
-def _lines(path: Path) -> Iterator[tuple[int, FrameRow]]:
-    """Yield the rows of a file and their positions; an invalid line is skipped."""
+def _lines(path: Path) -> Iterator[tuple[int, FrameRow | None]]:
+    """Yield the position and the row of each line of a file; None for a damaged line."""
     for position, content in json_lines(path):
+        row = None
         with suppress(TypeError):
-            yield position, FrameRow(**content)
+            row = FrameRow(**content)
+        yield position, row
 
 
 def last_line(text: str) -> str:

@@ -16,7 +16,13 @@ from functools import partial
 from pathlib import Path
 
 from gelpolight_core.batch.plan import BatchPlan, Job
-from gelpolight_core.batch.results import FrameRow, finished_frames, keep_rows, write_summary
+from gelpolight_core.batch.results import (
+    FrameRow,
+    damaged_lines,
+    finished_frames,
+    keep_rows,
+    write_summary,
+)
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
 from gelpolight_core.batch.work import failed, work
 from gelpolight_core.batch.workers import Workers
@@ -45,6 +51,8 @@ class BatchProgress:
         Frames completed now, frames without a result, and those of them with an internal error.
     row : FrameRow or None
         The last frame; None at the beginning.
+    damaged : int
+        Damaged lines of the run's file; their frames count as not completed.
     """
 
     total: int
@@ -53,6 +61,7 @@ class BatchProgress:
     bad: int = 0
     internal: int = 0
     row: FrameRow | None = None
+    damaged: int = 0
 
     @property
     def left(self) -> int:
@@ -110,7 +119,8 @@ def run_batch(
                 (out / f"{job.output}.{name}").is_file() for name in endings
             )
 
-        progress = BatchProgress(len(plan), sum(map(is_done, plan)))
+        before = sum(map(is_done, plan))
+        progress = BatchProgress(len(plan), before, damaged=damaged_lines(out))
         report(progress)
         if progress.left:
             jobs = (job for job in plan if not is_done(job))

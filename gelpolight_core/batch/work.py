@@ -23,7 +23,7 @@ from gelpolight_core.batch.plan import Job, frame_stamp
 from gelpolight_core.batch.results import FrameRow
 from gelpolight_core.batch.settings import BatchSettings, require_same
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.errors import InputError, Remedy, machine_fault
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
@@ -103,8 +103,10 @@ class _Worker:
             if heightmap is not None and isinstance(error.__cause__, OSError):
                 raise  # the disk refuses files, also those of other frames
             row = failed(job, str(error))
-        except Exception:  # an internal error in one frame must not stop all others
-            row = failed(job, traceback.format_exc(), internal=True)
+        except Exception as error:  # an error in one frame must not stop all others
+            fault = machine_fault(error)
+            text = traceback.format_exc() if fault is None else str(fault)
+            row = failed(job, text, internal=fault is None)
         return replace(row, seconds=time.process_time() - began)
 
     def _reconstruct(self, job: Job) -> tuple[FrameRow, HeightMap]:

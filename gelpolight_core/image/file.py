@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.reading import brief, missing_file, read_file
+from gelpolight_core.io.reading import brief, missing_file, read_file, unreadable
 from gelpolight_core.translation import tr
 
 MAX_PIXELS = 64_000_000
@@ -78,12 +78,14 @@ def files_in(folder: Path) -> Files:
 
     Raises
     ------
-    PermissionError
+    InputError
         If it cannot be listed.
     """
-    if not folder.is_dir():
-        return Files((), ())
-    found = sorted(p for p in folder.iterdir() if not p.name.startswith(".") and not p.is_dir())
+    try:
+        entries = sorted(folder.iterdir()) if folder.is_dir() else ()
+        found = [p for p in entries if not p.name.startswith(".") and not p.is_dir()]
+    except OSError as error:
+        raise unreadable(error, folder) from error
     return Files(
         tuple(path for path in found if path.suffix.lower() in SUFFIXES),
         tuple(path for path in found if path.suffix.lower() not in SUFFIXES),

@@ -8,12 +8,14 @@ import json
 import os
 import secrets
 import stat
+import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import methodcaller
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.io.reading import LINE_CHECK
 from gelpolight_core.translation import tr
 
 
@@ -32,8 +34,8 @@ def write_atomically(
 
     The bytes are written to a temporary file in the same folder, flushed to disk, and then replace
     the old file in one step. If anything fails, including Ctrl-C, the old file stays unchanged and
-    the temporary one is removed. A symbolic link is followed; the permissions of an existing file
-    are kept.
+    the temporary one is removed. A symbolic link is followed, but replaced in a folder that others
+    can write to; the permissions of an existing file are kept.
 
     Parameters
     ----------
@@ -124,6 +126,9 @@ def make_folder(folder: Path) -> None:
 def _ordinary_target(path: Path) -> Path:
     """Return the target of a path; refuse anything but an ordinary file."""
     target = Path(os.path.realpath(path))
+    folder = Path(os.path.realpath(path.parent))
+    if path.is_symlink() and folder.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return folder / path.name  # the link may be of somebody else
     if target.exists() and not (target.is_file() or target.is_dir()):
         # Otherwise an ordinary file would replace, for example, /dev/full.
         raise InputError(tr("The path is a device, not a file"), path, Remedy.CHOOSE_FILE)
@@ -229,7 +234,8 @@ def append_durably(path: Path, content: bytes) -> None:
     try:
         is_new = not path.exists()
         # Unbuffered: data left in a buffer would be written again when the file is closed.
-        with path.open("a+b", buffering=0) as file:
+        handle = open_unlinked(path, os.O_RDWR | os.O_APPEND)
+        with os.fdopen(handle, "a+b", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
             file.seek(max(size - 1, 0))
             if size and file.read(1) != b"\n":
@@ -246,10 +252,41 @@ def append_durably(path: Path, content: bytes) -> None:
         sync_folder(path.parent)
 
 
-def append_json(path: Path, rows: Iterable[Any]) -> None:
-    """Append plain values as lines of JSON, as :func:`append_durably`."""
-    lines = [json.dumps(row, separators=(",", ":")) + "\n" for row in rows]
-    append_durably(path, "".join(lines).encode())
+def append_json(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
+    """Append tables as lines of JSON with a checksum each, as :func:`append_durably`."""
+    lines = [json.dumps(row, separators=(",", ":")).encode()[:-1] for row in rows]
+    checked = [b"%b%b%d}\n" % (line, LINE_CHECK, zlib.crc32(line)) for line in lines]
+    append_durably(path, b"".join(checked))
+
+
+def open_unlinked(path: Path, flags: int) -> int:
+    """Open a file of this program to write, created if it does not exist; return its handle.
+
+    Others may write to its folder: a link placed there would redirect what is written.
+
+    Raises
+    ------
+    InputError
+        If it is a link or no file, or cannot be written.
+    """
+    flags |= os.O_CREAT | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        handle = os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    except OSError as error:
+        raise (_is_link(path) if path.is_symlink() else cannot_write(error, path)) from error
+    status = os.fstat(handle)
+    if status.st_nlink > 1 or not stat.S_ISREG(status.st_mode):
+        os.close(handle)
+        raise _is_link(path)
+    return handle
+
+
+def _is_link(path: Path) -> InputError:
+    return InputError(
+        tr("This file is a link to another file, which would be overwritten"),
+        path,
+        Remedy.REPLACE_LINK,
+    )
 
 
 def _write_all(handle: int, content: bytes) -> None:

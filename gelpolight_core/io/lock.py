@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.atomic import cannot_write
+from gelpolight_core.io.atomic import cannot_write, open_unlinked
 from gelpolight_core.io.user import user_name
 from gelpolight_core.translation import tr
 
@@ -41,17 +41,7 @@ class FileLock:
     """
 
     def __init__(self, path: Path, refusal: Callable[[str], InputError]) -> None:
-        # Others may write to this folder: a link placed there would redirect what is written.
-        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
-        try:
-            self._handle: int | None = os.open(path, flags, 0o666)
-        except OSError as error:
-            if path.is_symlink():
-                raise _is_link(path) from error
-            raise cannot_write(error, path) from error
-        if os.fstat(self._handle).st_nlink > 1:
-            self.release()
-            raise _is_link(path)
+        self._handle: int | None = open_unlinked(path, os.O_RDWR)
         try:
             # The system releases the lock with the process, even if it is killed.
             _lock(self._handle)
@@ -112,14 +102,6 @@ def _lock(handle: int) -> None:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
     else:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-def _is_link(path: Path) -> InputError:
-    return InputError(
-        tr("This file is a link to another file, which would be overwritten"),
-        path,
-        Remedy.REPLACE_LINK,
-    )
 
 
 def _name() -> str:

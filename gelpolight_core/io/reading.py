@@ -19,6 +19,7 @@ import zlib
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
+from functools import partial
 from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
@@ -37,6 +38,8 @@ NAME_LIMIT = 200
 # Highest plausible version number; anything above it means a damaged file.
 NEWEST = 1_000_000
 LINES = "\n\t"
+LINE_CHECK = b',"crc32":'
+"""Before the checksum (CRC-32) at the end of a line of JSON, of all before it."""
 # Limit for the declared size of all arrays: fixed for a small file, this multiple of the packed
 # size for a larger one.
 DECLARED_LIMIT = 64_000_000
@@ -205,7 +208,8 @@ def parse_json(data: bytes | str) -> Any:
 def json_lines(path: Path) -> Iterator[tuple[int, Any]]:
     """Yield the position and the content of each line of JSON; none if there is no such file.
 
-    A line that a crash cut off, or that is not JSON, is left out.
+    A line that a crash cut off, that is not JSON, or whose checksum is wrong has the content None.
+    Lines of earlier versions of this program have no checksum.
 
     Raises
     ------
@@ -215,11 +219,15 @@ def json_lines(path: Path) -> Iterator[tuple[int, Any]]:
     position = 0
     try:
         with open_file(path) as file:
-            for line in file:
+            for line in iter(partial(file.readline, OWN_LIMIT), b""):
+                body, checked, checksum = line.rpartition(LINE_CHECK)
+                content = None
                 with suppress(ValueError):
-                    content = parse_json(line)
-                    if line.endswith(b"\n"):
-                        yield position, content
+                    if checked and checksum == b"%d}\n" % zlib.crc32(body):
+                        content = parse_json(body + b"}")
+                    elif not checked and line.endswith(b"\n"):
+                        content = parse_json(line)
+                yield position, content
                 position += len(line)
     except FileNotFoundError:
         return
@@ -398,7 +406,9 @@ def missing_file(path: Path) -> InputError:
 
 
 def unreadable(error: OSError, path: Path) -> InputError:
-    """Return the error for a file that the system cannot read."""
+    """Return the error for a file or folder that the system cannot read."""
+    if isinstance(error, PermissionError):
+        return InputError(tr("You do not have permission to read this"), path, Remedy.MAY_READ)
     return InputError(
         tr("The file cannot be read ({reason})").format(reason=error.strerror or error),
         path,

@@ -126,6 +126,25 @@ def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> Non
     assert go(day, out=out).before == 6
 
 
+def test_a_flipped_digit_of_a_line_is_found_and_its_frame_computed_again(
+    go, day: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    go(day, out=out)
+    good, before = (out / "batch.csv").read_bytes(), lines(out)
+    place = before[2].index('"max_depth_mm":') + 18
+    spoilt = before[2][:place] + str((int(before[2][place]) + 1) % 10) + before[2][place + 1 :]
+    (out / ROWS).write_text("\n".join([*before[:2], spoilt, *before[3:]]) + "\n")
+    goes_on = go(day, out=out)
+    assert (goes_on.damaged, goes_on.before, goes_on.done) == (1, 5, 1)
+    header = good.splitlines()[0].split(b",")
+    without_time = [
+        [row.split(b",")[: header.index(b"seconds")] for row in text.splitlines()]
+        for text in (good, (out / "batch.csv").read_bytes())
+    ]
+    assert without_time[0] == without_time[1]
+
+
 def test_another_image_of_the_same_name_is_another_frame(go, day: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     go(day, out=out)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import cv2
 import numpy as np
@@ -16,7 +19,8 @@ from one_line import refusal
 from app.command_line import calibrate
 from app.command_line import main as main_module
 from app.command_line.main import MENDABLE, OUR_FAULT, main
-from gelpolight_core.errors import InputError
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image.file import files_in
 from gelpolight_core.session.decisions import Decisions, write_decisions
 
 
@@ -325,3 +329,40 @@ def test_an_internal_error_is_one_line_and_a_log(
     assert "Traceback" not in shown
     log = next(tmp_path.rglob("gelpolight-faults.log"))
     assert "Traceback" in log.read_text()
+
+
+def test_too_little_memory_is_one_sentence_with_a_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    reasons = {
+        "numpy": lambda: np.empty(2**60, np.uint8),
+        "opencv": lambda: cv2.resize(np.zeros((1, 1), np.uint8), (2**31 - 1, 2**31 - 1)),
+    }
+    for ask in reasons.values():
+        monkeypatch.setattr(calibrate, "session_to_calibrate", lambda _path, ask=ask: ask())
+        said = refusal(capsys, "calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal"))
+        assert Remedy.LESS_MEMORY in said
+
+
+def test_a_folder_that_may_not_be_read_is_not_called_empty(
+    calibration: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The administrator, who may run this test, can read all folders: the system is replaced."""
+
+    def denied(path: object = ".") -> NoReturn:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    for name in ("listdir", "scandir"):
+        monkeypatch.setattr(os, name, denied)
+    (tmp_path / "in").mkdir()
+    said = refusal(
+        capsys, "batch", str(calibration), str(tmp_path / "in"), "-o", str(tmp_path / "o")
+    )
+    assert Remedy.MAY_READ in said
+    with pytest.raises(InputError) as refused:
+        files_in(tmp_path / "in")
+    assert (refused.value.where, refused.value.advice) == (str(tmp_path / "in"), Remedy.MAY_READ)

@@ -93,6 +93,18 @@ def test_colleagues_can_read_the_file_as_any_other(tmp_path: Path) -> None:
     assert stat.S_IMODE(ours.stat().st_mode) == 0o640
 
 
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_a_link_in_a_folder_that_others_can_write_to_is_replaced(tmp_path: Path) -> None:
+    theirs = tmp_path / "thesis.tex"
+    theirs.write_text("years of work")
+    (tmp_path / "all").mkdir()
+    (tmp_path / "all").chmod(0o777)
+    (tmp_path / "all/out.csv").symlink_to(theirs)
+    write_atomically(tmp_path / "all/out.csv", lambda file: file.write(b"new"))
+    assert theirs.read_text() == "years of work"
+    assert (tmp_path / "all/out.csv").read_bytes() == b"new"
+
+
 @pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
 def test_a_link_stays_a_link(tmp_path: Path) -> None:
     (tmp_path / "real").write_bytes(b"old")
