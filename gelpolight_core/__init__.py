@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from gelpolight_core.reconstruction.reconstructor import Reconstructor
     from gelpolight_core.sensor_calibration import Calibration
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 __all__ = [
     "Calibration",

@@ -5,7 +5,7 @@
 #     sh packaging/freeze.sh folder    the folder alone
 #     sh packaging/freeze.sh package   the package alone, of the folder that is there
 #
-# Needs Python 3.11 to 3.13 with venv and its shared library, binutils, and for the package dpkg-deb. The package
+# Needs Python 3.11 to 3.14 with venv and its shared library, binutils, and for the package dpkg-deb. The package
 # runs on systems at least as new as this one: make it on the oldest that is to be served (Debian 12).
 # PYTHON=/path/to/python chooses another Python.
 set -eu

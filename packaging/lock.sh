@@ -5,7 +5,7 @@
 #     sh packaging/lock.sh         every version anew
 #     sh packaging/lock.sh keep    versions that are locked stay; only what is missing or no longer allowed changes
 #
-# Needs Python 3.11 to 3.13 with venv, and the network. The tool that resolves (uv) lives in a folder that is deleted.
+# Needs Python 3.11 to 3.14 with venv, and the network. The tool that resolves (uv) lives in a folder that is deleted.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -45,24 +45,24 @@ lock() { # FILE WHAT [OPTION...]
         --fork-strategy fewest --generate-hashes --no-annotate --no-header \
         "$@" $basis --output-file "$scratch/lock.txt" >/dev/null
     {
-        echo "# $what, exact versions by hash, for Python 3.11 to 3.13. Made by packaging/lock.sh; do not edit."
+        echo "# $what, exact versions by hash, for Python 3.11 to 3.14. Made by packaging/lock.sh; do not edit."
         cat "$scratch/lock.txt"
     } >"$file"
     echo "Written: $file"
 }
 
-lock packaging/requirements.lock "What the program needs"
-lock packaging/requirements-dev.lock "What the program and its tests need" --extra dev \
+lock packaging/requirements.lock "What the program needs" --extra gui
+lock packaging/requirements-dev.lock "What the program and its tests need" --extra gui --extra dev \
     --constraint packaging/requirements.lock
 
 # The tools that run the tests are not what is tested with the oldest versions: they stay as they are locked.
 grep -E '^(pytest|hypothesis)' packaging/requirements-dev.lock | sed 's/ .*//' >"$scratch/tools.txt"
-lock packaging/requirements-oldest.lock "The oldest versions that the program allows, and what tests it" --extra dask \
+lock packaging/requirements-oldest.lock "The oldest versions that the program allows, and what tests it" --extra gui --extra dask \
     --resolution lowest-direct "$scratch/tools.txt"
 
 # PyInstaller is GPL 2 with an exception for what it builds: a tool of the build, never a part of the program.
 echo "pyinstaller>=6.16" >"$scratch/freeze.txt"
-lock packaging/requirements-freeze.lock "What the frozen build is made of and with" "$scratch/freeze.txt" \
+lock packaging/requirements-freeze.lock "What the frozen build is made of and with" --extra gui "$scratch/freeze.txt" \
     --constraint packaging/requirements.lock
 
 # What builds the documentation shares nothing with the program.

@@ -5,7 +5,8 @@
 #     sh packaging/oldest.sh         all of the core, and a choice of the windows
 #     sh packaging/oldest.sh thin    from saved calibrations to measured sizes by the commands, and all files; no windows
 #
-# Needs what "sh packaging/setup.sh test" installs from the system. PYTHON=/path/to/python chooses another Python.
+# Needs what "sh packaging/setup.sh test" installs from the system. PYTHON=/path/to/python chooses another Python;
+# the oldest versions are older than Python 3.14.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -32,6 +33,12 @@ whole)
     ;;
 esac
 
+python=${PYTHON:-.venv/bin/python}
+if ! "$python" -c 'import sys; sys.exit(sys.version_info >= (3, 14))'; then
+    echo "The oldest versions have no files for Python 3.14; choose an older one with PYTHON=/path/to/python." >&2
+    exit 0
+fi
+
 venv=.venv-oldest
 lock=packaging/requirements-oldest.lock
 window_libraries='^(pyside6-essentials|shiboken6|pyqtgraph|vtk|pytest-qt)=='
@@ -54,7 +61,7 @@ run_tests() { # PYTEST-ARGUMENT...
 make_environment() {
     echo "Making $venv with the oldest libraries, without those of windows."
     rm -rf "$venv"
-    "${PYTHON:-.venv/bin/python}" -m venv "$venv"
+    "$python" -m venv "$venv"
     entries "\$0 !~ /$window_libraries/" | install
     "$venv/bin/python" -m pip --disable-pip-version-check --no-input install --quiet --no-deps --no-build-isolation \
         --no-index --editable .

@@ -6,7 +6,7 @@
 #     sh packaging/setup.sh test        what the program, the checks and the tests need
 #
 # Safe to run again; quick when nothing has changed. PYTHON=/path/to/python chooses another Python.
-# What the system lacks is installed with apt-get, as root or by sudo, and only when it is missing.
+# What the system lacks is installed with apt-get, as root or by sudo, in one step and only when it is missing.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -65,9 +65,9 @@ begin() { # STEP [NOTE]
     echo "Set-up: $1${2:+ ($2)}."
 }
 
-# Python 3.11, 3.12 or 3.13, 64 bit: what the locked libraries are built for.
+# Python 3.11 to 3.14, 64 bit: what the locked libraries are built for.
 fits() { # PYTHON
-    "$1" -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 14) and sys.maxsize > 2**32))' \
+    "$1" -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 15) and sys.maxsize > 2**32))' \
         >/dev/null 2>&1
 }
 
@@ -75,10 +75,10 @@ makes_environments() { # PYTHON
     "$1" -c 'import ensurepip, venv' >/dev/null 2>&1
 }
 
-# The first fitting Python that can make an environment; else the first that fits, to be completed by apt-get.
+# The first fitting Python that can make an environment; else the first that fits; else none.
 choose_python() {
     python=
-    if [ -n "${PYTHON:-}" ]; then set -- "$PYTHON"; else set -- python3 python3.11 python3.12 python3.13; fi
+    if [ -n "${PYTHON:-}" ]; then set -- "$PYTHON"; else set -- python3 python3.11 python3.12 python3.13 python3.14; fi
     for candidate in "$@"; do
         fits "$candidate" || continue
         if makes_environments "$candidate"; then
@@ -87,8 +87,6 @@ choose_python() {
         fi
         python=${python:-$candidate}
     done
-    [ -n "$python" ] || stop "No 64-bit Python 3.11, 3.12 or 3.13 was found${PYTHON:+ as $PYTHON}; install one\
- (on Debian 12: apt-get install python3 python3-venv), or name it with PYTHON=/path/to/python, and run this again."
 }
 
 install_packages() { # PACKAGE...
@@ -99,7 +97,7 @@ install_packages() { # PACKAGE...
     elif command -v sudo >/dev/null 2>&1; then
         as_root=sudo
     else
-        stop "These system packages are missing: $*. Ask an administrator for \"apt-get install $*\" and run this again."
+        stop "System packages are missing. Ask an administrator for \"apt-get install $*\" and run this again."
     fi
     begin "installing the system packages $*"
     $as_root apt-get update -qq
@@ -118,34 +116,38 @@ missing_for_a_window() {
     done
 }
 
-install_what_windows_need() {
-    # shellcheck disable=SC2046 # names of packages hold no spaces
-    set -- $(missing_for_a_window)
-    if [ "$kind" = test ]; then
-        command -v Xvfb >/dev/null 2>&1 || set -- "$@" xvfb
-        command -v pdftotext >/dev/null 2>&1 || set -- "$@" poppler-utils
+# What a new environment needs, one package a line. Without the certificates no download can be verified;
+# systems that keep them elsewhere have no apt-get.
+missing_for_an_environment() {
+    if [ -z "$python" ]; then
+        [ -n "${PYTHON:-}" ] || printf '%s\n' python3 python3-venv
+    elif ! makes_environments "$python"; then
+        "$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])'
     fi
-    [ $# -eq 0 ] || install_packages "$@"
+    if command -v apt-get >/dev/null 2>&1 && [ ! -s "$trusted_authorities" ]; then echo ca-certificates; fi
 }
 
+missing_for_tests() {
+    command -v Xvfb >/dev/null 2>&1 || echo xvfb
+    command -v pdftotext >/dev/null 2>&1 || echo poppler-utils
+}
+
+# All at once, so that a person without administrator rights is stopped once only.
 install_what_the_system_lacks() {
-    set --
-    if ! makes_environments "$python"; then
-        set -- "$("$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"
-    fi
-    # Without it no download can be verified. Systems that keep it elsewhere have no apt-get.
-    if command -v apt-get >/dev/null 2>&1 && [ ! -s "$trusted_authorities" ]; then
-        set -- "$@" ca-certificates
-    fi
+    # shellcheck disable=SC2046 # names of packages hold no spaces
+    set -- $([ -z "$new" ] || missing_for_an_environment
+        [ "$kind" = commands ] || missing_for_a_window
+        [ "$kind" != test ] || missing_for_tests)
     [ $# -eq 0 ] || install_packages "$@"
-    makes_environments "$python" ||
-        stop "$python cannot make environments (venv and ensurepip are missing); install them, or name another Python\
- with PYTHON=/path/to/python, and run this again."
 }
 
 make_environment() {
     choose_python
-    install_what_the_system_lacks
+    [ -n "$python" ] || stop "No 64-bit Python 3.11 to 3.14 was found${PYTHON:+ as $PYTHON}; install one\
+ (on Debian 12: apt-get install python3 python3-venv), or name it with PYTHON=/path/to/python, and run this again."
+    makes_environments "$python" ||
+        stop "$python cannot make environments (venv and ensurepip are missing); install them, or name another Python\
+ with PYTHON=/path/to/python, and run this again."
     if [ -e "$venv" ]; then
         begin "removing the unfinished or outdated $venv"
         rm -rf "$venv"
@@ -162,8 +164,8 @@ hash_of() { # FILE...: together with where the environment stands, which it cann
     { pwd -P && cat "$@"; } | sha256sum | cut -d ' ' -f 1
 }
 
-[ "$kind" = commands ] || install_what_windows_need
-[ "$kind" = test ] || kind=run # the same libraries, as far as .venv is concerned
+wanted=run # the same libraries for the commands, as far as .venv is concerned
+[ "$kind" != test ] || wanted=test
 
 # One set of versions in both locks, so that the test environment also serves the program.
 libraries=$(hash_of packaging/requirements.lock packaging/requirements-dev.lock)
@@ -177,16 +179,21 @@ if [ -n "${PYTHON:-}" ] && [ -n "$found" ]; then
     [ "$("$venv/bin/python" -c "$version")" = "$("$PYTHON" -c "$version")" ] || found=
 fi
 
-if [ "$found" != "$kind $libraries" ] && [ "$found" != "test $libraries" ]; then
-    # Adding the tests' libraries to a whole environment is safe; everything else starts afresh.
-    [ "$found" = "run $libraries" ] || make_environment
+# Adding the tests' libraries to a whole environment is safe; everything else starts afresh.
+new=yes
+case $found in "run $libraries" | "test $libraries") new= ;; esac
+choose_python
+install_what_the_system_lacks
+
+if [ "$found" != "$wanted $libraries" ] && [ "$found" != "test $libraries" ]; then
+    [ -z "$new" ] || make_environment
     rm -f "$libraries_stamp"
     begin "installing the libraries of $lock" "the first time, about a minute"
     # Tests import a part of the libraries, and compile it then.
     compiled=--compile
-    [ "$kind" = run ] || compiled=--no-compile
+    [ "$wanted" = run ] || compiled=--no-compile
     pip install --quiet $compiled --require-hashes --only-binary :all: --requirement "$lock"
-    echo "$kind $libraries" >"$libraries_stamp"
+    echo "$wanted $libraries" >"$libraries_stamp"
 fi
 
 if [ "$(cat "$project_stamp" 2>/dev/null)" != "$project" ] || [ ! -x "$venv/bin/gelpolight" ]; then

@@ -70,10 +70,13 @@ def test_a_blocked_module_would_be_noticed() -> None:
         import_all_without("gelpolight_core", ["numpy"])
 
 
-def test_the_installed_version_is_the_one_that_calibrations_record() -> None:
-    """Provenance names the program that people have installed."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    assert project["version"] == gelpolight_core.__version__
+def test_the_release_note_and_the_citation_are_of_this_version() -> None:
+    """Provenance and the citation name the program that people have installed."""
+    version = gelpolight_core.__version__
+    notes = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    assert re.findall(r"^## ([\d.]+)", notes, flags=re.MULTILINE)[0] == version
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert re.findall(r"^version: (.+)$", citation, flags=re.MULTILINE) == [version]
 
 
 @pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
@@ -106,7 +109,7 @@ def test_every_dependency_is_locked() -> None:
     text = (ROOT / "pyproject.toml").read_text("utf-8")
     project = tomllib.loads(text)["project"]
     for lock, wanted in (
-        (RUNTIME_LOCK, project["dependencies"]),
+        (RUNTIME_LOCK, project["dependencies"] + project["optional-dependencies"]["gui"]),
         (DEV_LOCK, project["optional-dependencies"]["dev"]),
         (DOCS_LOCK, project["optional-dependencies"]["docs"]),
     ):
@@ -117,7 +120,8 @@ def test_every_dependency_is_locked() -> None:
 def test_the_lowest_versions_that_are_allowed_are_those_that_were_tested() -> None:
     """A lower bound that nobody tried is a guess."""
     table = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    wanted = table["project"]["dependencies"] + table["project"]["optional-dependencies"]["dask"]
+    extras = table["project"]["optional-dependencies"]
+    wanted = table["project"]["dependencies"] + extras["gui"] + extras["dask"]
     oldest = pins(OLDEST_LOCK)
     for requirement in wanted + table["build-system"]["requires"]:
         name, bound = re.match(r"([\w.-]+)>=([\d.]+)", requirement).groups()

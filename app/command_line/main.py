@@ -77,11 +77,17 @@ def _run(given: list[str]) -> int:
 
 def _open_desktop(arguments: list[str]) -> int:
     """Show the main window. Imported here, because commands also run without window libraries."""
-    from app.services.settings import Settings
+    try:
+        from app.services.settings import Settings
 
-    use_language(Settings().language)  # before the other modules translate their texts
-    from app.desktop import run
-
+        use_language(Settings().language)  # before the other modules translate their texts
+        from app.desktop import run
+    except ModuleNotFoundError as error:
+        raise InputError(
+            tr("The desktop program is not installed, only the library and the commands"),
+            str(error),
+            Remedy.INSTALL.format(package="gelpolight-studio[gui]"),
+        ) from error
     return run(arguments)
 
 

@@ -18,6 +18,7 @@ from gelpolight_core.export.raster import (
     write_tiff,
     write_xyz,
 )
+from gelpolight_core.export.surface_files import write_pcd, write_sdf, write_x3p
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
@@ -29,8 +30,11 @@ RASTER_FORMATS = {
     "tif": write_tiff,
     "png": write_png16,
     "gsf": write_gsf,
+    "x3p": write_x3p,
+    "sdf": write_sdf,
     "csv": write_csv,
     "xyz": write_xyz,
+    "pcd": write_pcd,
 }
 MESH_FORMATS: dict[str, Callable[..., object]] = {
     "vtp": write_vtp,
@@ -60,7 +64,8 @@ def write_heightmap(
         all.
     formats : sequence of str, or one of them
         Out of :data:`FORMATS`: ``npz`` (all maps), ``csv`` (the depth as a table, with the
-        places of columns and rows), ``xyz`` (one point a line), ``tif``, ``gsf`` and ``png`` (the
+        places of columns and rows), ``xyz`` (one point a line), ``x3p``, ``sdf`` and ``pcd`` (the
+        surface in metres, for metrology and robots), ``tif``, ``gsf`` and ``png`` (the
         depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera image
         may be in the same folder), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
         same), ``stl`` (bare mesh), ``glb`` (glTF, in metres).

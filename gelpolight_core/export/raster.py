@@ -181,7 +181,7 @@ def _refuse_contradictions(heightmap: HeightMap) -> None:
         # Written in float64: a hundredth of the pitch is far more than rounding.
         if not np.abs(places - expected).max() <= 0.01 * heightmap.pitch_mm:
             raise ValueError(f"{name} contradicts pitch_mm")
-    there, depth_mm = _known(heightmap), heightmap.depth_mm
+    there, depth_mm = has_depth(heightmap), heightmap.depth_mm
     if np.isinf(depth_mm).any() or np.isnan(depth_mm[_unflagged(heightmap)]).any():
         raise ValueError("depth_mm is not finite where flags states a depth")
     width_mm = heightmap.pitch_mm * max(depth_mm.shape)
@@ -206,7 +206,7 @@ def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> 
     if not np.all(normals[:, 2] < 0.0):
         raise ValueError("normals point away from the camera")
     slopes = np.stack(surface_slopes(heightmap.depth_mm, heightmap.pitch_mm), axis=-1)
-    slopes = slopes[_known(heightmap)].astype(np.float64)
+    slopes = slopes[has_depth(heightmap)].astype(np.float64)
     finite = np.isfinite(slopes).all(axis=1)
     stated = normals[finite, :2] / normals[finite, 2:]
     of_depth, of_normals = (float(np.sqrt(np.sum(s**2))) for s in (slopes[finite], stated))
@@ -332,7 +332,7 @@ def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
     """
     header = ",".join(["depth_mm", *(f"{x:.6g}" for x in heightmap.x_mm)])
     file.write(f"{header}\n".encode())
-    there = _known(heightmap)
+    there = has_depth(heightmap)
     for y, depths, known in zip(heightmap.y_mm, heightmap.depth_mm, there, strict=True):
         cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, known, strict=True))
         file.write(f"{y:.6g},{','.join(cells)}\n".encode())
@@ -343,13 +343,14 @@ def write_xyz(heightmap: HeightMap, file: BinaryIO) -> None:
 
     Places without depth are left out.
     """
-    there = _known(heightmap)
+    there = has_depth(heightmap)
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     points = np.column_stack([x[there], y[there], -heightmap.depth_mm[there]])
     np.savetxt(file, points, fmt="%.6g")
 
 
-def _known(heightmap: HeightMap) -> NDArray[np.bool_]:
+def has_depth(heightmap: HeightMap) -> NDArray[np.bool_]:
+    """Return (rows, columns) whether a place is in the working area and its depth is known."""
     return np.asarray(np.isfinite(heightmap.depth_mm) & _unflagged(heightmap))
 
 

@@ -24,7 +24,7 @@ BLOCKED = {"PySide6", "shiboken6", "pyqtgraph", "vtk", "vtkmodules"}
 class Blocker:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in BLOCKED:
-            raise ImportError(name + " is not here")
+            raise ModuleNotFoundError(name + " is not here", name=name)
 
 sys.meta_path.insert(0, Blocker())
 """
@@ -59,6 +59,16 @@ def test_only_window_libraries_are_blocked_in_a_process_and_its_children(
     )
     assert (done.returncode == 0) == (module == "numpy")
     assert ("is not here" in done.stderr) == (module != "numpy")
+
+
+def test_the_window_says_what_to_install(blocked: dict[str, str]) -> None:
+    start = "from app.command_line.main import main; raise SystemExit(main(['--demo']))"
+    done = subprocess.run(
+        [sys.executable, "-c", start], env=blocked, capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert 'pip install "gelpolight-studio[gui]"' in line
 
 
 def test_images_become_depth_maps_and_sizes(blocked: dict[str, str], tmp_path: Path) -> None:
