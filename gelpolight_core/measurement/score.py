@@ -131,7 +131,10 @@ def read_true_depth(path: Path) -> TrueDepth:
         raise _not_a_truth(path) from error
     if not x0.size == y0.size == pitch.size == 1:
         raise _not_a_truth(path)
-    if depth.ndim != 2 or not pitch > 0.0 or not np.isfinite(depth).all():
+    finite = all(np.isfinite(values).all() for values in (depth, x0, y0, pitch))
+    if depth.ndim != 2 or not finite or not pitch > 0.0:
+        raise _not_a_truth(path)
+    if np.abs(depth).max(initial=0.0) > pitch * max(depth.shape):  # of another unit
         raise _not_a_truth(path)
     rows, columns = depth.shape
     return TrueDepth(depth, x0 + pitch * np.arange(columns), y0 + pitch * np.arange(rows))

@@ -89,3 +89,15 @@ def test_a_truth_that_cannot_be_read_is_refused(tmp_path: Path, content: bytes |
         path.write_bytes(content)
     with pytest.raises(InputError):
         read_true_depth(path)
+
+
+@pytest.mark.parametrize("changed", [{"x0_mm": np.nan}, {"depth_mm": np.full((4, 5), 900.0)}])
+def test_a_truth_of_another_unit_or_without_a_place_is_refused(
+    changed: dict[str, object], tmp_path: Path
+) -> None:
+    good = {"depth_mm": np.ones((4, 5)), "x0_mm": 0.0, "y0_mm": 0.0, "pitch_mm": 0.5}
+    np.savez(tmp_path / "truth.npz", **good)
+    assert read_true_depth(tmp_path / "truth.npz").depth_mm.shape == (4, 5)
+    np.savez(tmp_path / "truth.npz", **(good | changed))
+    with pytest.raises(InputError):
+        read_true_depth(tmp_path / "truth.npz")
