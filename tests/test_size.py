@@ -83,7 +83,7 @@ MOST = {
     "tests/factors": 76,
     "tests/golden": 223,
     "tests/image": 292,
-    "tests/in_place": 1278,
+    "tests/in_place": 1312,
     "tests/io": 264,
     "tests/lab": 145,
     "tests/light": 737,

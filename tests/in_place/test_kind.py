@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from gelpolight_core.calibration.in_place import BALLS
 from gelpolight_core.calibration.in_place_session import Slopes, find_slopes
@@ -16,8 +22,9 @@ from gelpolight_core.finding import Verdict
 from gelpolight_core.in_place.kind import preset_of
 from gelpolight_core.in_place.preset import stated_sizes
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
-from gelpolight_core.session.session import Session
+from gelpolight_core.session.session import Session, read_session
 
+Array = NDArray[np.float32]
 FACTORS = st.floats(-1.0, 1.0).map(lambda power: 10.0**power)
 
 
@@ -102,3 +109,40 @@ def test_the_stated_sizes_are_shown_to_be_confirmed() -> None:
     sentence = stated_sizes([12.7, 9.5, 12.7], (0.0634, 0.0634), (320, 240))
     for number in ("19", "25.4", "0.0634", "20.3", "15.2"):
         assert number in sentence
+
+
+def other_images(folder: Path, out: Path, change: Callable[[Array, bool], Array]) -> Session:
+    """Return a session whose images are changed; told whether an image shows a press."""
+    shutil.copytree(folder, out)
+    for path in sorted(out.glob("b*/*.png")):
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        assert image is not None
+        most = np.iinfo(image.dtype).max
+        changed = change(image.astype(np.float32), path.parent.name == "balls")
+        assert cv2.imwrite(str(path), np.clip(changed, 0, most).round().astype(image.dtype))
+    return read_session(out)
+
+
+def test_a_texture_that_the_press_drags_is_calibrated(closed_folder: Path, tmp_path: Path) -> None:
+    def textured(image: Array, pressed: bool) -> Array:
+        # The same texture in every image.
+        texture = np.random.default_rng(3).normal(0.0, 1.0, image.shape[:2]).astype(np.float32)
+        texture = cv2.GaussianBlur(texture, (0, 0), 2.0)
+        texture = 1.0 + 0.03 * texture / texture.std()
+        dragged = np.roll(texture, (2, 2), (0, 1)) if pressed else texture
+        return np.asarray(image * dragged[..., None], np.float32)
+
+    session = other_images(closed_folder, tmp_path / "dragged", textured)
+    quality = find_slopes(session, session.averaged("background")).quality
+    assert quality["balls_left_out_percent"].value == 0.0
+    assert quality["held_out_normal_deg"].verdict is Verdict.PASS
+
+
+def test_a_background_under_other_light_is_corrected(closed_folder: Path, tmp_path: Path) -> None:
+    def dimmed(image: Array, pressed: bool) -> Array:
+        return image if pressed else np.asarray(0.94 * image, np.float32)
+
+    session = other_images(closed_folder, tmp_path / "dimmed", dimmed)
+    quality = find_slopes(session, session.averaged("background")).quality
+    assert quality["balls_left_out_percent"].value == 0.0
+    assert quality["held_out_normal_deg"].verdict is Verdict.PASS
