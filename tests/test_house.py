@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 RUNTIME_LOCK = ROOT / "packaging" / "requirements.lock"
 DEV_LOCK = ROOT / "packaging" / "requirements-dev.lock"
 OLDEST_LOCK = ROOT / "packaging" / "requirements-oldest.lock"
+TESTS = ROOT / "packaging" / "test.sh"
 DOCS_LOCK = ROOT / "packaging" / "requirements-docs.lock"
 FREEZE_LOCK = ROOT / "packaging" / "requirements-freeze.lock"
 LOCKS = [RUNTIME_LOCK, DEV_LOCK, OLDEST_LOCK, DOCS_LOCK, FREEZE_LOCK]
@@ -133,3 +134,11 @@ def test_only_the_headless_opencv_is_installed() -> None:
     """Its sibling brings a Qt of its own, which crashes beside PySide6."""
     opencv = {name for name in pins(DEV_LOCK) if name.startswith("opencv")}
     assert opencv == {"opencv-contrib-python-headless"}
+
+
+def test_commits_are_checked_as_by_the_test_command() -> None:
+    """What passes before a commit passes in the tests, too."""
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
+    commands = re.findall(r"entry: (.+)$", hooks, flags=re.MULTILINE)
+    tested = re.findall(r'^check "[\w ]+" (\.venv.+?)(?: >.*)?$', TESTS.read_text(), re.MULTILINE)
+    assert set(commands) == set(tested)

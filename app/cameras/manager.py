@@ -81,9 +81,10 @@ class CameraManager(QObject):
     def driver(self) -> CameraDriver:
         """What finds and opens cameras."""
         if self._driver is None:
+            from app.sources.camera.all_drivers import AllCameras
             from app.sources.camera.opencv import OpenCvDriver  # slow to import
 
-            self._driver = OpenCvDriver()
+            self._driver = AllCameras(OpenCvDriver())
         return self._driver
 
     @driver.setter

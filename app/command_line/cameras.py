@@ -27,9 +27,10 @@ class Cameras(Command):
 
     def run(self) -> None:
         """List the connected cameras."""
+        from app.sources.camera.all_drivers import AllCameras
         from app.sources.camera.opencv import OpenCvDriver  # slow import
 
-        report(OpenCvDriver(), self.json)
+        report(AllCameras(OpenCvDriver()), self.json)
 
 
 def report(driver: CameraDriver, json: Path | None) -> None:

@@ -56,7 +56,7 @@ class ExportChoice:
     @property
     def formats(self) -> tuple[str, ...]:
         """The chosen ones of FORMATS."""
-        return tuple(name for name in FORMATS if getattr(self, name))
+        return tuple(name for name in FORMATS if getattr(self, name, False))
 
     @property
     def frames(self) -> range | None:

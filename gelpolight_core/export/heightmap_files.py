@@ -20,12 +20,14 @@ from gelpolight_core.export.raster import (
 )
 from gelpolight_core.export.surface_files import write_pcd, write_sdf, write_x3p
 from gelpolight_core.io.atomic import make_folder, write_atomically
+from gelpolight_core.plug_ins import EXPORTS, plug_ins
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Writer = Callable[[BinaryIO], object]
 
-RASTER_FORMATS = {
+RASTER_FORMATS: dict[str, Callable[..., object]] = {
+    **plug_ins(EXPORTS),  # first, so that none replaces one of ours
     "npz": write_npz,
     "tif": write_tiff,
     "png": write_png16,

@@ -16,7 +16,9 @@ from gelpolight_core.measurement.indenter_tools import Ball, Cuboid, Cylinder
 from gelpolight_core.measurement.outline_tools import Circle, RectangleTool
 from gelpolight_core.measurement.point_tools import Angle, Distance, StepHeight
 from gelpolight_core.measurement.profile_tools import ProfileAngle, ProfileStep, ProfileWidth
-from gelpolight_core.measurement.tool import Tool, ToolResult
+from gelpolight_core.measurement.tool import Tool, ToolResult, places
+from gelpolight_core.plug_ins import TOOLS as PLUG_INS
+from gelpolight_core.plug_ins import plug_ins
 from gelpolight_core.translation import tr
 
 __all__ = [
@@ -45,7 +47,8 @@ __all__ = [
 ]
 
 TOOLS: Mapping[str, type[Tool]] = MappingProxyType(
-    {
+    plug_ins(PLUG_INS, lambda kind: kind.name and places(kind) and kind.apply)
+    | {
         kind.name: kind
         for kind in (
             Distance,
