@@ -71,6 +71,13 @@ class Finding:
     remedy: str = ""
     heights: Heights = Heights.STATED
 
+    def __eq__(self, other: object) -> bool:
+        """Compare as tuples do, where a NaN is equal to itself; Python 3.13 compares otherwise."""
+        if not isinstance(other, Finding):
+            return NotImplemented
+        ours, theirs = ([getattr(one, name) for name in self.__slots__] for one in (self, other))
+        return ours == theirs
+
     @property
     def stated(self) -> str:
         """Text, value and unit."""

@@ -13,3 +13,10 @@ def test_the_worst_finding_is_the_first_one_with_the_worst_verdict() -> None:
     assert worst_of(()) is None
     assert QualityTable((fine, doubtful)).verdict is Verdict.WARN
     assert reason_of((doubtful, failed)) == "cut by the border; no light"
+
+
+def test_the_same_note_without_a_number_is_one_note() -> None:
+    first, second = Finding("k", "a note"), Finding("k", "a note")
+    assert first == second
+    assert len({first, second, Finding("k", "another note")}) == 2
+    assert Finding("k", "a note", 1.0) != first
