@@ -88,7 +88,7 @@ MOST = {
     "tests/lab": 145,
     "tests/light": 737,
     "tests/lights": 206,
-    "tests/long": 1644,
+    "tests/long": 1652,
     "tests/measurement": 2131,
     "tests/optics": 520,
     "tests/packaging": 322,

@@ -110,6 +110,10 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
              (*BYTES, *(spoil.forged_recording,) * 4)),
         Kind("PNG image", "p.png", _pngs(), read_image, (*BYTES, *(spoil.forged_png,) * 4)),
         Kind("TIFF image", "p.tif", _tiffs(), read_image, (*BYTES, *(spoil.numbered,) * 3)),
+        *(
+            Kind(f"{end} image", f"p.{end}", _encoded(end), read_image, (*BYTES, spoil.numbered))
+            for end in ("jpg", "bmp", "webp")
+        ),
         Kind("records", "records.sqlite", _records(folder), _use_records,
              (*BYTES, *(partial(_forged_records, folder / "forge.sqlite"),) * 4)),
         Kind("true depth", "t.npz", (_true_depth(),), read_true_depth,
@@ -193,6 +197,12 @@ def _pngs() -> tuple[bytes, ...]:
     return tuple(
         cv2.imencode(".png", p.astype(k))[1].tobytes() for p, k in zip(images, kinds, strict=True)
     )
+
+
+def _encoded(end: str) -> tuple[bytes, ...]:
+    light = np.random.default_rng(2).uniform(0, 255, (24, 32, 3)).astype(np.uint8)
+    ways: tuple[list[int], ...] = ([], [cv2.IMWRITE_WEBP_QUALITY, 60]) if end == "webp" else ([],)
+    return tuple(cv2.imencode(f".{end}", light, way)[1].tobytes() for way in ways)
 
 
 def _tiffs() -> tuple[bytes, ...]:
