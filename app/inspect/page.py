@@ -66,7 +66,10 @@ class InspectPage(QWidget):
         self._rate.setMinimumHeight(2 * self._rate.fontMetrics().lineSpacing())
         show_meaning(self._rate, "muted")
         self._shown: Shown | None = None
-        self._recorded = ""
+        self._recorded = named(
+            PlainLabel(wrap=True), "inspect.recorded", tr("State of the recording")
+        )
+        self._recorded.hide()
         self._lay_out()
         self._connect()
         self.views.restore()
@@ -89,7 +92,10 @@ class InspectPage(QWidget):
         self.export = ExportControl(self.live_depth, self.jobs, self, context=self.context)
         self.views = Views(
             self.jobs,
-            (vbox(self._value, self._readout, spacing=2), vbox(self.modes.box, self._rate)),
+            (
+                vbox(self._value, self._readout, spacing=2),
+                vbox(self.modes.box, self._recorded, self._rate),
+            ),
             (
                 hbox(action_button(zero_action), action_button(self.export.action), spacing=8),
                 action_button(self.recorder.action),
@@ -205,7 +211,7 @@ class InspectPage(QWidget):
     def _show_texts(self) -> None:
         self.modes.follow(self.live_depth.last)
         self.views.surface.refresh_pins()
-        texts = self._recorded, self.stream.text, self.live_depth.rate_text()
+        texts = self.stream.text, self.live_depth.rate_text()
         self._rate.setText("\n".join(filter(None, texts)))
         self._rate.setToolTip(plain_tip(self.live_depth.trace_text()))
         heightmap = None if self._shown is None else self._shown.heightmap
@@ -226,9 +232,10 @@ class InspectPage(QWidget):
         self.views.follow_source()
         self.replay.follow(self.live.source)
 
-    def _on_recorded(self, text: str) -> None:
-        self._recorded = text
-        self._show_texts()
+    def _on_recorded(self, text: str, loses: bool) -> None:
+        self._recorded.setText(text)
+        self._recorded.setVisible(bool(text))
+        show_meaning(self._recorded, "fail" if loses else "muted")
 
     def _on_stream(self) -> None:
         self._want()

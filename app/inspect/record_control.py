@@ -27,7 +27,8 @@ class RecordControl(QObject):
     owner : QWidget
         Gets the action.
     report : callable
-        Called with the status of the recording. Empty if there is none.
+        Called with the status of the recording, and whether frames are lost. Empty if there is
+        none.
     context : AppContext
         Holds the library and the messages.
     """
@@ -36,7 +37,7 @@ class RecordControl(QObject):
         self,
         depth: LiveDepth,
         owner: QWidget,
-        report: Callable[[str], object],
+        report: Callable[[str, bool], object],
         *,
         context: AppContext,
     ) -> None:
@@ -44,7 +45,7 @@ class RecordControl(QObject):
         self._report = report
         self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
-        self._warned = False
+        self._warned = self._offered = False
         tip, text = tr("Record every frame without loss"), tr("Record")
         self.action = make_action(
             owner, "inspect.record", text, self.toggle, keys=("R",), icon_name="record", tip=tip
@@ -90,7 +91,7 @@ class RecordControl(QObject):
             return
         self._recorder = Recorder(stream, path, header)
         self._recorder.start()
-        self._warned = False
+        self._warned = self._offered = False
         self.action.setChecked(True)
         self._timer.start()
 
@@ -121,7 +122,8 @@ class RecordControl(QObject):
             return
         if not self.action.isChecked():
             self.action.setText(tr("Writing…"))
-            self._report(tr("Writing: {words}").format(words=recorder_text(figures)))
+            words = tr("Writing: {words}").format(words=recorder_text(figures))
+            self._report(words, figures.lost > 0)
             return
         room = room_for(
             figures,
@@ -132,8 +134,11 @@ class RecordControl(QObject):
             tr("{time}, {left}").format(time=time_text(figures.seconds), left=left_text(room))
         )
         words = tr("Recording: {words}, {left}")
-        self._report(words.format(words=recorder_text(figures), left=left_text(room)))
+        text = words.format(words=recorder_text(figures), left=left_text(room))
+        self._report(text, figures.lost > 0)
         self._heed(room)
+        if figures.lost and not self._offered:
+            self._offer_half(self._recorder, figures)
 
     def _heed(self, room: Room) -> None:
         """Stop when there is no room left, and warn a minute before."""
@@ -150,12 +155,27 @@ class RecordControl(QObject):
                 text = tr("The recording stops in {left}: it reaches its size limit.")
             self._context.toasts.show(text.format(left=time_text(room.left_s)), "warn")
 
+    def _offer_half(self, recorder: Recorder, figures: RecorderFigures) -> None:
+        """Say that frames are lost, and offer half the rate. Once, and again if that is chosen."""
+
+        def halve() -> None:
+            recorder.halve_rate()
+            self._offered = False
+
+        self._offered = True
+        text = tr(
+            "The recording loses frames ({lost} of {n}): this computer or its disk is too slow."
+        )
+        text = text.format(lost=figures.lost, n=figures.frames + figures.lost)
+        action = tr("Record every second frame"), halve
+        self._context.toasts.show(text, "fail", actions=(action,))
+
     def _report_finished(self, recorder: Recorder, figures: RecorderFigures) -> None:
         self._recorder = None
         self._timer.stop()
         self.action.setChecked(False)
         self.action.setText(tr("Record"))
-        self._report("")
+        self._report("", False)
         if figures.failure:
             self._context.toasts.show(figures.failure, "fail")
             return

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from app.context.context import AppContext
 from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details, uses_text
-from app.sensors.tables import SessionsBox, cells_of, library_titles
+from app.sensors.tables import cells_of, library_titles, recordings_box, sessions_box
 from app.sensors.trash_dialog import TrashDialog
 from app.services.file_dialogs import ask_save, ask_several
 from app.services.jobs import Job, Jobs
@@ -67,11 +67,14 @@ class SensorsPage(QWidget):
         self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
         self._table.selectionModel().selectionChanged.connect(self._show_chosen)
         self._table.doubleClicked.connect(lambda _: self.offered["use"].trigger())
-        self._sessions = SessionsBox(context.requests.session.emit)
+        self._sessions = sessions_box(lambda folder: context.requests.session.emit(str(folder)))
+        self._recordings = recordings_box(self._play)
         self._reports = Jobs("report", self)
         self._details = Details((use, report, reveal, remove), self._on_elastomer)
         self._reports.refused.connect(self._details.say)
-        lists = splitter(Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2))
+        lists = splitter(
+            Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2), (self._recordings, 2)
+        )
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
         empty = named(PlainLabel(wrap=True), "sensors.empty", tr("No sensor yet"))
@@ -205,7 +208,11 @@ class SensorsPage(QWidget):
         self._table.show_items(entries)
         sessions = self._library.sessions()
         self._sessions.set_entries(sessions)
-        self._stack.setCurrentIndex(1 if entries or sessions else 0)
+        recordings: tuple[Path, ...] = ()
+        with self._context.toasts.errors():
+            recordings = self._context.workspace.recordings()
+        self._recordings.set_entries(recordings)
+        self._stack.setCurrentIndex(1 if entries or sessions or recordings else 0)
         self.offered["trash"].setEnabled(bool(self._library.removals()))
         if self._trash is not None:
             self._trash.refresh()
@@ -225,6 +232,10 @@ class SensorsPage(QWidget):
         self.offered["report"].setEnabled(good and not self._writing)
         for name in ("reveal", "remove"):
             self.offered[name].setEnabled(entry is not None)
+
+    def _play(self, recording: Path) -> None:
+        self._context.source.choose_recording(recording)
+        self._context.requests.page.emit("inspect")
 
     def _uses(self, entry: Entry | None) -> str:
         """Return how often a calibration was used, or why that is not known."""

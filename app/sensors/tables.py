@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import datetime
+from pathlib import Path
+from typing import Generic, TypeVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
@@ -17,6 +19,8 @@ from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from gelpolight_core.finding import verdict_word
 from gelpolight_core.translation import tr
+
+Item = TypeVar("Item")
 
 
 def library_titles() -> tuple[str, ...]:
@@ -105,45 +109,97 @@ def _in_use(entry: Entry) -> Cell:
     return Cell("", "use", "accent", tr("In use"), key=1) if entry.in_use else Cell("", key=0)
 
 
-class SessionsBox(QWidget):
-    """A table of sessions, and a button to continue the selected one.
+class TableBox(QWidget, Generic[Item]):
+    """A titled table, and a button for the selected row, which a double click presses, too.
 
     Parameters
     ----------
-    on_continue : callable
-        Called with the folder of the session.
+    name : str
+        Object name.
+    title : str
+        Of the table.
+    columns : tuple of str
+        Their titles.
+    cells : callable
+        Returns the cells of an item.
+    path : callable
+        Returns the file or folder of an item, which keeps it selected.
+    button : (str, str, str)
+        Object name, text and tooltip of the button.
+    on_chosen : callable
+        Called with the path of the selected item.
     """
 
-    def __init__(self, on_continue: Callable[[str], object]) -> None:
+    def __init__(
+        self,
+        name: str,
+        title: str,
+        columns: tuple[str, ...],
+        cells: Callable[[Item], tuple[Cell, ...]],
+        path: Callable[[Item], Path],
+        button: tuple[str, str, str],
+        on_chosen: Callable[[Path], object],
+    ) -> None:
         super().__init__()
-        named(self, "sensors.sessions", tr("Sessions"))
-        self._on_continue = on_continue
-        self.table = CellsTable(
-            "sensors.sessions.table",
-            tr("Sessions"),
-            session_titles(),
-            session_cells,
-            lambda session: session.folder,
-        )
+        named(self, name, title)
+        self._path, self._on_chosen = path, on_chosen
+        self.table = CellsTable(f"{name}.table", title, columns, cells, path)
         self.table.sortByColumn(0, Qt.SortOrder.AscendingOrder)
-        self.table.doubleClicked.connect(lambda _: self._continue())
+        self.table.doubleClicked.connect(lambda _: self._choose())
         self.table.selectionModel().selectionChanged.connect(self._enable)
-        tip = tr("Open the selected session with all its images and decisions")
-        self.go_on = make_action(
-            self, "sensors.go_on", tr("&Continue calibration"), self._continue, tip=tip
-        )
-        row = hbox(heading(tr("Sessions")), None, action_button(self.go_on))
+        key, text, tip = button
+        self.action = make_action(self, key, text, self._choose, tip=tip)
+        row = hbox(heading(title), None, action_button(self.action))
         vbox(row, (self.table, 1), of=self, margins=(0, 8, 0, 0))
 
-    def set_entries(self, entries: tuple[SessionEntry, ...]) -> None:
-        """Show these sessions. The selection is kept."""
+    def set_entries(self, entries: tuple[Item, ...]) -> None:
+        """Show these items. The selection is kept."""
         self.table.show_items(entries)
         self._enable()
 
     def _enable(self) -> None:
-        self.go_on.setEnabled(self.table.chosen() is not None)
+        self.action.setEnabled(self.table.chosen() is not None)
 
-    def _continue(self) -> None:
-        session = self.table.chosen()
-        if session is not None:
-            self._on_continue(str(session.folder))
+    def _choose(self) -> None:
+        item = self.table.chosen()
+        if item is not None:
+            self._on_chosen(self._path(item))
+
+
+def sessions_box(on_continue: Callable[[Path], object]) -> TableBox[SessionEntry]:
+    """Return the table of sessions, with a button to continue the selected one."""
+    tip = tr("Open the selected session with all its images and decisions")
+    return TableBox(
+        "sensors.sessions",
+        tr("Sessions"),
+        session_titles(),
+        session_cells,
+        lambda session: session.folder,
+        ("sensors.go_on", tr("&Continue calibration"), tip),
+        on_continue,
+    )
+
+
+def recordings_box(on_play: Callable[[Path], object]) -> TableBox[Path]:
+    """Return the table of recordings, with a button to play the selected one."""
+    return TableBox(
+        "sensors.recordings",
+        tr("Recordings"),
+        (tr("Sensor"), tr("Recording"), tr("Size"), tr("Last changed")),
+        recording_cells,
+        lambda path: path,
+        ("sensors.play", tr("Pla&y"), tr("Use the selected recording as the camera")),
+        on_play,
+    )
+
+
+def recording_cells(path: Path) -> tuple[Cell, ...]:
+    """Return the cells of a recording's row."""
+    stat = path.stat()
+    changed = datetime.fromtimestamp(stat.st_mtime).astimezone()
+    return (
+        Cell(path.parent.parent.name),
+        Cell(path.stem, tip=str(path)),
+        Cell(tr("{mb:.0f} MB").format(mb=1e-6 * stat.st_size), key=stat.st_size),
+        Cell(f"{changed:%Y-%m-%d %H:%M}", key=stat.st_mtime),
+    )

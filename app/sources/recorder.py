@@ -99,7 +99,7 @@ class Recorder:
         self._ending = self._overrun = False
         self._figures = RecorderFigures()
         self._raw_number: int | None = None
-        self._number = -1
+        self._number, self._every = -1, 1
         self._first_s = 0.0
         self._thread: threading.Thread | None = None
 
@@ -126,6 +126,11 @@ class Recorder:
             join(self._thread, 20.0)
         return self.figures()
 
+    def halve_rate(self) -> None:
+        """Keep every second frame of those kept until now; the others do not count as lost."""
+        with self._changed:
+            self._every *= 2
+
     def figures(self) -> RecorderFigures:
         """Return the statistics of the recording."""
         with self._changed:
@@ -140,9 +145,12 @@ class Recorder:
                 step, self._first_s = 1, frame.time_s
                 self._number = frame.number - 1
             else:
+                made = frame.number - self._raw_number
+                if 0 < made < self._every:
+                    return
                 # A reopened source counts from 0 again; how many frames it made meanwhile is not
                 # known.
-                step = max(frame.number - self._raw_number, 1)
+                step = max(made // self._every, 1)
             self._number += step
             self._raw_number = frame.number
             self._note(lost=step - 1, seconds=frame.time_s - self._first_s)

@@ -284,6 +284,30 @@ def test_a_recording_is_made_replayed_and_saved_as_a_movie(
     qtbot.waitUntil(lambda: pressed.views.map_panel.map.shown_images > shown, timeout=WAIT_MS)
 
 
+def test_a_recording_that_loses_frames_says_so_in_red_and_offers_half_the_rate(
+    pressed: InspectPage, context: AppContext, qtbot: QtBot
+) -> None:
+    context.toasts.attach(pressed, lambda: None)
+    pressed.recorder.start()
+    state = pressed.findChild(QLabel, "inspect.recorded")
+    qtbot.waitUntil(state.isVisible, timeout=WAIT_MS)
+    assert state.property("meaning") == "muted"
+    recorder = pressed.recorder._recorder
+    assert recorder is not None
+    with recorder._changed:
+        recorder._note(lost=7)
+    qtbot.waitUntil(lambda: "7 lost" in state.text(), timeout=WAIT_MS)
+    assert state.property("meaning") == "fail"
+    (toast,) = (t for t in context.toasts.shown() if "loses frames" in t.finding.text)
+    (button,) = (b for b in toast.findChildren(QPushButton) if "second frame" in b.text())
+    button.click()
+    assert recorder._every == 2
+    pressed.recorder.stop()
+    qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=WAIT_MS)
+    assert not state.isVisible()
+    context.toasts.clear()
+
+
 def test_zero_uses_the_present_background_and_can_be_undone(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
     qtbot: QtBot,

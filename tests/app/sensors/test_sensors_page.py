@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 import scene
 from PySide6.QtCore import Qt
@@ -35,6 +36,8 @@ from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.remarks import write_validation
 from gelpolight_core.quantity import Quantity
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME
 from gelpolight_core.report.build import calibration_report
@@ -268,6 +271,23 @@ def test_a_session_can_be_continued_before_there_is_a_calibration(
     with qtbot.waitSignal(context.requests.session) as asked:
         button.click()
     assert asked.args == [str(folder)]
+
+
+def test_recordings_are_listed_and_played(
+    page: SensorsPage, context: AppContext, qtbot: QtBot
+) -> None:
+    path = context.workspace.recording_path("S-1")
+    with RecordingWriter(path, RecordingHeader(serial="S-1")) as writer:
+        writer.append(np.zeros((24, 32, 3), np.uint8), 0, 1.0)
+    page.enter()
+    table = page.findChild(QTableView, "sensors.recordings.table")
+    row = [table.model().index(0, column).data() for column in range(2)]
+    assert row == ["S-1", path.stem]
+    table.selectRow(0)
+    with qtbot.waitSignal(context.requests.page) as asked:
+        page.findChild(QPushButton, "sensors.play.button").click()
+    assert asked.args == ["inspect"]
+    assert context.source.info is not None and context.source.info.kind == "recording"
 
 
 def test_a_report_is_written_in_the_background(

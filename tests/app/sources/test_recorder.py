@@ -114,6 +114,24 @@ def test_a_slow_disk_loses_frames_and_reports_how_many(
         assert (len(recording), recording.lost) == (LEAST_QUEUE, 20 - LEAST_QUEUE)
 
 
+def test_half_the_rate_keeps_every_second_frame_and_loses_none(
+    stream: HandedOn, tmp_path: Path
+) -> None:
+    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
+    recorder.start()
+    for number in range(4):
+        stream.hand_on(number)
+    recorder.halve_rate()
+    for number in (*range(4, 10), *range(14, 16)):  # of 11 and 13, 14 replaces one
+        stream.hand_on(number)
+    figures = recorder.stop()
+    assert (figures.frames, figures.lost) == (8, 1)
+    with Recording.open(recorder.path) as recording:
+        assert recording.lost == 1
+        times = [recording.frame(k).time_s for k in range(len(recording))]
+    assert times == pytest.approx([50.0, 50.1, 50.2, 50.3, 50.5, 50.7, 50.9, 51.4])
+
+
 def test_a_reopened_source_continues_in_the_same_recording(
     stream: HandedOn, tmp_path: Path
 ) -> None:
