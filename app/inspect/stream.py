@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,6 +26,8 @@ from gelpolight_core.export.live_message import pack
 from gelpolight_core.fields import choice, number
 from gelpolight_core.translation import tr
 
+_LOG = logging.getLogger(__name__)
+
 HOST, PORT = "127.0.0.1", 5557
 ANY_HOST = "0.0.0.0"
 """All networks of this computer."""
@@ -34,8 +37,10 @@ REACH = {
 }
 WAITING = 1
 """Messages that wait for a slow receiver. It loses the ones after them; the others lose none."""
-MOST_RECEIVED = 4096
+MOST_RECEIVED = 512
 """Bytes of one message from a receiver: subscriptions to a topic, and the protocol's own."""
+MOST_SUBSCRIPTIONS = 100
+"""To different topics; only one is sent. Each byte of a topic takes about 50 bytes of memory."""
 
 
 class DepthStream(QObject):
@@ -138,9 +143,12 @@ class DepthStream(QObject):
         used = self._depth.live_reconstructor
         serial = "" if used is None else used.calibration.serial
         parts = pack(heightmap, frame=frame.number, time_s=frame.time_s, serial=serial)
-        self._publisher.send(parts)
-        self._sent = frame.number
-        self.count += 1
+        with self._context.toasts.errors():
+            self._publisher.send(parts)
+            self._sent = frame.number
+            self.count += 1
+            return
+        self.stop()
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,24 +247,46 @@ class Publisher:
                 tr("Use 127.0.0.1, or allow the network explicitly"),
             )
         self._zmq = _library()
+        self._open(f"{host}:{port or '*'}")
+
+    def _open(self, place: str) -> None:
+        """Open the socket, which tells what receivers subscribe to."""
+        self._subscriptions = 0
         self._context = self._zmq.Context()
-        self._socket = self._context.socket(self._zmq.PUB)
+        self._socket = self._context.socket(self._zmq.XPUB)
         self._socket.setsockopt(self._zmq.LINGER, 0)
         self._socket.setsockopt(self._zmq.SNDHWM, WAITING)
+        self._socket.setsockopt(self._zmq.RCVHWM, WAITING)
         self._socket.setsockopt(self._zmq.MAXMSGSIZE, MOST_RECEIVED)
         try:
-            self._socket.bind(f"tcp://{host}:{port or '*'}")
+            self._socket.bind(f"tcp://{place}")
         except self._zmq.ZMQError as error:
             self.close()
             raise InputError(
                 tr("the address cannot be used ({reason})").format(reason=error.strerror),
-                f"{host}:{port}",
+                place,
                 Remedy.CLOSE_PROGRAM,
             ) from error
         self.address: str = self._socket.getsockopt_string(self._zmq.LAST_ENDPOINT)
 
     def send(self, parts: Sequence[bytes]) -> None:
-        """Send a message to all receivers. It never waits for them."""
+        """Send a message to all receivers. It never waits for them.
+
+        Each subscription takes memory. When there are too many the socket is opened again, and
+        receivers connect and subscribe again by themselves.
+
+        Raises
+        ------
+        InputError
+            If another program has taken the address meanwhile.
+        """
+        while self._socket.poll(0):
+            self._socket.recv()
+            self._subscriptions += 1
+            if self._subscriptions > MOST_SUBSCRIPTIONS:
+                _LOG.warning("There are too many subscriptions; all receivers were disconnected")
+                self.close()
+                self._open(self.address.removeprefix("tcp://"))
         self._socket.send_multipart(parts, flags=self._zmq.NOBLOCK)
 
     def close(self) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import pytest
+from fake_camera import eventually
 
 from app.inspect.stream import Publisher
 
@@ -75,13 +77,47 @@ def test_a_slow_receiver_works_on_new_frames(publisher: Publisher) -> None:
         context.term()
 
 
-def test_a_receiver_cannot_fill_the_memory_of_the_program(publisher: Publisher) -> None:
-    """A peer that speaks the protocol (ZMTP 3.0) declares a subscription of 1.5 GB."""
+@pytest.fixture
+def peer(publisher: Publisher) -> Iterator[socket.socket]:
+    """Return a connection that speaks the protocol (ZMTP 3.0) as a subscriber."""
     port = int(publisher.address.rpartition(":")[2])
     greeting = b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32)
     ready = b"\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB"
-    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as peer:
-        peer.sendall(greeting + b"\x04" + bytes([len(ready)]) + ready)
-        peer.sendall(b"\x02" + (1_500_000_000).to_bytes(8, "big") + b"\x01depth")
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as made:
+        made.sendall(greeting + b"\x04" + bytes([len(ready)]) + ready)
+        yield made
+
+
+def _disconnected(peer: socket.socket) -> None:
+    """Read until the publisher closes the connection: otherwise this ends with a time-out."""
+    with suppress(ConnectionError):
         while peer.recv(4096):
-            pass  # the publisher closes the connection: otherwise this ends with a time-out
+            pass
+
+
+def test_a_large_subscription_cannot_fill_the_memory_of_the_program(peer: socket.socket) -> None:
+    peer.sendall(b"\x02" + (1_500_000_000).to_bytes(8, "big") + b"\x01depth")
+    _disconnected(peer)
+
+
+def test_many_subscriptions_cannot_fill_the_memory_of_the_program(
+    publisher: Publisher, subscriber: Any, peer: socket.socket
+) -> None:
+    """The socket keeps every topic. All are disconnected, and a usual receiver connects again."""
+    _received(publisher, subscriber, [b"depth", b"first"])
+    address, before = publisher.address, publisher._context
+    with suppress(ConnectionError):
+        for number in range(1000):
+            topic = b"\x01" + number.to_bytes(200, "little")
+            peer.sendall(b"\x00" + bytes([len(topic)]) + topic)
+
+    def opened_again() -> bool:
+        publisher.send([b"depth", b"again"])
+        return publisher._context is not before
+
+    eventually(opened_again)
+    while subscriber.poll(0):
+        subscriber.recv_multipart()
+    assert _received(publisher, subscriber, [b"depth", b"again"]) == [b"depth", b"again"]
+    assert publisher.address == address
+    _disconnected(peer)
