@@ -16,7 +16,7 @@ from app.calibrate.step import Step, no_camera
 from app.live.image_checks import Rgb
 from app.live.live_detection import Detection, Seen
 from app.live.overlay import Overlay, hold_ring
-from app.services.file_dialogs import ask_several
+from app.services.file_dialogs import ask_several, image_patterns
 from app.services.jobs import Job
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
@@ -281,7 +281,7 @@ class ImageStep(Step):
 
     def choose_files(self) -> None:
         """Let the user choose image files to import."""
-        title, patterns = tr("Import images"), tr("Images (*.png *.tif *.tiff)")
+        title, patterns = tr("Import images"), image_patterns()
         if files := ask_several(self.area, self.context.settings, "images", title, patterns):
             self.import_files(files)
 

@@ -18,7 +18,7 @@ from app.calibrate.page_state import Remedy, StepState
 from app.calibrate.result import ask_report
 from app.calibrate.step import Step
 from app.context.calibration_status import put_into_use
-from app.services.file_dialogs import ask_open
+from app.services.file_dialogs import ask_open, image_patterns
 from app.services.jobs import Job
 from app.sources.bench import Scene
 from app.widgets.buttons import push_button
@@ -152,7 +152,8 @@ class ValidationStep(Step):
 
     def build(self) -> None:
         """Create the form of the pressed object and the button that records."""
-        self.form = Form(Truth(size_mm=5.0), "validation", at_once=True, only=ASKED)
+        known = Truth(size_mm=5.0)
+        self.form = Form(known, "validation", at_once=True, only=ASKED, narrow=True)
         self.calibration = named(
             PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
         )
@@ -279,7 +280,7 @@ class ValidationStep(Step):
         presses, settings = self.session.folder / "presses", self.context.settings
         if presses.is_dir():
             settings.keep_folder("press", presses)
-        title, patterns = tr("Import an image of a press"), tr("Images (*.png *.tif *.tiff)")
+        title, patterns = tr("Import an image of a press"), image_patterns()
         path = ask_open(self.area, settings, "press", title, patterns)
         if path is not None:
             self.import_press(path)

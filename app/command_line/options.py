@@ -14,7 +14,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.translation import tr
 
-KEPT = (".png", ".tif", ".tiff", ".toml")
+KEPT = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".webp", ".toml")
 """Files of a folder that no result may overwrite: images, and what is stated about them."""
 
 

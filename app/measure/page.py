@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.context.context import AppContext
 from app.measure.indenters_dialog import IndentersDialog
-from app.measure.press_view import IMAGES, PressView
+from app.measure.press_view import PressView
 from app.measure.protocol_view import ProtocolView
 from app.measure.record_book import RecordBook
 from app.measure.record_table import quantity_text, shape_label
@@ -20,6 +20,7 @@ from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.workspace.indenters import FILE as INDENTERS
 from app.workspace.indenters import read_indenters, write_indenters
+from gelpolight_core.image.file import SUFFIXES
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.reference import Truth
@@ -133,13 +134,13 @@ class MeasurePage(QWidget):
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept images and recordings. The window handles everything else."""
         paths = dropped_paths(event.mimeData())
-        if any(path.suffix.lower() in (*IMAGES, RECORDING) for path in paths):
+        if any(path.suffix.lower() in (*SUFFIXES, RECORDING) for path in paths):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
         """Open the first of them."""
         paths = dropped_paths(event.mimeData())
-        wanted = [path for path in paths if path.suffix.lower() in (*IMAGES, RECORDING)]
+        wanted = [path for path in paths if path.suffix.lower() in (*SUFFIXES, RECORDING)]
         self.tabs.setCurrentWidget(self.press_view)
         self.press_view.try_file(wanted[0])
         event.acceptProposedAction()

@@ -38,6 +38,7 @@ from app.widgets.buttons import Slot
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image.file import SUFFIXES
 from gelpolight_core.measurement.measured_press import MeasuredPress
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -47,7 +48,6 @@ from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.translation import tr
 
-IMAGES = (".png", ".tif", ".tiff")
 TOOLS_WIDTH = 148
 QUANTITIES = {"depth": tr("Depth"), "residual": tr("Residual of the fitted object")}
 """What colours the surface in 3D."""
@@ -220,7 +220,7 @@ class PressView(QWidget):
             self.context.source.choose_recording(path)
             self.release()
             return
-        if path.suffix.lower() not in IMAGES:
+        if path.suffix.lower() not in SUFFIXES:
             raise InputError(
                 tr("The file is neither an image nor a recording"), path, Remedy.CHOOSE_IMAGES
             )
@@ -229,7 +229,7 @@ class PressView(QWidget):
 
     def choose_file(self) -> None:
         """Let the user choose an image or a recording."""
-        endings = " ".join(f"*{ending}" for ending in (*IMAGES, RECORDING))
+        endings = " ".join(f"*{ending}" for ending in (*SUFFIXES, RECORDING))
         chosen = ask_open(
             self,
             self.context.settings,

@@ -7,6 +7,15 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.services.settings import Settings
+from gelpolight_core.translation import tr
+
+
+def image_patterns() -> str:
+    """Return the names of image files, as in Qt."""
+    from gelpolight_core.image.file import SUFFIXES
+
+    endings = " ".join(f"*{end}" for end in SUFFIXES)
+    return tr("Images ({endings})").format(endings=endings)
 
 
 def ask_open(

@@ -44,6 +44,8 @@ class Form(QWidget, Generic[V]):
         Whether a number counts while it is typed.
     only : tuple of str, optional
         The fields that are shown, if not all.
+    narrow : bool, optional
+        Whether each field has a row of its own, also one that could stand beside another.
 
     Attributes
     ----------
@@ -63,7 +65,13 @@ class Form(QWidget, Generic[V]):
     changed = Signal(str, object)
 
     def __init__(
-        self, value: V, name: str, *, at_once: bool = False, only: tuple[str, ...] = ()
+        self,
+        value: V,
+        name: str,
+        *,
+        at_once: bool = False,
+        only: tuple[str, ...] = (),
+        narrow: bool = False,
     ) -> None:
         super().__init__()
         self._at_once = at_once
@@ -79,7 +87,7 @@ class Form(QWidget, Generic[V]):
                 made, meta = self._input(f), f.metadata
                 words = (meta["label"] or meta["text"]).replace("&", "")
                 named(made, f"{name}.{f.name}", words, meta["tip"], meta.get("key", ""))
-                if meta.get("beside"):
+                if meta.get("beside") and not narrow:
                     self._put_beside(list(self.inputs)[-1], meta["beside"], made)
                 else:
                     self.rows.addRow(meta["label"], made)
