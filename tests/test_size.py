@@ -101,7 +101,7 @@ MOST = {
     "tests/response": 134,
     "tests/session": 479,
     "tests/simulation": 694,
-    "tests/strangers": 1028,
+    "tests/strangers": 1031,
     "tests/studies": 1506,
 }
 

@@ -84,7 +84,7 @@ def drawing(
                 figure = Figure(figsize=size_inch, layout="constrained")
                 FigureCanvasSVG(figure)
                 caption, stream = paint(figure, *arguments, **named), io.StringIO()
-                if layout := figure.get_layout_engine():
+                if figure.axes and (layout := figure.get_layout_engine()):
                     layout.execute(figure)
                     figure.set_layout_engine(None)  # which savefig would draw everything for
                 figure.savefig(stream, format="svg", metadata={"Date": None})

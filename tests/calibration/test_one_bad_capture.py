@@ -30,7 +30,7 @@ def spoil(folder: Path, usual: tuple[int, int]) -> dict[str, str]:
     (folder / "zz_damaged.png").write_bytes(b"not an image")
     write_noise(folder / "zz_small.png", (usual[0] // 2, usual[1] // 2))
     write_noise(folder / "zz_nothing.png", usual)
-    return {"zz_damaged.png": "not a complete PNG", "zz_small.png": "pixels", "zz_nothing.png": ""}
+    return {"zz_damaged.png": "not an image", "zz_small.png": "pixels", "zz_nothing.png": ""}
 
 
 @pytest.mark.parametrize("stage", SEVERAL)

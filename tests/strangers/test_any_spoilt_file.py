@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 NAMES = (
-    "calibration", "recording", "PNG image", "TIFF image", "records", "true depth", "height map",
+    "calibration", "recording", "PNG image", "TIFF image", "jpg image", "bmp image",
+    "webp image", "records", "true depth", "height map",
     "label", "session",
     "decisions", "design", "protocol", "truth", "ledger", "tools", "indenters", "validation",
     "workspace", "catalog", "annotations", "settings",

@@ -118,7 +118,7 @@ def _measured(change: Change, scale: float = SCALE) -> Seen:
         change(folder)
         run = calibrate(read_session(folder))
         image = next((folder / "presses").glob("*.png"))
-        frame, _ = read_raw_image(image)
+        frame = read_raw_image(image).rgb
     tables = run.calibration.quality.values()
     warning = "; ".join(advice for table in tables for advice in table.remedies)
     modes, texts = [], []

@@ -127,7 +127,7 @@ def wrong_files(session: Path, folder: Path) -> dict[str, Path]:
 @pytest.mark.parametrize(
     ("kind", "expected_text"),
     [("grey", "grey"), ("size", "160x120"), ("copy", "already"), ("torn", "complete"),
-     ("text", "complete")],
+     ("text", "not an image")],
 )  # fmt: skip
 def test_an_invalid_file_is_not_imported(
     technician: Technician, computed_project: Made, tmp_path: Path, kind: str, expected_text: str
