@@ -14,9 +14,6 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.translation import tr
 
-KEPT = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".webp", ".toml")
-"""Files of a folder that no result may overwrite: images, and what is stated about them."""
-
 
 def place(metavar: str, help: str = "") -> Any:
     """Return a field that is known by its place among the arguments."""
@@ -121,10 +118,14 @@ def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:
 
     An input that is a folder stands for its images and descriptions.
     """
+    from gelpolight_core.image.file import SUFFIXES
+
     used = {path.resolve() for path in inputs}
     for path in results:
         target = path.resolve()
-        inside = target.suffix.lower() in KEPT and target.exists() and used & {*target.parents}
+        # Of a folder, images and what is stated about them are not overwritten.
+        kept = target.suffix.lower() in (*SUFFIXES, ".toml")
+        inside = kept and target.exists() and used & {*target.parents}
         if target in used or inside:
             raise InputError(
                 tr("The result would overwrite a file that is used here"), path, Remedy.CHOOSE_NAME

@@ -45,7 +45,7 @@ class Form(QWidget, Generic[V]):
     only : tuple of str, optional
         The fields that are shown, if not all.
     narrow : bool, optional
-        Whether each field has a row of its own, also one that could stand beside another.
+        Whether every field gets its own row.
 
     Attributes
     ----------

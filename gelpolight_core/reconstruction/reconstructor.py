@@ -332,7 +332,7 @@ class Reconstructor:
         return replace(health, findings=(*health.findings, *self._compressed(loss)))
 
     def _compressed(self, loss: float) -> tuple[Finding, ...]:
-        """Return what is said of a loss beyond the noise and that of the calibration's images."""
+        """Return a finding if compression errs by more than noise and calibration images do."""
         usual = max(self.calibration.loss, 255.0 * float(self.calibration.data.noise.max()))
         if loss <= usual:
             return ()
