@@ -34,12 +34,16 @@ membrane."""
 _single = np.float32
 _0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
 _PER_PI = _single(1.0 / pi)
-_LEAST_VIEW = _single(LEAST_VIEW)
+_LEAST_VIEW, _LEAST_COSINE = _single(LEAST_VIEW), _single(LEAST_COSINE)
+_LEAST_FACING = _single(0.1)
+_NO_LIGHT = _single(1e-9)
 _TINY = _single(1e-6)
-_POINT, _NORMAL, _AREA, _LIGHT = 0, 3, 6, 7
-_PLANES = 25
-_DOWN = (_POINT + 2, _NORMAL + 2, _LIGHT + 2, _LIGHT + 8, _LIGHT + 14)
+_POINT, _NORMAL, _AREA, _LIGHT, _PER_LED = 0, 3, 6, 7, 6
+_PLANES = _LIGHT + 3 * _PER_LED
+_DOWN = (_POINT + 2, _NORMAL + 2, *(_LIGHT + _PER_LED * k + 2 for k in range(3)))
 """Planes of z components, which have the opposite sign in a mirror image."""
+_TILE = WIDE**2
+"""Facets of a larger facet. They lie side by side, so that one instruction handles all of them."""
 
 _part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
 _whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
@@ -123,10 +127,14 @@ def ratio_reflected(ratio: NDArray[np.floating], known: NDArray[np.bool_], refle
     return np.asarray(np.where(known, np.maximum(ratio, 0.0), 1.0) * reflecting[..., None])
 
 
-def facets(
-    surface: Surface, leds_mm: NDArray[np.float64], membrane: Membrane, side_mm: float
+def _facets(
+    surface: Surface,
+    leds_mm: NDArray[np.float64],
+    membrane: Membrane,
+    side_mm: float,
+    rows: tuple[int, int] | None = None,
 ) -> Map:
-    """Return the light that facets emit, (planes, rows, columns), for :func:`gather_rows`.
+    """Return the light that facets emit, (tile rows, tile columns, planes, facets of a tile).
 
     Parameters
     ----------
@@ -138,35 +146,16 @@ def facets(
         Its glossy lobe.
     side_mm : float
         Distance between facets, along the flat membrane.
+    rows : (int, int), optional
+        Tiles that are needed, first and last + 1; the others emit nothing.
     """
-    points, normals, view, seen = (np.asarray(part, np.float32) for part in surface)
-    made = np.empty((_PLANES, *seen.shape[:2]), np.float32)
-    made[_POINT : _POINT + 3] = np.moveaxis(points, -1, 0)
-    made[_NORMAL : _NORMAL + 3] = np.moveaxis(normals, -1, 0)
-    # Along its ray, a facet covers the same part of the flat membrane for any tilt.
-    facing = np.maximum(np.einsum("ijc,ijc->ij", view, normals), 0.1)
-    made[_AREA] = side_mm**2 * -view[..., 2] / facing
-    a2 = membrane.roughness**2
-    s = np.maximum(facing, LEAST_VIEW)
-    for k in range(3):
-        to_led = np.asarray(leds_mm[k], np.float32) - points
-        distance = np.sqrt(np.einsum("ijc,ijc->ij", to_led, to_led))
-        light = to_led / distance[..., None]
-        c = np.maximum(np.einsum("ijc,ijc->ij", light, normals), 0.0)
-        half = 2.0 + 2.0 * np.einsum("ijc,ijc->ij", light, view)
-        t2 = (c + s) ** 2 / np.maximum(half, _TINY)
-        width = 1.0 / (1.0 - np.minimum(t2, 1.0) * (1.0 - a2))
-        power = membrane.gloss * a2 / pi * c / (c + np.sqrt(a2 + (1.0 - a2) * c * c) + _TINY)
-        to_camera = power * width**2 / (s + np.sqrt(a2 + (1.0 - a2) * s * s))
-        expected = (1.0 - membrane.gloss) / pi * np.maximum(c, LEAST_COSINE) + to_camera
-        # Share of the expected light: less is shadow, more does not come from the LED.
-        strength = -to_led[..., 2] / distance**3
-        lit = np.clip(seen[..., k] / np.maximum(expected * strength, 1e-9), 0.0, 1.0) * strength
-        at = _LIGHT + 6 * k
-        made[at : at + 3] = np.moveaxis(light, -1, 0)
-        made[at + 3] = c
-        made[at + 4] = power * lit
-        made[at + 5] = np.maximum(seen[..., k] - to_camera * lit, 0.0)
+    parts = [np.ascontiguousarray(part, np.float32) for part in surface]
+    tiles = [-(-n // WIDE) for n in parts[0].shape[:2]]
+    made = np.zeros((*tiles, _PLANES, _TILE), np.float32)
+    first, last = rows or (0, tiles[0])
+    lobe = _single(membrane.gloss), _single(membrane.roughness**2)
+    leds = np.asarray(leds_mm, np.float32)
+    emit_rows(max(first, 0), min(last, tiles[0]), *parts, leds, lobe, _single(side_mm**2), made)
     return made
 
 
@@ -202,14 +191,18 @@ def gathered(
         Calls a compiled function for parts of the points, like `RowWorkers.run`; by default one
         thread.
     """
-    near = facets(surface, leds_mm, membrane, side_mm)
-    wide = widened(surface)
-    middle = facets(wide, leds_mm, membrane, WIDE * side_mm)
-    far = facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
     points = np.concatenate(at, axis=-1).astype(np.float32)
     result = np.empty((len(points), 3), np.float32)
+    if not len(points):
+        return result
+    wide = widened(surface)
+    own = np.asarray(at.place[:, 0]) // WIDE
+    rows = int(own.min()) - NEAR, int(own.max()) + NEAR + 1
+    near = _facets(surface, leds_mm, membrane, side_mm, rows)
+    middle = _facets(wide, leds_mm, membrane, WIDE * side_mm)
+    far = _facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
-    mirrored, index2 = far, _0
+    mirrored, index2 = far, None
     if slab is not None:
         mirrored, index2 = _mirrored(far, slab.thickness_mm), _single(slab.refractive_index**2)
     fields = (near, middle, far, mirrored)
@@ -223,8 +216,8 @@ def gathered(
 def _mirrored(sent: Map, depth_mm: float) -> Map:
     """Return the mirror images of facets in a face at a distance below the membrane."""
     image = sent.copy()
-    image[list(_DOWN)] *= -1.0
-    image[_POINT + 2] -= _single(2.0 * depth_mm)
+    image[..., list(_DOWN), :] *= -1.0
+    image[..., _POINT + 2, :] -= _single(2.0 * depth_mm)
     return image
 
 
@@ -302,72 +295,120 @@ def _means(values: NDArray[np.floating]) -> Map:
     return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA))
 
 
+@_whole
+def emit_rows(first, last, points, normals, view, seen, leds, gloss, area, made):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Find the light that facets emit, for the rows of tiles `first` to `last`.
+
+    Parameters
+    ----------
+    points, normals, view, seen : (rows, columns, 3) float32
+        As in :class:`Surface`.
+    leds : (3, 3) float32
+        Sensor frame.
+    gloss : (float, float)
+        Share and squared roughness of the lobe.
+    area : float
+        Of the flat membrane, for each facet.
+    made : (tile rows, tile columns, planes, facets of a tile) float32
+        Written: point, normal, area; for each LED its direction, the cosine to it, and the light
+        that goes into the lobe and into the other directions.
+    """
+    share, a2 = gloss
+    for i in range(first * WIDE, min(last * WIDE, points.shape[0])):
+        for j in range(points.shape[1]):
+            to, m = made[i // WIDE, j // WIDE], i % WIDE * WIDE + j % WIDE
+            p, n, v = points[i, j], normals[i, j], view[i, j]
+            for k in range(3):
+                to[_POINT + k, m], to[_NORMAL + k, m] = p[k], n[k]
+            s = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+            # Along its ray, a facet covers the same part of the flat membrane for any tilt.
+            to[_AREA, m] = area * -v[2] / max(s, _LEAST_FACING)
+            s = max(s, _LEAST_VIEW)
+            for k in range(3):
+                x, y, z = leds[k, 0] - p[0], leds[k, 1] - p[1], leds[k, 2] - p[2]
+                short = _1 / sqrt(x * x + y * y + z * z)
+                x, y, z, strength = x * short, y * short, z * short, -z * short * short * short
+                c = max(x * n[0] + y * n[1] + z * n[2], _0)
+                root = sqrt(a2 + (_1 - a2) * c * c) + _TINY
+                power = share * a2 * _PER_PI * c / (c + root)
+                to_camera = power * _lobe(c, s, x * v[0] + y * v[1] + z * v[2], a2)
+                expected = (_1 - share) * _PER_PI * max(c, _LEAST_COSINE) + to_camera
+                # Share of the expected light: less is shadow, more does not come from the LED.
+                lit = min(max(seen[i, j, k] / max(expected * strength, _NO_LIGHT), _0), _1)
+                at = _LIGHT + _PER_LED * k
+                to[at, m], to[at + 1, m], to[at + 2, m], to[at + 3, m] = x, y, z, c
+                to[at + 4, m] = power * lit * strength
+                to[at + 5, m] = max(seen[i, j, k] - to_camera * lit * strength, _0)
+
+
 @_part
 def _lobe(c, s, between, a2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return D / (s + root) of the lobe between two directions, from their cosines."""
     b2 = _1 - a2
-    t2 = (c + s) * (c + s) / (_single(2.0) + between + between + _TINY)
-    t2 = t2 if t2 < _1 else _1
-    width = _1 / (_1 - t2 * b2)
+    half = _single(2.0) + between + between + _TINY
+    both = (c + s) * (c + s)
+    width = half / (half - (both if both < half else half) * b2)
     return width * width / (s + sqrt(a2 + b2 * s * s))
 
 
 @_part
-def _gather(sent, i, left, right, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the light of a row of facets via a point to the camera."""
+def _gather(sent, row, column, hole, p, n, v, s, gloss, index2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the light of a tile via a point to the camera, without the facets around a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
-    for j in range(left, right):
-        dx, dy, dz = sent[0, i, j] - p[0], sent[1, i, j] - p[1], sent[2, i, j] - p[2]
-        r2 = dx * dx + dy * dy + dz * dz + _TINY
-        short = _1 / sqrt(r2)
+    tile = sent[row, column]
+    for j in range(_TILE):
+        dx, dy, dz = tile[0, j] - p[0], tile[1, j] - p[1], tile[2, j] - p[2]
+        short = _1 / sqrt(dx * dx + dy * dy + dz * dz + _TINY)
         ux, uy, uz = dx * short, dy * short, dz * short
         c = ux * n[0] + uy * n[1] + uz * n[2]
-        out = -(ux * sent[3, i, j] + uy * sent[4, i, j] + uz * sent[5, i, j])
+        out = -(ux * tile[3, j] + uy * tile[4, j] + uz * tile[5, j])
         c, out = (c if c > _0 else _0), (out if out > _0 else _0)
-        part = c * out * sent[6, i, j] * short * short
+        part = c * out * tile[6, j] * short * short * _PER_PI
+        if hole is not None:
+            up, along = row * WIDE + j // WIDE - hole[0], column * WIDE + j % WIDE - hole[1]
+            beside = -NEAR <= up <= NEAR and -NEAR <= along <= NEAR
+            part = _0 if beside else part
+        if index2 is not None:
+            part = part * _returned_share(-uz, index2)
         if gloss is None:
-            part = part * _PER_PI
-            r_sum += part * sent[12, i, j]
-            g_sum += part * sent[18, i, j]
-            b_sum += part * sent[24, i, j]
+            r_sum += part * tile[12, j]
+            g_sum += part * tile[18, j]
+            b_sum += part * tile[24, j]
         else:
             share, a2 = gloss
             b2 = _1 - a2
             between = ux * v[0] + uy * v[1] + uz * v[2]
             lobe = share * a2 * _lobe(c, s, between, a2) / (c + sqrt(a2 + b2 * c * c))
-            part = part * _PER_PI * (_1 - share + lobe)
-            between = -(ux * sent[7, i, j] + uy * sent[8, i, j] + uz * sent[9, i, j])
-            lobe = _lobe(sent[10, i, j], out, between, a2)
-            r_sum += part * (sent[12, i, j] + sent[11, i, j] * lobe)
-            between = -(ux * sent[13, i, j] + uy * sent[14, i, j] + uz * sent[15, i, j])
-            lobe = _lobe(sent[16, i, j], out, between, a2)
-            g_sum += part * (sent[18, i, j] + sent[17, i, j] * lobe)
-            between = -(ux * sent[19, i, j] + uy * sent[20, i, j] + uz * sent[21, i, j])
-            lobe = _lobe(sent[22, i, j], out, between, a2)
-            b_sum += part * (sent[24, i, j] + sent[23, i, j] * lobe)
+            part = part * (_1 - share + lobe)
+            between = -(ux * tile[7, j] + uy * tile[8, j] + uz * tile[9, j])
+            r_sum += part * (tile[12, j] + tile[11, j] * _lobe(tile[10, j], out, between, a2))
+            between = -(ux * tile[13, j] + uy * tile[14, j] + uz * tile[15, j])
+            g_sum += part * (tile[18, j] + tile[17, j] * _lobe(tile[16, j], out, between, a2))
+            between = -(ux * tile[19, j] + uy * tile[20, j] + uz * tile[21, j])
+            b_sum += part * (tile[24, j] + tile[23, j] * _lobe(tile[22, j], out, between, a2))
     return r_sum, g_sum, b_sum
 
 
 @_part
-def _around(sent, window, hole, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the light of a window of facets (top, bottom, left, right) without a hole."""
+def _around(sent, place, hole, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the light of the tile at a place and of those around it, without a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
-    for i in range(max(window[0], 0), min(window[1], sent.shape[1])):
-        left, right = max(window[2], 0), min(window[3], sent.shape[2])
-        beside = hole[0] <= i < hole[1]
-        end = min(max(hole[2], left), right) if beside else right
-        r, g, b = _gather(sent, i, left, end, p, n, v, s, gloss)
-        r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
-        if beside:
-            r, g, b = _gather(sent, i, max(hole[3], left), right, p, n, v, s, gloss)
+    for i in range(max(place[0] - NEAR, 0), min(place[0] + NEAR + 1, sent.shape[0])):
+        for j in range(max(place[1] - NEAR, 0), min(place[1] + NEAR + 1, sent.shape[1])):
+            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, None)
             r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
     return r_sum, g_sum, b_sum
 
 
 @_part
-def _window(row, column):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the larger facets next to a point's own: top, bottom, left, right."""
-    return row - NEAR, row + NEAR + 1, column - NEAR, column + NEAR + 1
+def _everywhere(sent, hole, p, n, v, s, gloss, index2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the light of all tiles, without a hole."""
+    r_sum, g_sum, b_sum = _0, _0, _0
+    for i in range(sent.shape[0]):
+        for j in range(sent.shape[1]):
+            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, index2)
+            r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
+    return r_sum, g_sum, b_sum
 
 
 @_part
@@ -381,19 +422,6 @@ def _returned_share(up, index2):  # type: ignore[no-untyped-def]  # pragma: no c
     return _HALF * (across * across + along * along)
 
 
-@_part
-def _returned(sent, index2, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the light that a point receives from the mirror images of the facets."""
-    r_sum, g_sum, b_sum = _0, _0, _0
-    for i in range(sent.shape[1]):
-        for j in range(sent.shape[2]):
-            dx, dy, dz = sent[0, i, j] - p[0], sent[1, i, j] - p[1], sent[2, i, j] - p[2]
-            share = _returned_share(-dz / sqrt(dx * dx + dy * dy + dz * dz), index2)
-            r, g, b = _gather(sent, i, j, j + 1, p, n, v, s, gloss)
-            r_sum, g_sum, b_sum = r_sum + share * r, g_sum + share * g, b_sum + share * b
-    return r_sum, g_sum, b_sum
-
-
 @_whole
 def gather_rows(first, last, at, fields, gloss, index2, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Gather the light of the points `first` to `last`.
@@ -402,33 +430,30 @@ def gather_rows(first, last, at, fields, gloss, index2, result):  # type: ignore
     ----------
     at : (points, 11) float32
         Point, normal, view, and its row and column among the facets of the field.
-    fields : 4 of (planes, rows, columns) float32
-        Facets, wide and widest facets of the whole field, from :func:`facets`, and the widest
+    fields : 4 of (tile rows, tile columns, planes, facets of a tile) float32
+        Facets, wide and widest facets of the whole field, from :func:`emit_rows`, and the widest
         ones' mirror images in the lower face.
     gloss : (float, float) or None
         Share and squared roughness of the lobe.
-    index2 : float
-        Square of the elastomer's refractive index; 0 where no face returns light.
+    index2 : float or None
+        Square of the elastomer's refractive index; None where no face returns light.
     result : (points, 3) float32
         Written: light to the camera, in the facets' unit.
     """
     near, middle, far, mirrored = fields
-    everywhere = (0, far.shape[1], 0, far.shape[2])
     for m in range(first, last):
         p, n = (at[m, 0], at[m, 1], at[m, 2]), (at[m, 3], at[m, 4], at[m, 5])
         v = (at[m, 6], at[m, 7], at[m, 8])
         s = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
         s = s if s > _LEAST_VIEW else _LEAST_VIEW
         row, column = int(at[m, 9]), int(at[m, 10])
-        a = _window(row // WIDE, column // WIDE)
-        b = _window(row // WIDE**2, column // WIDE**2)
-        own = (a[0] * WIDE, a[1] * WIDE, a[2] * WIDE, a[3] * WIDE)
-        mid = (b[0] * WIDE, b[1] * WIDE, b[2] * WIDE, b[3] * WIDE)
-        r0, g0, b0 = _around(near, own, (0, 0, 0, 0), p, n, v, s, gloss)
-        r1, g1, b1 = _around(middle, mid, a, p, n, v, s, gloss)
-        r2, g2, b2 = _around(far, everywhere, b, p, n, v, s, gloss)
+        a = row // WIDE, column // WIDE
+        b = row // WIDE**2, column // WIDE**2
+        r0, g0, b0 = _around(near, a, None, p, n, v, s, gloss)
+        r1, g1, b1 = _around(middle, b, a, p, n, v, s, gloss)
+        r2, g2, b2 = _everywhere(far, b, p, n, v, s, gloss, None)
         r0, g0, b0 = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
-        if index2 > _0:
-            r1, g1, b1 = _returned(mirrored, index2, p, n, v, s, gloss)
+        if index2 is not None:
+            r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, index2)
             r0, g0, b0 = r0 + r1, g0 + g1, b0 + b1
         result[m, 0], result[m, 1], result[m, 2] = r0, g0, b0

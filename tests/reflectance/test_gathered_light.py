@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from gelpolight_core.masks import reflects_light
-from gelpolight_core.reflectance.gathered_light import Slab, ratio_reflected, returned_to_flat
+from gelpolight_core.reflectance.gathered_light import (
+    Receivers,
+    Slab,
+    Surface,
+    gathered,
+    ratio_reflected,
+    returned_to_flat,
+)
 from gelpolight_core.reflectance.membrane import Membrane
 
 LEDS = np.array([[0.0, 10.0, -8.0], [-9.0, -5.0, -8.0], [9.0, -5.0, -8.0]])
@@ -50,3 +57,31 @@ def test_a_saturated_or_dim_part_reflects_light_and_a_hole_reflects_none() -> No
     known = np.array([[[False], [True], [False], [False]]])
     sent = ratio_reflected(ratio, known, reflecting.astype(np.float32))
     assert sent[0, :, 0] == pytest.approx([1.0, 0.7, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("shape", [(96, 64), (64, 112)])
+def test_a_matt_dent_receives_the_light_of_every_facet_once(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(7)
+    y, x = (SIDE * (np.arange(n) - 0.4 * n) for n in shape)
+    x, y = np.meshgrid(x, y)
+    depth = 1.2 * np.exp(-((x - 1.0) ** 2 + (y + 0.5) ** 2) / 2.0)
+    down, across = np.gradient(depth, SIDE)
+    normals = np.stack([-across, -down, -np.ones_like(x)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    view = np.zeros_like(normals)
+    view[..., 2] = -1.0
+    points = np.stack([x, y, -depth], axis=-1)
+    smooth = 1.0 + 0.2 * np.sin(0.3 * x)[..., None] + 0.1 * np.cos(0.2 * y)[..., None]
+    surface = Surface(points, normals, view, 0.01 * smooth * np.array([1.0, 0.7, 0.4]))
+    where = rng.random(shape) < 0.02
+    found = gathered(surface, Receivers.on(surface, where), LEDS, Membrane(), SIDE)
+    # What a Lambertian facet sends, and a Lambertian point shows, by the definition of radiance.
+    area = SIDE**2 / -normals[..., 2]
+    exact = []
+    for p, n in zip(points[where], normals[where], strict=True):
+        to = points - p
+        square = np.maximum((to**2).sum(axis=-1), 1e-12)
+        received = np.maximum(to @ n, 0.0) * np.maximum(-(to * normals).sum(axis=-1), 0.0)
+        exact.append(np.einsum("ij,ijk->k", received * area / square**2, surface.seen) / np.pi)
+    # Distant facets are gathered as larger ones.
+    assert np.abs(found - np.array(exact)).max() < 0.03 * np.max(exact)
