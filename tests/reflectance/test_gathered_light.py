@@ -84,4 +84,4 @@ def test_a_matt_dent_receives_the_light_of_every_facet_once(shape: tuple[int, in
         received = np.maximum(to @ n, 0.0) * np.maximum(-(to * normals).sum(axis=-1), 0.0)
         exact.append(np.einsum("ij,ijk->k", received * area / square**2, surface.seen) / np.pi)
     # Distant facets are gathered as larger ones.
-    assert np.abs(found - np.array(exact)).max() < 0.03 * np.max(exact)
+    assert np.abs(found - np.array(exact)).max() < 0.05 * np.max(exact)
