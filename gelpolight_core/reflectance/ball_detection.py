@@ -26,7 +26,13 @@ from gelpolight_core.image.noise import (
     scale_difference,
 )
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit, fit_shading
-from gelpolight_core.reflectance.contour import Circle, Contour, distance_in_radii, fit_edge
+from gelpolight_core.reflectance.contour import (
+    Circle,
+    Contour,
+    dilution,
+    distance_in_radii,
+    fit_edge,
+)
 from gelpolight_core.reflectance.indentation import Indentation, describe_indentation
 from gelpolight_core.reflectance.indentation_checks import (
     DETECTION,
@@ -90,12 +96,8 @@ class BallDetection:
 
     @property
     def verdict(self) -> Verdict:
-        """Fail without an indentation, warn where the border cuts it, else its own verdict."""
-        if self.indentation is None:
-            return Verdict.FAIL
-        if self.refusal is not None and self.indentation.quality.verdict is Verdict.PASS:
-            return Verdict.WARN
-        return self.indentation.quality.verdict
+        """Fail without an indentation, else its own verdict, also where the border cuts it."""
+        return Verdict.FAIL if self.indentation is None else self.indentation.quality.verdict
 
     @property
     def centre_px(self) -> tuple[float, float] | None:
@@ -304,11 +306,10 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
     clean = contour.residual_px < _CLEAN_EDGE * contour.circle.radius
     clean &= hidden < _MOST_HIDDEN_EDGE
     if clean and apart < _AGREES * radius and 0.75 < contour.circle.radius / radius < 1.33:
-        systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * contour.residual_px)
+        off = contour.residual_px * dilution(contour.points, contour.circle)
+        systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * off)
         sd = float(np.hypot(contour.centre_sd_px, systematic))
         return replace(contour, centre_sd_px=sd, stretches=stretches), "edge"
-    model_sd = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart, 0.5 * radius))
-    sd = float(np.hypot(shading.centre_sd_px, model_sd))
     turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
     x = rough.x + radius * np.cos(turns)
     y = rough.y + radius * np.sin(turns)
@@ -317,6 +318,8 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
     seen = inside.copy()
     seen[inside] = area[np.rint(y[inside]).astype(int), np.rint(x[inside]).astype(int)]
     points = np.stack([x, y], axis=1)[seen]
+    model_sd = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart, 0.5 * radius))
+    sd = float(np.hypot(shading.centre_sd_px, model_sd * dilution(points, rough)))
     coverage = float(seen.mean())
     return Contour(rough, points, sd, shading.axis_ratio, coverage, sd, stretches), "shading"
 

@@ -19,12 +19,10 @@ from gelpolight_core.image.noise import (
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.reflectance.contour import Circle, Contour, distance_in_radii
 from gelpolight_core.reflectance.indentation_checks import (
-    ALLOWED_RESIDUAL_PX,
     DETECTION,
     LARGEST_LIGHT_CHANGE,
-    LARGEST_RESIDUAL,
     LARGEST_SD,
-    LEAST_COVERAGE,
+    ROUND_FROM,
     reaches_border,
 )
 from gelpolight_core.translation import tr
@@ -57,7 +55,7 @@ class Indentation:
     residual_px : float
         Robust standard deviation of the contour about the circle.
     centre_sd_px, radius_sd_px : float
-        Standard deviations of the centre, per axis, and of the radius.
+        Standard deviations of the centre, along the worse axis, and of the radius.
     found_by : str
         Source of the circle: ``edge``, ``shading``, or ``hand`` if the user placed it.
     axis_ratio : float
@@ -206,13 +204,12 @@ def describe_indentation(
         gain=change.gain,
         signal_to_noise=signal,
         touches_border=reaches,
-        quality=_judge(contour, found_by, signal, change.gain, light_change, saturated),
+        quality=_judge(contour, signal, change.gain, light_change, saturated),
     )
 
 
 def _judge(
     contour: Contour,
-    found_by: str,
     signal: float,
     gain: tuple[float, float, float],
     light_change: float,
@@ -226,14 +223,10 @@ def _judge(
     again = tr("Capture the press again, or leave it out")
     light = tr("Let the LEDs warm up and capture the background again")
     radius = contour.circle.radius
-    residual = 100.0 * contour.residual_px / radius
-    worst_residual = 100.0 * max(LARGEST_RESIDUAL, ALLOWED_RESIDUAL_PX / radius)
     gain_change = 100.0 * max(abs(g - 1.0) for g in gain)
     label = {
-        "edge_residual": tr("Edge off the circle"),
         "centre_sd": tr("Uncertainty of the centre"),
         "axis_ratio": tr("Roundness"),
-        "coverage": tr("Visible share of the edge"),
         "signal_to_noise": tr("Signal to noise"),
         "gain_change": tr("Brightness against the background"),
         "drift": tr("Change far from the contact"),
@@ -243,24 +236,17 @@ def _judge(
     def figure(
         key: str, value: float, unit: str, warn: float, fail: float | None, advice: str
     ) -> Finding:
-        high = key in {"axis_ratio", "coverage", "signal_to_noise"}
+        high = key in {"axis_ratio", "signal_to_noise"}
         limits = {"warn": warn, "fail": fail}
         return judge(key, label[key], value, unit, **limits, remedy=advice, higher_is_better=high)
 
-    lowest = 100.0 * LEAST_COVERAGE
-    middle, deeper = (
-        Remedy.PRESS_MIDDLE,
-        tr("Average several frames or press deeper"),
-    )
-    largest_sd = max(1.0, LARGEST_SD * radius)
-    traced = (figure("edge_residual", residual, "%", 4.0, worst_residual, again),)
+    deeper = tr("Average several frames or press deeper")
+    ratio = figure("axis_ratio", contour.axis_ratio, "", 0.9, None, again)
     return QualityTable(
         (
             judge("contact_radius", tr("Contact radius"), radius, "px"),
-            *(() if found_by == "shading" else traced),
-            figure("centre_sd", contour.centre_sd_px, "px", largest_sd, None, again),
-            figure("axis_ratio", contour.axis_ratio, "", 0.9, None, again),
-            figure("coverage", 100.0 * contour.coverage, "%", 70.0, lowest, middle),
+            figure("centre_sd", contour.centre_sd_px, "px", LARGEST_SD * radius, None, again),
+            *((ratio,) if contour.coverage > ROUND_FROM else ()),
             figure("signal_to_noise", signal, "", 2.0, None, deeper),
             figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
             figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * LARGEST_LIGHT_CHANGE, light),

@@ -33,12 +33,12 @@ SMALLEST_RADIUS_PX = 6.0
 # A circle at the boundary of the field has more than 0.95; two touching presses have less than
 # 0.75.
 _LEAST_AXIS_RATIO = 0.8
-# The edge of a square scatters by 0.08 to 0.1 of its mean radius.
-LARGEST_RESIDUAL = 0.07
-ALLOWED_RESIDUAL_PX = 1.5
 LEAST_COVERAGE = 0.35
-# 12 % of a usual contact are 4 degrees; with more, a refinement cannot start.
-LARGEST_SD = 0.12
+# A shorter arc does not give an ellipse.
+ROUND_FROM = 0.75
+# From 0.3 contact radii off, the shading brings the centre back to 0.03, a slope of one degree;
+# from 0.5 off, to 0.15. Two standard deviations are within it.
+LARGEST_SD = 0.5 * 0.3
 LARGEST_LIGHT_CHANGE = 0.1
 # The inner half of a ball changes like the whole: 0.9 to 1.6 on all tested sensors. Flat faces give
 # 0.2 or less, domed faces 0.5.
@@ -315,23 +315,12 @@ def check_round(contour: Contour, name: str) -> None:
     Raises
     ------
     InputError
-        If it was seen in too few directions, or is oval, jagged or too small.
+        If it was seen in too few directions, or is oval.
     """
-    radius = contour.circle.radius
     if contour.coverage < LEAST_COVERAGE:
         _refuse_shape(Reason.NOT_ROUND, tr("no round contact edge was found"), name)
-    if contour.coverage > 0.75 and contour.axis_ratio < _LEAST_AXIS_RATIO:
+    if contour.coverage > ROUND_FROM and contour.axis_ratio < _LEAST_AXIS_RATIO:
         _refuse_oval(contour.axis_ratio, name)
-    if contour.residual_px > max(LARGEST_RESIDUAL * radius, ALLOWED_RESIDUAL_PX):
-        _refuse_shape(
-            Reason.NOT_ROUND,
-            tr(
-                "the edge of the indentation deviates by {res:.1f} px from a circle of {r:.1f} px"
-            ).format(res=contour.residual_px, r=radius),
-            name,
-        )
-    if radius < SMALLEST_RADIUS_PX:
-        _refuse_small(radius, name)
 
 
 def check_order(press: Array, background: Array, area: Mask, circle: Circle, name: str) -> None:

@@ -24,7 +24,7 @@ from gelpolight_core.sensor_calibration import Calibration
 ROOT = DOCS.parent
 NOTHING = "\N{EN DASH}"
 CHAPTER = (DOCS / "reference/quality-figures.md").read_text("utf-8")
-HIGHER_IS_BETTER = {"axis_ratio", "coverage", "signal_to_noise"}  # of a ball's contact
+HIGHER_IS_BETTER = {"axis_ratio", "signal_to_noise"}  # of a ball's contact
 # What the chapter says of limits that depend on the image or the ball; its numbers are filled in
 # from the module.
 IN_WORDS = {
@@ -34,9 +34,7 @@ IN_WORDS = {
     "camera.width / 50.0": "width/50",
     "edge_limit_px(view.image_size[0])": "width / 200, at least 3 px",
     "LED_OFF_OF_WIDTH * rgb.shape[1]": "{LED_OFF_OF_WIDTH:g} widths",
-    "worst_residual": "{100LARGEST_RESIDUAL:g} %, or {ALLOWED_RESIDUAL_PX:g} px",
-    "largest_sd": "1 px, or {100LARGEST_SD:g} % of the radius",
-    "lowest": "{100LEAST_COVERAGE:g} %",
+    "LARGEST_SD * radius": "{100LARGEST_SD:g} % of the radius",
     "LEAST_INDEX if too_low else MOST_INDEX": "{MOST_INDEX:g} (or < {LEAST_INDEX:g})",
     "DOUBTFUL_SIGMAS * 100.0 * stretch.sd": "{DOUBTFUL_SIGMAS:g} standard deviations",
     "math.exp(DOUBTFUL_SDS * sd)": "{DOUBTFUL_SDS:g} standard deviations",

@@ -73,8 +73,8 @@ def shaded(pose: BallPose, glossy: float, exponent: float) -> ShadedPixels:
 @given(
     st.floats(-6.0, 6.0),
     st.floats(-5.0, 5.0),
-    st.floats(-0.2, 0.2),
-    st.floats(-0.2, 0.2),
+    st.floats(-0.32, 0.32),
+    st.floats(-0.32, 0.32),
     st.floats(0.8, 1.3),
 )
 def test_the_shading_pulls_a_wrong_centre_to_the_right_place(

@@ -25,6 +25,7 @@ from gelpolight_core.optics.refraction import (
     membrane_to_camera,
 )
 from gelpolight_core.reflectance.ball_detection import find_indentation
+from gelpolight_core.reflectance.contour import Circle, dilution
 from gelpolight_core.reflectance.indentation import Indentation
 
 Images = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -170,6 +171,19 @@ def test_drape_that_reaches_the_border_is_reported() -> None:
     assert near.touches_border
     assert off_by(near, 42.0, 120.0) < 1.5
     assert not find_indentation(*scene((150.0, 120.0, 30.0))).touches_border
+
+
+@pytest.mark.parametrize("share", [0.4, 0.5, 0.7, 1.0])
+def test_an_arc_gives_its_centre_as_much_worse_as_is_stated(share: float) -> None:
+    """Centres of circles through noisy arcs scatter as the part of the edge in view says."""
+    rng = np.random.default_rng(3)
+    angle = np.linspace(0.0, 2.0 * np.pi * share, round(180 * share), endpoint=False)
+    design = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], axis=1)
+    radii = 40.0 + 0.5 * rng.standard_normal((len(angle), 4000))
+    centres = np.linalg.lstsq(design, radii, rcond=None)[0][1:]
+    worst = float(np.sqrt(np.linalg.eigvalsh(np.cov(centres)).max()))
+    stated = 0.5 * np.sqrt(2.0 / len(angle)) * dilution(40.0 * design[:, 1:], Circle(0.0, 0.0, 40))
+    assert stated == pytest.approx(worst, rel=0.05)
 
 
 # -- what is refused ----------------------------------------------------------------------------
