@@ -1,4 +1,4 @@
-"""All drawings are made in one thread."""
+"""Matplotlib, which the extra ``report`` installs, and the one thread in which it draws."""
 
 from __future__ import annotations
 
@@ -7,6 +7,39 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import ParamSpec, TypeVar
+
+from gelpolight_core.errors import not_installed
+from gelpolight_core.translation import tr
+
+try:
+    from matplotlib import get_data_path, rc_context
+    from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.colors import LightSource, LogNorm
+    from matplotlib.figure import Figure
+    from matplotlib.font_manager import get_font
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Circle, Ellipse, Rectangle
+except ModuleNotFoundError as error:
+    raise not_installed("Matplotlib", tr("Reports and figures"), "report") from error
+
+__all__ = [
+    "Axes",
+    "Circle",
+    "Ellipse",
+    "Figure",
+    "FigureCanvasAgg",
+    "FigureCanvasSVG",
+    "LightSource",
+    "Line2D",
+    "LogNorm",
+    "Rectangle",
+    "get_data_path",
+    "get_font",
+    "in_drawing_thread",
+    "rc_context",
+]
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -115,6 +115,9 @@ class Remedy(StrEnum):
         return translated(self.value).format(*args, **values)
 
 
+NOT_INSTALLED = marked("{library} is not installed")
+
+
 class InputError(Exception):
     """Input that the user can correct. It is shown as one sentence, never as a traceback.
 
@@ -152,6 +155,22 @@ class InputError(Exception):
     def __str__(self) -> str:
         """Return the message that the user reads: where, what, advice."""
         return str(self.text)
+
+
+def not_installed(library: str, what: str, extra: str) -> InputError:
+    """Return the error for a library that is installed with an extra of this package only.
+
+    Parameters
+    ----------
+    library : str
+        Its name.
+    what : str
+        What needs it.
+    extra : str
+        Extra of pyproject.toml.
+    """
+    found = translated(NOT_INSTALLED).format(library=library)
+    return InputError(found, what, Remedy.INSTALL.format(package=f"gelpolight-studio[{extra}]"))
 
 
 def _printable(text: str) -> str:

@@ -98,6 +98,24 @@ def test_the_lock_files_name_no_address_and_no_folder(lock: Path) -> None:
             assert not re.search(r"://|/|@|--(?!hash)", line), line
 
 
+def requirements(*extras: str, core: bool = True) -> list[str]:
+    """Return what pyproject.toml asks for, with the extras and those that they name."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    found = list(project["dependencies"]) if core else []
+    for extra in extras:
+        for requirement in project["optional-dependencies"][extra]:
+            named = re.fullmatch(r"gelpolight-studio\[(\w+)\]", requirement)
+            found += requirements(named[1], core=False) if named else [requirement]
+    return found
+
+
+def test_only_the_extra_of_reports_brings_what_draws_them() -> None:
+    """The library and its commands are half as large without."""
+    names = {re.split(r"[<>=!~\[ ]", requirement)[0] for requirement in requirements()}
+    assert not names & {"matplotlib", "typst"}
+    assert {"matplotlib", "typst"} <= {x.split(">=")[0] for x in requirements("gui")}
+
+
 def test_the_tests_run_with_the_versions_that_users_get() -> None:
     """The test environment holds the program's environment."""
     runtime, dev = pins(RUNTIME_LOCK), pins(DEV_LOCK)
@@ -107,12 +125,10 @@ def test_the_tests_run_with_the_versions_that_users_get() -> None:
 
 def test_every_dependency_is_locked() -> None:
     """A library added to the project is added to the locks."""
-    text = (ROOT / "pyproject.toml").read_text("utf-8")
-    project = tomllib.loads(text)["project"]
     for lock, wanted in (
-        (RUNTIME_LOCK, project["dependencies"] + project["optional-dependencies"]["gui"]),
-        (DEV_LOCK, project["optional-dependencies"]["dev"]),
-        (DOCS_LOCK, project["optional-dependencies"]["docs"]),
+        (RUNTIME_LOCK, requirements("gui")),
+        (DEV_LOCK, requirements("gui", "dev")),
+        (DOCS_LOCK, requirements("docs", core=False)),
     ):
         names = {re.split(r"[<>=!~\[ ]", requirement)[0].lower() for requirement in wanted}
         assert names <= pins(lock).keys()
@@ -121,10 +137,8 @@ def test_every_dependency_is_locked() -> None:
 def test_the_lowest_versions_that_are_allowed_are_those_that_were_tested() -> None:
     """A lower bound that nobody tried is a guess."""
     table = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    extras = table["project"]["optional-dependencies"]
-    wanted = table["project"]["dependencies"] + extras["gui"] + extras["dask"]
     oldest = pins(OLDEST_LOCK)
-    for requirement in wanted + table["build-system"]["requires"]:
+    for requirement in requirements("gui", "dask") + table["build-system"]["requires"]:
         name, bound = re.match(r"([\w.-]+)>=([\d.]+)", requirement).groups()
         tested = oldest[name.lower()]
         assert re.fullmatch(re.escape(bound) + r"(\.0)*", tested), (requirement, tested)

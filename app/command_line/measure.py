@@ -63,6 +63,9 @@ class Measure(ToolArguments):
             self._refuse("edge_radius", "tolerance", "truth", "report")
         if self.report is not None:
             refuse_other_endings(self.report)
+            from gelpolight_core.report.file import write_report  # slow to import
+            from gelpolight_core.report.measurement import measurement_report
+
         truths, limits = self._truths(), tolerances(self.tolerance)
         reconstructor = load_reconstructor(self.calibration, self.model)
         several = len(self.images) > 1
@@ -86,9 +89,6 @@ class Measure(ToolArguments):
         if self.json:
             write_json(self.json, entries if several else entries[0])
         if self.report and certified:
-            from gelpolight_core.report.file import write_report  # slow to import
-            from gelpolight_core.report.measurement import measurement_report
-
             certificate = measurement_report(
                 reconstructor.calibration, certified, limits_percent=limits
             )

@@ -26,7 +26,6 @@ from app.command_line.reconstructing import (
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
-from gelpolight_core.export.preview import write_preview
 from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.io.atomic import make_folder, write_json
 from gelpolight_core.measurement.profile import take_profile
@@ -69,6 +68,8 @@ class Reconstruct(Command):
                 "--uncertainty",
                 Remedy.REMOVE_OPTION,
             )
+        if PREVIEW in self.format:
+            from gelpolight_core.export.preview import write_preview  # slow to import
         endings = ["png" if name == PREVIEW else ending(name) for name in self.format]
         with ExitStack() as opened:
             inputs, recordings = open_inputs(self.images, self.frames, opened)

@@ -21,7 +21,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.question import ask
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.errors import InputError, Remedy, not_installed
 from gelpolight_core.export.live_message import pack
 from gelpolight_core.fields import choice, number
 from gelpolight_core.translation import tr
@@ -315,9 +315,5 @@ def _library() -> Any:
     try:
         import zmq
     except ImportError as error:
-        raise InputError(
-            tr("the package pyzmq is not installed"),
-            tr("stream"),
-            Remedy.INSTALL.format(package="pyzmq>=26"),
-        ) from error
+        raise not_installed("pyzmq", tr("stream"), "stream") from error
     return zmq

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.errors import InputError, Remedy, not_installed
 from gelpolight_core.translation import tr
 
 T = TypeVar("T")
@@ -131,11 +131,7 @@ def cluster(address: str) -> Iterator[Workers]:
         from distributed import Client, KilledWorker
         from distributed.comm import connect
     except ImportError as error:
-        raise InputError(
-            tr("Dask is not installed"),
-            "--workers",
-            Remedy.INSTALL.format(package="gelpolight-studio[dask]"),
-        ) from error
+        raise not_installed("Dask", "--workers", "dask") from error
 
     for name in ("distributed", "distributed.client"):  # what they would print, the error says
         logging.getLogger(name).setLevel(logging.CRITICAL)

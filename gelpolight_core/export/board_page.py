@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
-
-from gelpolight_core.drawing_thread import in_drawing_thread
+from gelpolight_core.drawing_thread import (
+    Axes,
+    Figure,
+    Line2D,
+    Rectangle,
+    in_drawing_thread,
+    rc_context,
+)
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.session.board import BoardSpec

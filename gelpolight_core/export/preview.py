@@ -7,12 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LightSource
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gelpolight_core.drawing_thread import in_drawing_thread
+from gelpolight_core.drawing_thread import Figure, FigureCanvasAgg, LightSource, in_drawing_thread
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr

@@ -11,16 +11,19 @@ from typing import Any, Concatenate, ParamSpec
 
 import cv2
 import numpy as np
-from matplotlib import get_data_path, rc_context
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
-from matplotlib.font_manager import get_font
 from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
-from gelpolight_core.drawing_thread import in_drawing_thread
+from gelpolight_core.drawing_thread import (
+    Axes,
+    Figure,
+    FigureCanvasAgg,
+    FigureCanvasSVG,
+    get_data_path,
+    get_font,
+    in_drawing_thread,
+    rc_context,
+)
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
 

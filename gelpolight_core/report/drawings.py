@@ -6,14 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Ellipse
 from numpy.typing import ArrayLike
 
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.channels import channel_name
+from gelpolight_core.drawing_thread import Axes, Circle, Ellipse, Figure, LogNorm
 from gelpolight_core.finding import Verdict
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.optics.lens import LensResult

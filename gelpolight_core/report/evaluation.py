@@ -7,9 +7,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from gelpolight_core.calibration.recipe import Facts
+from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of

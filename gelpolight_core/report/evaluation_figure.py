@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from gelpolight_core.drawing_thread import Axes, Figure
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,

@@ -12,14 +12,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typst
 
 from gelpolight_core import __version__
+from gelpolight_core.errors import not_installed
 from gelpolight_core.finding import Finding, Verdict, limit_text, value_text, verdict_word
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.report.document import MARKS, Report, refuse_other_endings
 from gelpolight_core.report.drawing import FONTS, printable
 from gelpolight_core.translation import current_language, tr
+
+try:
+    import typst
+except ModuleNotFoundError as error:
+    raise not_installed("typst", tr("Reports and figures"), "report") from error
 
 TEMPLATE = Path(__file__).with_name("report.typ")
 

@@ -8,9 +8,9 @@ from datetime import datetime
 
 import cv2
 import numpy as np
-from matplotlib.figure import Figure
 
 from gelpolight_core.calibration.recipe import Facts
+from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.finding import QualityTable, Verdict, worst_of
 from gelpolight_core.labels import label
 from gelpolight_core.measurement.measured_press import MeasuredPress

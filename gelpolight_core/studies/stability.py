@@ -15,8 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
+from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of

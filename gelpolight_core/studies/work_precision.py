@@ -14,10 +14,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of

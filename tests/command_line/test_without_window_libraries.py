@@ -1,4 +1,4 @@
-"""The commands on a machine without Qt, pyqtgraph and VTK."""
+"""The commands on a machine without the libraries of windows, and of reports and figures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = """
 import sys
 
-BLOCKED = {"PySide6", "shiboken6", "pyqtgraph", "vtk", "vtkmodules"}
+BLOCKED = {"PySide6", "shiboken6", "pyqtgraph", "vtk", "vtkmodules", "matplotlib", "typst"}
 
 class Blocker:
     def find_spec(self, name, path=None, target=None):
@@ -36,6 +36,13 @@ if __name__ == "__main__":
     for line in sys.stdin:
         assert main(shlex.split(line)) == 0, line
 """
+IN_PYTHON = """
+    import gelpolight_core as gp
+    try:
+        import gelpolight_core.report.file
+    except gp.InputError as error:
+        print(error, file=sys.stderr)
+"""
 
 
 @pytest.fixture
@@ -47,8 +54,11 @@ def blocked(tmp_path: Path) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": path, "HOME": str(tmp_path)}
 
 
-@pytest.mark.parametrize("module", ["PySide6.QtCore", "pyqtgraph", "vtkmodules.util", "numpy"])
-def test_only_window_libraries_are_blocked_in_a_process_and_its_children(
+@pytest.mark.parametrize(
+    "module",
+    ["PySide6.QtCore", "pyqtgraph", "vtkmodules.util", "matplotlib.figure", "typst", "numpy"],
+)
+def test_only_these_libraries_are_blocked_in_a_process_and_its_children(
     blocked: dict[str, str], module: str
 ) -> None:
     """Shows that the test below can fail."""
@@ -71,6 +81,35 @@ def test_the_window_says_what_to_install(blocked: dict[str, str]) -> None:
     assert 'pip install "gelpolight-studio[gui]"' in line
 
 
+def test_reports_and_figures_say_what_to_install(blocked: dict[str, str], tmp_path: Path) -> None:
+    """In one line each, before any work."""
+    for name in ("c.gplcal", "p.png"):
+        (tmp_path / name).touch()
+    lines = [
+        "board -o b.pdf",
+        "evaluate c.gplcal . -o out",
+        "measure c.gplcal p.png --shape ball --report r.pdf",
+        "reconstruct c.gplcal p.png -o out --format npz,preview",
+        "report c.gplcal -o r.pdf",
+        "stability -o out",
+        "work-precision -o out",
+    ]
+    (tmp_path / "commands.py").write_text(COMMANDS.replace("== 0", "== 2") + IN_PYTHON)
+    done = subprocess.run(
+        [sys.executable, "commands.py"],
+        cwd=tmp_path,
+        env=blocked,
+        input="\n".join(lines),
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    refusals = done.stderr.splitlines()
+    assert len(refusals) == len(lines) + 1
+    assert all('pip install "gelpolight-studio[report]"' in refusal for refusal in refusals)
+    assert not {"out", "r.pdf", "b.pdf"} & set(os.listdir(tmp_path))
+
+
 def test_images_become_depth_maps_and_sizes(blocked: dict[str, str], tmp_path: Path) -> None:
     """From saved files; with the oldest libraries, nothing is calibrated beside the other tests."""
     sensor = ROOT / "tests/data/2026-11-23/workspace/sensors/small-1"
@@ -79,7 +118,7 @@ def test_images_become_depth_maps_and_sizes(blocked: dict[str, str], tmp_path: P
         assert cv2.imwrite(str(tmp_path / "press.png"), opened.frame(1).rgb[..., ::-1])
     (tmp_path / "commands.py").write_text(COMMANDS)
     lines = f"""inspect {sensor / "first.gplcal"}
-reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif,preview
+reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif
 measure {sensor / "first.gplcal"} press.png --shape cylinder --json measured.json
 batch {sensor / "first.gplcal"} press.png {recording} -o batch
 benchmark {sensor / "first.gplcal"} press.png --json times.json --model paper
