@@ -35,7 +35,7 @@ SHOWN_FAULTS = 20
 def _workers(text: str) -> AbstractContextManager[Workers]:
     """Return the workers of the argument."""
     if not text.isdecimal():
-        return cluster(text)
+        return cluster(text, partial(tqdm.write, file=sys.stderr))
     if int(text) < 1:
         raise InputError(tr("At least one worker is needed"), "--workers", Remedy.CORRECT_VALUE)
     return processes(int(text))

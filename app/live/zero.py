@@ -13,7 +13,8 @@ from PySide6.QtCore import QObject
 from app.context.context import AppContext
 from app.live.session import LiveSession
 from app.services.jobs import Job, Jobs
-from app.workspace.workspace import ENDING, Workspace
+from app.workspace.entries import ENDING
+from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict, worst_of

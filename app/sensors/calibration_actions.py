@@ -119,8 +119,10 @@ class CalibrationActions:
         cancel.setFocus()
 
     def removals(self) -> tuple[Removal, ...]:
-        """Return the calibrations in the trash."""
-        return self._context.workspace.removals()
+        """Return the calibrations in the trash. If it cannot be read: none, with a message."""
+        with self._context.toasts.errors():
+            return self._context.workspace.removals()
+        return ()
 
     def restore(self, removal: Removal) -> None:
         """Move a calibration from the trash back to its place. The one in use stays in use."""

@@ -23,9 +23,8 @@ from app.widgets.cells_table import Cell, CellsTable
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.naming import named
-from app.workspace.entries import Entry
+from app.workspace.entries import ENDING, Entry
 from app.workspace.gel_care import presses_text, read_presses
-from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.lab.trend import Sample, read_samples, sample_of_validation

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QMimeData
 
-from app.workspace.workspace import ENDING
+from app.workspace.entries import ENDING
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 
 DESCRIPTION = "session.toml"

@@ -49,7 +49,7 @@ from app.widgets.layout import vbox
 from app.widgets.naming import named
 from app.widgets.timers import timer
 from app.widgets.units import use_length_unit
-from app.workspace.workspace import ENDING
+from app.workspace.entries import ENDING
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 from gelpolight_core.translation import tr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -9,9 +10,13 @@ from pathlib import Path
 from gelpolight_core.calibration.manifest import CalibrationSummary, read_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
-from gelpolight_core.io.reading import parse_time
+from gelpolight_core.io.reading import parse_time, unreadable
 from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
+
+ENDING = ".gplcal"
+UNLISTED = f"*{ENDING}"
+"""Stands for the files of a folder that cannot be listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +83,54 @@ class Entry:
         return None if made is None else max(0.0, (now - made) / timedelta(days=1))
 
 
+def calibrations_in(parent: Path) -> list[Path]:
+    """Return the calibration files in the folders of a folder.
+
+    A folder that cannot be listed has one path, :data:`UNLISTED`, whose entry says why.
+
+    Raises
+    ------
+    OSError
+        If the folder itself cannot be listed.
+    """
+    found: list[Path] = []
+    try:
+        folders = [parent / name for name in os.listdir(parent)]
+    except FileNotFoundError:
+        return found
+    for folder in folders:
+        try:
+            names = os.listdir(folder)
+        except NotADirectoryError:
+            continue
+        except OSError:
+            names = [UNLISTED]
+        found += [folder / name for name in names if name.endswith(ENDING) and name[0] != "."]
+    return sorted(found)
+
+
 def read_entry(path: Path, *, in_use: bool = False) -> Entry:
     """Return the library entry of a calibration file, including broken ones."""
     try:
+        refuse_unlisted(path)
         return Entry(path, read_summary(path), in_use=in_use)
     except InputError as error:
         return Entry(path, None, broken=f"{error.found}. {error.advice}.", in_use=in_use)
+
+
+def refuse_unlisted(path: Path) -> None:
+    """Refuse a path that stands for the files of a folder.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be listed.
+    """
+    try:
+        if path.name == UNLISTED:
+            os.listdir(path.parent)
+    except OSError as error:
+        raise unreadable(error, path.parent) from error
 
 
 def validation_lines(entry: Entry) -> list[str]:

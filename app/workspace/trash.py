@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.workspace.entries import Entry, read_entry
+from app.workspace.entries import Entry, calibrations_in, read_entry
 from app.workspace.files import free_path, move_file
 from app.workspace.sessions import file_time
 from gelpolight_core.errors import InputError
@@ -21,7 +21,6 @@ from gelpolight_core.translation import tr
 from gelpolight_core.validation import validation_path
 
 NOTE = "removal.json"
-ENDING = ".gplcal"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +79,7 @@ def put_into_trash(workspace: Path, path: Path, *, was_in_use: bool) -> Removal:
 
 def removals_in(workspace: Path) -> tuple[Removal, ...]:
     """Return the calibrations in the trash of a workspace, the last removed first."""
-    found = (workspace / "trash").glob(f"*/[!.]*{ENDING}")
-    removals = [_read(workspace, path) for path in found]
+    removals = [_read(workspace, path) for path in calibrations_in(workspace / "trash")]
     return tuple(sorted(removals, key=lambda removal: removal.when, reverse=True))
 
 

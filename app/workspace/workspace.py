@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import platformdirs
 
-from app.workspace.entries import Entry, read_entry
+from app.workspace.entries import ENDING, Entry, calibrations_in, read_entry, refuse_unlisted
 from app.workspace.files import copy_file, copy_new, free_path
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.trash import Removal, put_into_trash, removals_in, take_from_trash
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from gelpolight_core.records.records import Records
     from gelpolight_core.sensor_calibration import Calibration
 
-ENDING = ".gplcal"
 STATE = "workspace.json"
 DRAFT = "-draft"
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{n}{k}" for n in ("COM", "LPT") for k in range(10))}
@@ -190,7 +189,7 @@ class Workspace:
         """
         in_use = self.in_use
         with self._reading():
-            files = sorted(self.sensors_folder.glob(f"*/[!.]*{ENDING}"))
+            files = calibrations_in(self.sensors_folder)
         return _in_order(read_entry(path, in_use=path == in_use) for path in files)
 
     def entry_of(self, identity: str) -> Entry | None:
@@ -296,6 +295,7 @@ class Workspace:
             If it is outside the workspace or cannot be moved.
         """
         self._refuse_outside(path)
+        refuse_unlisted(path)
         was_in_use = self.in_use == path
         removal = put_into_trash(self.folder, path, was_in_use=was_in_use)
         if was_in_use:
@@ -303,8 +303,15 @@ class Workspace:
         return removal
 
     def removals(self) -> tuple[Removal, ...]:
-        """Return the calibrations in the trash folder, the last removed first."""
-        return removals_in(self.folder)
+        """Return the calibrations in the trash folder, the last removed first.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read.
+        """
+        with self._reading():
+            return removals_in(self.folder)
 
     def restore(self, removal: Removal, *, use: bool = True) -> None:
         """Restore a removed calibration.

@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 from gelpolight_core.errors import InputError, Remedy, not_installed
 from gelpolight_core.translation import tr
 
+LOG = logging.getLogger(__name__)
 T = TypeVar("T")
 ANSWER_S = 10.0
 EMPTY_S = 60.0
@@ -114,13 +115,15 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def cluster(address: str) -> Iterator[Workers]:
+def cluster(address: str, note: Callable[[str], object] = LOG.info) -> Iterator[Workers]:
     """Yield the workers of a Dask cluster.
 
     Parameters
     ----------
     address : str
         Address of the scheduler, such as ``tcp://10.0.0.1:8786``.
+    note : callable, optional
+        Called with a sentence when the cluster has no workers and one is waited for.
 
     Raises
     ------
@@ -152,16 +155,20 @@ def cluster(address: str) -> Iterator[Workers]:
     with client:
         # Not pure: the same frames may have to be repeated, and the result is the files.
         submit = client.get_executor(pure=False).submit
-        full_s = time.monotonic()
+        full_s, noted = time.monotonic(), False
 
         def most() -> int:
-            nonlocal full_s
+            nonlocal full_s, noted
             cores, now = int(sum(client.ncores().values())), time.monotonic()
             if cores:
-                full_s = now
+                full_s, noted = now, False
             elif now - full_s > EMPTY_S:
                 text = tr("The cluster has had no workers for {s:.0f} seconds")
                 raise InputError(text.format(s=EMPTY_S), address, Remedy.CLUSTER)
+            elif not noted:
+                text = tr("{address}: 0 workers. Waiting up to {s:.0f} seconds for the first one")
+                note(text.format(address=address, s=EMPTY_S))
+                noted = True
             return TASKS_PER_CORE * max(cores, 1)
 
         try:

@@ -281,6 +281,20 @@ def open_unlinked(path: Path, flags: int) -> int:
     return handle
 
 
+def refuse_link(path: Path) -> None:
+    """Refuse a link in place of a file of this program, which a library opens by its name.
+
+    Not by opening it as well: with a second handle, a process loses its locks on the file.
+
+    Raises
+    ------
+    InputError
+        If it is a link, or has another name.
+    """
+    if path.is_symlink() or (path.exists() and path.stat().st_nlink > 1):
+        raise _is_link(path)
+
+
 def _is_link(path: Path) -> InputError:
     return InputError(
         tr("This file is a link to another file, which would be overwritten"),

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.io.atomic import cannot_write
+from gelpolight_core.io.atomic import cannot_write, refuse_link
 from gelpolight_core.io.reading import brief
 from gelpolight_core.records.schema import bring_up_to_date
 from gelpolight_core.translation import tr
@@ -25,10 +25,11 @@ def connect(path: Path, busy_s: float) -> sqlite3.Connection:
     Raises
     ------
     InputError
-        If it belongs to another program, or to a newer version of this one.
+        If it belongs to another program or to a newer version of this one, or is a link.
     sqlite3.Error
         If it cannot be opened, or is damaged.
     """
+    refuse_link(path)  # SQLite would follow it
     # Any thread may use it, one at a time, controlled by the lock of the records.
     connection = sqlite3.connect(
         path, timeout=busy_s, isolation_level=None, check_same_thread=False

@@ -332,11 +332,16 @@ def test_a_cluster_without_workers_is_refused_after_a_time(
 ) -> None:
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(workers, "EMPTY_S", 0.5)
+    notes: list[str] = []
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None) as local,
         pytest.raises(InputError, match=r"no workers for .* 0 of 6 frames are done"),
     ):
-        go(day, out=tmp_path / "out", workers=cluster(local.scheduler_address))
+        address = local.scheduler_address
+        go(day, out=tmp_path / "out", workers=cluster(address, notes.append))
+    (note,) = notes  # once, while it waits
+    assert address in note
+    assert "0 workers" in note
 
 
 def test_a_lost_scheduler_is_one_error_with_one_remedy(

@@ -18,7 +18,7 @@ import pytest
 from app.command_line.main import OPENED
 from app.context.pages import all_pages
 from app.shell.documentation import find_documentation
-from app.workspace.workspace import ENDING as CALIBRATION
+from app.workspace.entries import ENDING as CALIBRATION
 from gelpolight_core.recording.recording import ENDING as RECORDING
 
 ROOT = Path(__file__).resolve().parents[2]

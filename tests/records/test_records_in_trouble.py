@@ -7,6 +7,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -54,6 +55,27 @@ def adding(path: Path) -> subprocess.Popen[str]:
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         text=True,
     )
+
+
+@pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
+def test_records_are_never_opened_through_a_link(
+    link: Callable[[Path, Path], None], tmp_path: Path
+) -> None:
+    """Somebody else may write to the folder, too."""
+    theirs = tmp_path / "theirs.sqlite"
+    Records.open(theirs).close()
+    before = theirs.read_bytes()
+    link(tmp_path / NAME, theirs)
+    with pytest.raises(InputError, match="link"):
+        Records.open(tmp_path / NAME)
+    assert theirs.read_bytes() == before
+
+
+def test_no_records_appear_where_a_dangling_link_points(tmp_path: Path) -> None:
+    (tmp_path / NAME).symlink_to(tmp_path / "elsewhere.sqlite")
+    with pytest.raises(InputError, match="link"):
+        Records.open(tmp_path / NAME)
+    assert not (tmp_path / "elsewhere.sqlite").exists()
 
 
 def test_a_killed_program_loses_or_splits_no_measurement(tmp_path: Path) -> None:

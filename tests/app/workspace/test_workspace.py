@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -44,6 +45,31 @@ def trial(path: Path, *comparisons: Quantity) -> Validation:
     return Validation(
         read_summary(path).identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", comparisons
     )
+
+
+def test_a_folder_that_nobody_may_list_is_shown_with_its_cause(
+    workspace: Workspace, source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the sensors and in the trash."""
+    workspace.remove(workspace.import_calibration(source))
+    good = workspace.import_calibration(source)
+    workspace.sensor_folder("B-2").mkdir()
+    denied = {workspace.sensor_folder("B-2"), *(workspace.folder / "trash").iterdir()}
+    list_folder = os.listdir
+
+    def listdir(folder: Path) -> list[str]:
+        if Path(folder) in denied:
+            raise PermissionError(errno.EACCES, "Permission denied", str(folder))
+        return list_folder(folder)
+
+    monkeypatch.setattr(os, "listdir", listdir)
+    found = {entry.path.parent.name: "permission" in entry.broken for entry in workspace.entries()}
+    assert found == {good.parent.name: False, "B-2": True}
+    with pytest.raises(InputError, match="permission"):
+        workspace.remove(workspace.sensor_folder("B-2") / "*.gplcal")
+    (removal,) = workspace.removals()
+    assert removal.old_path.parent == good.parent
+    assert "permission" in removal.entry.broken
 
 
 def test_a_failed_calibration_is_a_draft_that_is_used_only_with_a_reason(
