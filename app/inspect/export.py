@@ -38,6 +38,7 @@ class ExportChoice:
     tif: bool = switch(True, "", tr("tif: depth, 32-bit float"))
     png: bool = switch(False, "", tr("png: depth, 16-bit with its scale"))
     gsf: bool = switch(False, "", tr("gsf: depth, for Gwyddion"))
+    gwy: bool = switch(False, "", tr("gwy: depth with its units, for Gwyddion"))
     x3p: bool = switch(False, "", tr("x3p: surface, for metrology (ISO 25178-72)"))
     sdf: bool = switch(False, "", tr("sdf: surface, for metrology (ISO 25178-71)"))
     csv: bool = switch(False, "", tr("csv: depth as a table, for spreadsheets"))

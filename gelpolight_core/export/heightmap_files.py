@@ -18,7 +18,7 @@ from gelpolight_core.export.raster import (
     write_tiff,
     write_xyz,
 )
-from gelpolight_core.export.surface_files import write_pcd, write_sdf, write_x3p
+from gelpolight_core.export.surface_files import write_gwy, write_pcd, write_sdf, write_x3p
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.plug_ins import EXPORTS, plug_ins
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -32,6 +32,7 @@ RASTER_FORMATS: dict[str, Callable[..., object]] = {
     "tif": write_tiff,
     "png": write_png16,
     "gsf": write_gsf,
+    "gwy": write_gwy,
     "x3p": write_x3p,
     "sdf": write_sdf,
     "csv": write_csv,
@@ -67,9 +68,9 @@ def write_heightmap(
     formats : sequence of str, or one of them
         Out of :data:`FORMATS`: ``npz`` (all maps), ``csv`` (the depth as a table, with the
         places of columns and rows), ``xyz`` (one point a line), ``x3p``, ``sdf`` and ``pcd`` (the
-        surface in metres, for metrology and robots), ``tif``, ``gsf`` and ``png`` (the
-        depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera image
-        may be in the same folder), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
+        surface in metres, for metrology and robots), ``tif``, ``gsf``, ``gwy`` and ``png``
+        (the depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera
+        image may be in the same folder), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
         same), ``stl`` (bare mesh), ``glb`` (glTF, in metres).
     stride : int, optional
         Meshes use only every n-th row and column.

@@ -1,4 +1,4 @@
-"""The surface in metres, for programs of surface metrology (X3P, SDF) and of robots (PCD).
+"""The surface in metres, for programs of surface metrology (X3P, SDF, GWY) and of robots (PCD).
 
 The axes are those of the sensor, right-handed: x to the right, y down, z away from the camera. The
 height is minus the depth; places without depth hold NaN.
@@ -68,6 +68,41 @@ def write_sdf(heightmap: HeightMap, file: BinaryIO) -> None:
     pitch_m = 1e-3 * heightmap.pitch_mm
     about = sdfio.Metadata(manufacturer_id="GelPoLight", data_type=sdfio.DataType.BINARY32)
     sdfio.write(file, _heights_m(heightmap), x_scale=pitch_m, y_scale=pitch_m, metadata=about)
+
+
+def write_gwy(heightmap: HeightMap, file: BinaryIO) -> None:
+    """Write GWY, the file of Gwyddion: the depth in metres, with places without depth masked.
+
+    Its lengths include half a pixel beyond the outermost pixel centres.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The height map.
+    file : binary file
+        Open for writing.
+    """
+    from gwyfile.objects import GwyContainer, GwyDataField, GwySIUnit  # only needed here
+
+    known = has_depth(heightmap)
+    rows, columns = known.shape
+    pitch_m = 1e-3 * heightmap.pitch_mm
+    extent = {
+        "xreal": columns * pitch_m,
+        "yreal": rows * pitch_m,
+        "xoff": 1e-3 * float(heightmap.x_mm[0]) - pitch_m / 2,
+        "yoff": 1e-3 * float(heightmap.y_mm[0]) - pitch_m / 2,
+        "si_unit_xy": GwySIUnit(unitstr="m"),
+    }
+    depth_m = np.where(known, -_heights_m(heightmap), 0.0)
+    channel = GwyContainer(
+        {
+            "/0/data": GwyDataField(depth_m, **extent, si_unit_z=GwySIUnit(unitstr="m")),
+            "/0/data/title": f"Depth {heightmap.source}",
+            "/0/mask": GwyDataField(np.where(known, 0.0, 1.0), **extent),
+        }
+    )
+    channel.tofile(file)
 
 
 def write_pcd(heightmap: HeightMap, file: BinaryIO) -> None:

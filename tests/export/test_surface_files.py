@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import gwyfile
 import numpy as np
 import pytest
 import sdfio
@@ -51,6 +52,20 @@ def test_programs_of_metrology_read_the_surface_in_metres(
     x, y = np.meshgrid(1e-3 * x_mm, 1e-3 * y_mm)
     np.testing.assert_allclose(points[known][:, 0], x[known], atol=1e-9)
     np.testing.assert_allclose(points[known][:, 1], y[known], atol=1e-9)
+
+
+def test_gwyddion_reads_the_depth_with_its_units(tmp_path: Path, heightmap: HeightMap) -> None:
+    (path,) = write_heightmap(heightmap, tmp_path, formats="gwy")
+    container = gwyfile.load(str(path))
+    (field,) = gwyfile.util.get_datafields(container).values()
+    heights_m = expected_m(heightmap)
+    known = np.isfinite(heights_m)
+    np.testing.assert_allclose(field.data[known], -heights_m[known], rtol=1e-6, atol=1e-12)
+    np.testing.assert_array_equal(container["/0/mask"].data == 1.0, ~known)
+    assert (field.si_unit_xy.unitstr, field.si_unit_z.unitstr) == ("m", "m")
+    assert field.xreal == pytest.approx(1e-3 * heightmap.pitch_mm * known.shape[1])
+    first_m = field.xoff + 0.5 * field.xreal / known.shape[1]
+    assert first_m == pytest.approx(1e-3 * heightmap.x_mm[0])
 
 
 def test_pcd_follows_the_published_format(tmp_path: Path, heightmap: HeightMap) -> None:
