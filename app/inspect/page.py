@@ -53,8 +53,6 @@ class InspectPage(QWidget):
         self.live = LiveSession(context=context, name="inspect", parent=self)
         self.live_depth = LiveDepth(self.live, self.jobs, self, context=context)
         self.modes = ModeChoice(self.jobs, self, self.live_depth.choose, context=context)
-        idle = tr("Press an object into the membrane. Press Space to freeze it at full detail.")
-        self.banner = Banner(self.jobs, idle=idle, on_act=self.live_depth.act)
         self._value = named(PlainLabel(), "inspect.depth", tr("Depth under the cursor"))
         make_bold(self._value, size=1.7)
         self._readout = named(
@@ -110,6 +108,9 @@ class InspectPage(QWidget):
         )
         self.file_actions = FileActions(self.live_depth, self.views, self, context=self.context)
         self.views.surface.menu.add("mesh", tr("Export mesh…"), self.export.ask)
+        idle = tr("Press an object into the membrane. Press Space to freeze it at full detail.")
+        act, over = self.live_depth.act, self.views.stage.parts
+        self.banner = Banner(self.jobs, idle=idle, on_act=act, over=over)
         self.replay = ReplayBar("inspect")
         self.processed = ProcessedLine(self.views.processing.reset)
         parts = self.banner, self.processed, (self.views, 1), self.replay

@@ -21,6 +21,8 @@ BUTTONS = {
     "live": tr("Back to the camera"),
 }
 """The text of the button of every action. An advice with such a key has a button."""
+OF_CALIBRATION = ("fitting", "calibrate", "sensors", "same_camera")
+"""Actions that help where the calibration in use is not for the images."""
 PREPARING = Finding("preparing", tr("Preparing the calibration. Please wait."))
 
 
@@ -86,6 +88,12 @@ def action_of(advice: Finding | None) -> str:
         return ""
     action = "zero" if advice.key in ZERO_CORRECTS else advice.key
     return action if action in BUTTONS else ""
+
+
+def is_of_another(advice: Finding | None) -> bool:
+    """Return whether an advice says that the calibration in use is not for these images."""
+    failed = advice is not None and advice.verdict is Verdict.FAIL
+    return failed and action_of(advice) in OF_CALIBRATION
 
 
 def advise(now: LiveState) -> Finding | None:

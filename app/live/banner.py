@@ -1,18 +1,18 @@
-"""The line above the views: what to do next, or the progress of work."""
+"""What to do next: in the line above the views, or over them if the calibration is another's."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
-from app.live.advice import BUTTONS, action_of
+from app.live.advice import BUTTONS, action_of, is_of_another
 from app.services.jobs import Jobs
 from app.widgets.buttons import push_button
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox
-from app.widgets.meaning import show_meaning
+from app.widgets.meaning import show_ground, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.finding import Finding, Verdict
 from gelpolight_core.translation import tr
@@ -33,9 +33,13 @@ class Banner(QWidget):
         Shown in muted colour if there is no advice.
     on_act : callable
         Called with the name of the advised action when its button is clicked.
+    over : QWidget
+        The views. That the calibration in use is not for the images is said over their upper edge.
     """
 
-    def __init__(self, jobs: Jobs, *, idle: str, on_act: Callable[[str], object]) -> None:
+    def __init__(
+        self, jobs: Jobs, *, idle: str, on_act: Callable[[str], object], over: QWidget
+    ) -> None:
         super().__init__()
         named(self, "inspect.banner", tr("What to do next"))
         self._advice: Finding | None = None
@@ -50,7 +54,12 @@ class Banner(QWidget):
             "inspect.stop", tr("Stop"), jobs.cancel, accessible=tr("Stop the work")
         )
         jobs.progressed.connect(self.show_work)
-        hbox(self._text, self._button, self._bar, self._stop, of=self, margins=(10, 4, 10, 4))
+        self._line = QWidget()
+        self._line.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        hbox((self._text, 1), self._button, of=self._line, margins=(10, 4, 10, 4))
+        self._row = hbox((self._line, 1), self._bar, self._stop, of=self, margins=(0, 0, 10, 0))
+        self._over = over
+        over.installEventFilter(self)
         line, button = self._text.fontMetrics().lineSpacing(), self._button.sizeHint().height()
         self.setFixedHeight(max(2 * line, button) + 8)
         self._working = False
@@ -75,6 +84,7 @@ class Banner(QWidget):
         if not self._working:
             self._text.setText(self._idle if advice is None else advice.line)
             role = "muted" if advice is None else ROLES[advice.verdict]
+        self._put_line(over=is_of_another(advice) and not self._working)
         # A text that is longer than the banner starts in it, and the tooltip shows all of it.
         room = self._text.rect().adjusted(0, 0, 0, 10 * self.height())
         wrap = Qt.TextFlag.TextWordWrap
@@ -87,3 +97,28 @@ class Banner(QWidget):
         self._button.setVisible(bool(action_of(advice)) and not self._working)
         self._bar.setVisible(self._working)
         self._stop.setVisible(self._working)
+
+    def _put_line(self, *, over: bool) -> None:
+        """Put text and button over the views, or back into this line."""
+        views = self._over.parentWidget()
+        if over == (self._line.parent() is views):
+            return
+        show_ground(self._line, "fail" if over else "")
+        if over:
+            self._line.setParent(views)
+            self._place()
+            self._line.show()
+        else:
+            self._row.insertWidget(0, self._line, 1)
+
+    def _place(self) -> None:
+        at = self._over.geometry()
+        height = max(self._line.heightForWidth(at.width()), self.height())
+        self._line.setGeometry(at.x(), at.y(), at.width(), height)
+        self._line.raise_()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102
+        moved = event.type() in (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show)
+        if moved and self._line.parent() is not self:
+            self._place()
+        return super().eventFilter(watched, event)

@@ -113,6 +113,8 @@ class Stage(QWidget):
     ----------
     arranged : Layout
         What is visible.
+    parts : QSplitter
+        The views.
     bar : QHBoxLayout
         The row of buttons above the views; a page may add more at its end.
     """
@@ -172,7 +174,7 @@ class Stage(QWidget):
             )
             for row in ROWS
         ]
-        parts = splitter(
+        self.parts = splitter(
             Qt.Orientation.Vertical,
             *((row, 3) for row in self._rows),
             (self.section, 2),
@@ -188,7 +190,7 @@ class Stage(QWidget):
         if self._beside is not None:
             self.bar.addWidget(self._button("maximised", tr("Maximise"), "F", "maximise"))
         self.surface.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        vbox(self.bar, (parts, 1), of=self, margins=0, spacing=0)
+        vbox(self.bar, (self.parts, 1), of=self, margins=0, spacing=0)
 
     def _button(self, key: str, text: str, keys: str, icon_name: str = "") -> QToolButton:
         name, choose = f"{self._page}.show_{key}", partial(self._choose, key)

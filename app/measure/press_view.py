@@ -119,7 +119,7 @@ class PressView(QWidget):
             on_records=on_records,
         )
         idle = tr("Place a tool, or detect the object. Press Space for the next object.")
-        self.banner = Banner(jobs, idle=idle, on_act=self._on_act)
+        self.banner = Banner(jobs, idle=idle, on_act=self._on_act, over=self.stage.parts)
         self.replay = ReplayBar("measure", self._on_replayed)
         self._lay_out()
         self._connect()
