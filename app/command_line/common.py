@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from functools import partial
 from math import inf
 
-from tqdm import tqdm
-
 from app.command_line.options import option
 from app.command_line.terminal import harmless
 from app.services.kept import kept_in_file
@@ -45,6 +43,8 @@ def tolerances(stated: tuple[float, float] | None) -> tuple[float, float]:
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, float], None]]:
     """Show a progress bar on stderr. Yield the function that gets a stage and its progress."""
+    from tqdm import tqdm  # slow to import
+
     with tqdm(total=100, file=sys.stderr, bar_format="{desc:<24}{bar:30}{n:4.0f} %") as bar:
 
         def report(stage: str, share: float) -> None:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, spline_filter
 from scipy.special import kv
 
+from gelpolight_core.measurement.interpolation import between_nodes
+
 Array = NDArray[np.float64]
 
 _WEDGE = 1.5 * np.pi
@@ -58,7 +60,7 @@ def corner_drape(x: Array, y: Array, *, edge: float = 0.0, rounding: float = 0.0
     angle = np.abs(np.arctan2(y - x, x + y))
     row = np.minimum(radius / _REACH, 1.0) ** (2.0 / 3.0) * (_FINER * (_RADII - 1))
     column = np.minimum(angle / (_WEDGE / 2.0), 1.0) * (_FINER * (_ANGLES - 1))
-    depth = map_coordinates(_table(), [row, column], order=1, mode="nearest")
+    depth = between_nodes(_table(), row, column)
     straight = np.exp(-np.clip(np.maximum(x, y), 0.0, _REACH))
     far = np.where((x > 0.0) & (y > 0.0), 0.0, straight)
     drape = np.clip(np.where(radius < _REACH, depth, far), 0.0, 1.0)

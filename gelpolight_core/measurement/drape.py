@@ -12,7 +12,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.optimize import brentq
 from scipy.special import k0e, k1e
 
 from gelpolight_core.measurement.corner import corner_drape, fillet_rounding
@@ -172,8 +171,7 @@ def ball_contact_radius_mm(*, ball_radius_mm: float, height_mm: float, decay_mm:
         depth = height_mm - ball_radius_mm * (1.0 - math.cos(angle))
         return math.sin(angle) - math.cos(angle) * depth * _radial_steepness(radius, decay_mm)
 
-    angle = brentq(excess, 1e-9, math.pi / 2.0, xtol=1e-12)
-    return ball_radius_mm * math.sin(float(angle))
+    return ball_radius_mm * math.sin(_root(excess, 1e-9))
 
 
 def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:
@@ -212,11 +210,23 @@ def _edge_contact(
         depth = height_mm - edge_mm * (1.0 - math.cos(angle))
         return math.sin(angle) - math.cos(angle) * depth * steepness(position)
 
-    angle = float(brentq(excess, 0.0, math.pi / 2.0, xtol=1e-12))
+    angle = _root(excess, 0.0)
     return (
         face_mm - edge_mm * (1.0 - math.sin(angle)),
         height_mm - edge_mm * (1.0 - math.cos(angle)),
     )
+
+
+def _root(excess: Callable[[float], float], low: float) -> float:
+    """Return the angle up to a right one at which a function changes its sign (Illinois method)."""
+    other, angle = low, math.pi / 2.0
+    before, now = excess(other), excess(angle)
+    while now != 0.0 and abs(step := now * (angle - other) / (now - before)) > 1e-12:
+        new = excess(angle - step)
+        # The older end stays where it is needed to enclose the root, with half of its weight.
+        other, before = (angle, now) if new * now < 0.0 else (other, 0.5 * before)
+        angle, now = angle - step, new
+    return angle
 
 
 def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.optimize import least_squares
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.area import Rectangle
@@ -108,9 +107,9 @@ def fit_circle(points_mm: Array) -> FittedCircle:
     def distance(p: Array) -> Array:
         return np.asarray(np.hypot(points[:, 0] - p[0], points[:, 1] - p[1]) - p[2])
 
-    found = least_squares(distance, start, loss="soft_l1", f_scale=_scale(distance(start)))
-    x, y, radius = map(float, found.x)
-    left = distance(found.x)
+    found = _fitted(distance, start)
+    x, y, radius = map(float, found)
+    left = distance(found)
     if not math.isfinite(radius) or radius > 100.0 * float(np.ptp(points, axis=0).max()):
         raise _no_circle()
     rms = math.sqrt(float(np.mean(left**2)))
@@ -274,8 +273,16 @@ def _robust_line(x: Array, y: Array) -> tuple[float, float]:
         return np.asarray(y - p[0] * x - p[1])
 
     start = np.array([0.0, float(np.median(y))])
-    found = least_squares(distance, start, loss="soft_l1", f_scale=_scale(distance(start)))
-    return float(found.x[0]), float(found.x[1])
+    slope, level = _fitted(distance, start)
+    return float(slope), float(level)
+
+
+def _fitted(distance: Callable[[Array], Array], start: Array) -> Array:
+    """Return the parameters of a robust fit."""
+    from scipy.optimize import least_squares  # slow to import
+
+    fit = least_squares(distance, start, loss="soft_l1", f_scale=_scale(distance(start)))
+    return np.asarray(fit.x)
 
 
 def _algebraic_circle(points: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
-from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.measurement.measure import PressedMap, measure_object, pressed_map
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Measurement
@@ -57,8 +57,9 @@ def measure_heightmap(
         the height map is doubtful, the reason comes first: it may be why nothing was found.
     """
     try:
+        pressed = pressed_map(heightmap)
         if shape == AUTO:
-            shape = _found_shape(heightmap, seed_mm)
+            shape = _found_shape(heightmap, seed_mm, pressed)
         mode, reach_mm = mode_error(heightmap), TYPICAL_DECAY_MM
         return measure_object(
             heightmap,
@@ -68,6 +69,7 @@ def measure_heightmap(
             reach_mm=reach_mm,
             edge_radius_mm=edge_radius_mm,
             edge_radius_sd_mm=edge_radius_sd_mm,
+            pressed=pressed,
         )
     except InputError as error:
         for doubt in heightmap.doubts:
@@ -76,9 +78,9 @@ def measure_heightmap(
         raise
 
 
-def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:
+def _found_shape(heightmap: HeightMap, seed_mm: Point | None, pressed: PressedMap) -> str:
     """Return the shape that is pressed."""
-    proposal = propose(heightmap, seed_mm=seed_mm)
+    proposal = propose(heightmap, seed_mm=seed_mm, pressed=pressed)
     if proposal is not None and len(proposal.candidates) == 1:
         return proposal.candidates[0]
     if proposal is None:

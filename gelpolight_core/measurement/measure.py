@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -75,6 +76,7 @@ def measure_object(
     reach_mm: float = 0.0,
     edge_radius_mm: float | None = None,
     edge_radius_sd_mm: float | None = None,
+    pressed: PressedMap | None = None,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane; its drape is fitted, too.
 
@@ -97,6 +99,8 @@ def measure_object(
         Stated fillet of the edge of a cylinder or cuboid; by default it is fitted.
     edge_radius_sd_mm : float, optional
         Its standard uncertainty; by default a tenth of it, at least 0.01 mm.
+    pressed : PressedMap, optional
+        Of the height map, if it is known.
 
     Raises
     ------
@@ -110,7 +114,8 @@ def measure_object(
             tr("shape"),
             Remedy.ONE_OF.format(names=", ".join(SHAPES)),
         )
-    window, region, prior = find_object(heightmap, seed_mm, reach_mm=reach_mm, mode=mode)
+    pressed = pressed or pressed_map(heightmap)
+    window, region, prior = find_object(pressed, seed_mm, reach_mm=reach_mm, mode=mode)
     if shape == "ball" and mode is not None and mode.smoothed_mm2:
         window = replace(window, depth_mm=_sharpened(window, mode.smoothed_mm2))
     model = MODELS[shape]
@@ -160,8 +165,28 @@ def _sharpened(window: WindowData, smoothed_mm2: float) -> Array:
     return np.asarray(window.depth_mm - 0.5 * smoothed_mm2 / window.pitch_mm**2 * bend)
 
 
+class PressedMap(NamedTuple):
+    """The usable part of a height map, and what is pressed there.
+
+    Attributes
+    ----------
+    depth_mm, weight : (rows, columns)
+        Depth, 0 where it is not usable, and its weight in [0, 1].
+    x_mm, y_mm : (columns,), (rows,)
+        The grid.
+    regions : list of PressedRegion
+        The bumps, tallest first.
+    """
+
+    depth_mm: Array
+    x_mm: Array
+    y_mm: Array
+    weight: Array
+    regions: list[PressedRegion]
+
+
 def find_object(
-    heightmap: HeightMap,
+    pressed: PressedMap,
     seed_mm: tuple[float, float] | None = None,
     *,
     reach_mm: float = 0.0,
@@ -171,7 +196,9 @@ def find_object(
 
     Parameters
     ----------
-    heightmap, seed_mm, reach_mm, mode
+    pressed : PressedMap
+        The map.
+    seed_mm, reach_mm, mode
         As for :func:`measure_object`.
 
     Raises
@@ -179,12 +206,11 @@ def find_object(
     InputError
         As :func:`measure_object`, but for the shape.
     """
-    depth, x, y, weight = usable_depth(heightmap)
+    depth, x, y, weight, regions = pressed
     if min(weight.shape) < 8 or not weight.any():
         raise InputError(
             tr("no pixel is usable"), tr("depth map"), tr("Check the image and the working area")
         )
-    regions = find_pressed_regions(depth, x, y, weight > 0.0)
     region = _chosen_region(regions, x, y, seed_mm)
     if region.cut:
         raise InputError(
@@ -204,14 +230,15 @@ def find_object(
     return window, region, edge
 
 
-def usable_depth(heightmap: HeightMap) -> tuple[Array, Array, Array, Array]:
-    """Return depth (0 where it is not usable), x, y, and weights in [0, 1]."""
+def pressed_map(heightmap: HeightMap) -> PressedMap:
+    """Return the usable part of a height map, and what is pressed there."""
     x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
     outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
     weight = np.where(heightmap.flags != 0, DOUBTFUL_WEIGHT, 1.0)
     weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
     depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
-    return depth, x, y, weight
+    regions = find_pressed_regions(depth, x, y, weight > 0.0) if weight.any() else []
+    return PressedMap(depth, x, y, weight, regions)
 
 
 def _chosen_region(

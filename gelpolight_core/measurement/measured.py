@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
+from gelpolight_core.measurement.interpolation import between_nodes
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
@@ -150,9 +150,8 @@ def noise_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
     assert heightmap.noise_mm is not None
     factor = round(heightmap.x_mm.size / heightmap.noise_mm.shape[2])
     column, row = index_of(heightmap, x_mm, y_mm)
-    position = (np.stack([row, column]) - 0.5 * (factor - 1)) / factor
-    read = partial(map_coordinates, coordinates=position, order=1, mode="nearest")
-    return np.array([read(example, output=np.float64) for example in heightmap.noise_mm])
+    row, column = ((at - 0.5 * (factor - 1)) / factor for at in (row, column))
+    return between_nodes(heightmap.noise_mm, row, column)
 
 
 def measured(

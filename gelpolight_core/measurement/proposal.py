@@ -8,8 +8,8 @@ import numpy as np
 
 from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL, residuals_of
 from gelpolight_core.measurement.indenter import MODELS
-from gelpolight_core.measurement.measure import find_object, usable_depth
-from gelpolight_core.measurement.segmentation import PressedRegion, find_pressed_regions
+from gelpolight_core.measurement.measure import PressedMap, find_object, pressed_map
+from gelpolight_core.measurement.segmentation import PressedRegion
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -29,7 +29,12 @@ class Proposal:
     at_mm: tuple[float, float]
 
 
-def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None) -> Proposal | None:
+def propose(
+    heightmap: HeightMap,
+    *,
+    seed_mm: tuple[float, float] | None = None,
+    pressed: PressedMap | None = None,
+) -> Proposal | None:
     """Return the pressed indenter; None if there is none, or another shape.
 
     All three are fitted with their drape. The best one is returned if its residual is at most 6 %
@@ -42,20 +47,20 @@ def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None)
         The map.
     seed_mm : (float, float), optional
         A point on the object. Default: the tallest object.
+    pressed : PressedMap, optional
+        Of the height map, if it is known.
 
     Raises
     ------
     InputError
-        If a seed is given and no object is there, or no part of the map is usable.
+        If a seed is given and no object is there.
     """
-    depth, x, y, weight = usable_depth(heightmap)
-    if not weight.any():
-        return None
-    regions = find_pressed_regions(depth, x, y, weight > 0.0)
+    pressed = pressed or pressed_map(heightmap)
+    regions = pressed.regions
     if not regions or (seed_mm is None and regions[0].cut):
         return None
     seed_mm = seed_mm or _point_on(regions[0], heightmap)
-    window, region, edge = find_object(heightmap, seed_mm)
+    window, region, edge = find_object(pressed, seed_mm)
     residual = residuals_of(MODELS, window, region, edge)
     best, second, _ = sorted(residual, key=lambda shape: residual[shape])
     if residual[best] > POOR_RESIDUAL * region.height_mm:

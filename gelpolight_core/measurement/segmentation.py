@@ -62,12 +62,13 @@ def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
     valid : (rows, columns) bool
         Where it may be used.
     """
-    values = np.sort(depth_mm[valid])
-    low = values[: np.searchsorted(values, np.median(values) + 0.2 * np.ptp(values), "right")]
+    values = depth_mm[valid]
+    middle, lowest, extent = np.median(values), values.min(), np.ptp(values)
+    low = values[values <= middle + 0.2 * extent]
     level = float(np.median(low))
-    if np.median(values) > values[0] + 0.05 * np.ptp(values):
+    if middle > lowest + 0.05 * extent:
         # An object and its drape can cover most of the map: the ground is the most frequent depth.
-        low = values[: max(values.size // 2, 1)]
+        low = np.sort(values)[: max(values.size // 2, 1)]
         half = max(low.size // 2, 1)
         start = int(np.argmin(low[half - 1 :] - low[: low.size - half + 1]))
         level = float(np.median(low[start : start + half]))

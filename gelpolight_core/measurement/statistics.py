@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gelpolight_core.translation import tr
 
@@ -67,7 +67,7 @@ class Statistics:
         ISO 5725-6, 4.1: the repeatability limit, 2.8 standard deviations. The difference of two
         has sqrt(2) times the standard deviation of one.
         """
-        return float(norm.ppf(0.975)) * math.sqrt(2.0) * self.sd
+        return float(ndtri(0.975)) * math.sqrt(2.0) * self.sd
 
     def as_json(self, unit: str) -> dict[str, float | None]:
         """Return plain values, their names with a unit; None instead of NaN."""

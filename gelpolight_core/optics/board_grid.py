@@ -8,7 +8,6 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from gelpolight_core.optics.crossings import Crossings, fit_crossings
 
@@ -134,6 +133,8 @@ def grid_misfit_px(
     """
     centre = 0.5 * (np.array(size) - 1.0)
     scale = 0.5 * max(size)
+
+    from scipy.optimize import least_squares  # slow to import
 
     def misfit(values: Array) -> Array:
         h = np.append(values[:8], 1.0).reshape(3, 3)

@@ -7,6 +7,7 @@ interpolated only once. An inverse table leaves no holes and merges no pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -93,6 +94,7 @@ class ResamplingTable:
         )
 
 
+@lru_cache(maxsize=1)
 def build_resampling_table(
     camera: Camera,
     plane: TopPlane,

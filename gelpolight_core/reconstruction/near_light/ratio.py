@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import convolve2d
+from scipy.ndimage import convolve
 
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
@@ -216,7 +216,7 @@ def inverse_of_blur(blur2: float) -> Map:
     """
     across = np.array([[0.0, 1.0, 0.0], [1.0, -4.0, 1.0], [0.0, 1.0, 0.0]])
     first, share = np.pad(across, 1), 0.5 * blur2
-    second = convolve2d(across, across)
+    second = convolve(first, across, mode="constant")
     kernel = -share * first + 0.5 * share**2 * second
     kernel[2, 2] += 1.0
     return np.asarray(kernel, np.float32)

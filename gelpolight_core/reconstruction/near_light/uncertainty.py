@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate2d
+from scipy.ndimage import correlate
 
 from gelpolight_core.light.contact import ContactLight
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -427,7 +427,7 @@ def _variance_gain(kernel: Map, resampled: int) -> float:
     tent = np.array([1.0, 4.0, 1.0]) / 6.0
     line = tent if resampled == 1 else np.convolve(tent, tent)
     shared = np.outer(line, line)
-    own = correlate2d(kernel, kernel)
+    own = correlate(np.pad(kernel, len(kernel) // 2), kernel, mode="constant")
     middle, reach = len(own) // 2, len(line) // 2
     near = own[middle - reach : middle + reach + 1, middle - reach : middle + reach + 1]
     return float((near * shared).sum() / shared[reach, reach])
