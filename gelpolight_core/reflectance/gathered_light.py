@@ -149,13 +149,14 @@ def _facets(
     rows : (int, int), optional
         Tiles that are needed, first and last + 1; the others emit nothing.
     """
-    parts = [np.ascontiguousarray(part, np.float32) for part in surface]
-    tiles = [-(-n // WIDE) for n in parts[0].shape[:2]]
+    points, normals, view, seen = (np.ascontiguousarray(part, np.float32) for part in surface)
+    tiles = [-(-n // WIDE) for n in points.shape[:2]]
     made = np.zeros((*tiles, _PLANES, _TILE), np.float32)
     first, last = rows or (0, tiles[0])
     lobe = _single(membrane.gloss), _single(membrane.roughness**2)
-    leds = np.asarray(leds_mm, np.float32)
-    emit_rows(max(first, 0), min(last, tiles[0]), *parts, leds, lobe, _single(side_mm**2), made)
+    leds, area = np.asarray(leds_mm, np.float32), _single(side_mm**2)
+    first, last = max(first, 0), min(last, tiles[0])
+    emit_rows(first, last, points, normals, view, seen, leds, lobe, area, made)
     return made
 
 

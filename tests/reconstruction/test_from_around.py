@@ -7,10 +7,11 @@ import pytest
 
 from gelpolight_core.reconstruction.near_light.from_around import (
     CLEAR,
-    clear_rows,
+    clearance,
     with_surroundings,
 )
 from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
+from gelpolight_core.reconstruction.threads import RowWorkers
 
 NODES, PITCH = 120, 0.1
 AXIS = (PITCH * (np.arange(NODES) - NODES / 2)).astype(np.float32)
@@ -23,9 +24,7 @@ def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches() -> N
     depth = np.ascontiguousarray(np.repeat(ridge[:, None], NODES, axis=1))
     x, y = np.meshgrid(AXIS, AXIS)
     points = np.stack([x, y, -depth], axis=-1).astype(np.float32)
-    clear = np.empty((3, NODES, NODES), np.float32)
-    place = (AXIS[0], AXIS[0], np.float32(PITCH))
-    clear_rows(0, NODES, points, depth, place, LEDS, np.float32(height), clear)
+    clear = clearance(points, depth, (AXIS[0], AXIS[0], np.float32(PITCH)), LEDS, RowWorkers(1))
     # The first LED is at y = 10 and 10 deep: at the ridge's edge, y = -1, its rays rise by
     # (10 - 0.8) / 11 of their way, so that the shadow ends 0.8 * 11 / 9.2 mm behind it.
     ends = -1.0 - height * 11.0 / (10.0 - height)

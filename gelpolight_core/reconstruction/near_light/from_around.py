@@ -6,6 +6,8 @@ the membrane is flat, and looks as in the background.
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +34,9 @@ CLEAR = 0.015
 """A light is hidden if the slope between its ray and the surface is less than this: an LED of 0.2
 mm, 10 to 14 mm away, is then about half hidden."""
 PLACING = 6
-FIRST_STEP, STEP = 1.5, 0.75
-"""Nodes along a ray to a light, between those at which the surface is compared with it."""
+FIRST_STEP, STEP, SKIP = 1.5, 0.75, 6
+"""Nodes along a ray to a light, between those at which the surface is compared with it; and how
+many are skipped where the surface around is too low to hide the light."""
 
 GUIDE_NODES, GUIDE_SD, MOST_GUIDE = 1, 0.03, 4.0
 """Window around a node for this guidance, the noise of the image, and the highest press over
@@ -146,14 +149,36 @@ class FromAround:
         per_pitch = single(1.0 / scale.pitch_mm)
         slope = np.moveaxis(self._ray_slope, -1, 0) * per_pitch
         place = meeting(depth, np.stack([columns, rows]), -slope)
-        seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR))
+        seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR), np.float32)
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
-        clear = np.empty((3, *points.shape[:2]), np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
         origin = (single(scale.x_mm), single(scale.y_mm), single(scale.pitch_mm))
-        deepest = single(seen.max())
-        self._workers.run(len(points), clear_rows, points, seen, origin, leds, deepest, clear)
-        return clear
+        return clearance(points, seen, origin, leds, self._workers)
+
+
+def clearance(
+    points_mm: Map, depth_mm: Map, place: tuple[Any, Any, Any], leds_mm: Map, workers: RowWorkers
+) -> Map:
+    """Return the least slope (3, rows, columns) between a surface and the rays to the lights.
+
+    Parameters
+    ----------
+    points_mm : (rows, columns, 3) float32
+        From which the rays start.
+    depth_mm : (whole rows, whole columns) float32
+        The surface at true positions.
+    place : 3 of float32
+        First node of `depth_mm` (x, y), and the distance between its nodes.
+    leds_mm : (3, 3) float32
+        Sensor frame.
+    workers : RowWorkers
+        Threads.
+    """
+    clear = np.empty((3, *points_mm.shape[:2]), np.float32)
+    around = cv2.dilate(depth_mm, np.ones((2 * SKIP + 3,) * 2, np.uint8))
+    surface = (points_mm, depth_mm, around, place, leds_mm, single(depth_mm.max()))
+    workers.run(len(points_mm), clear_rows, *surface, clear)
+    return clear
 
 
 def meeting(depth_mm: Map, home: Map, slope: Map) -> Map:
@@ -273,7 +298,7 @@ def surface_normals(
 
 
 @whole
-def clear_rows(first, last, points, depth, place, leds, deepest, clear):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def clear_rows(first, last, points, depth, around, place, leds, deepest, clear):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find how far the rays from points to the lights clear the surface, rows `first` to `last`.
 
     Parameters
@@ -282,6 +307,8 @@ def clear_rows(first, last, points, depth, place, leds, deepest, clear):  # type
         Of the surface.
     depth : (whole rows, whole columns) float32
         At true positions.
+    around : (whole rows, whole columns) float32
+        The deepest of `depth` within `SKIP` nodes, and one more.
     place : tuple
         First node of `depth` (x, y), and the distance between its nodes.
     leds : (3, 3) float32
@@ -309,6 +336,9 @@ def clear_rows(first, last, points, depth, place, leds, deepest, clear):  # type
                     if x < none or y < none or x > columns - one or y > rows - one:
                         break
                     m, n = min(int(y), rows - 2), min(int(x), columns - 2)
+                    if fall > most and around[m, n] < d + (fall - most) * t:
+                        t += single(SKIP) * pitch
+                        continue
                     fx, fy = x - single(n), y - single(m)
                     up = depth[m, n] + fx * (depth[m, n + 1] - depth[m, n])
                     low = depth[m + 1, n] + fx * (depth[m + 1, n + 1] - depth[m + 1, n])
