@@ -54,3 +54,12 @@ def test_the_papers_model_leaves_out_an_untouched_image_and_no_visible_press(
     assert ("integration" in reconstruct.needs(frame).done) is pressed
     assert bool(height_map.depth_mm.any()) is pressed
     assert height_map.depth_mm.max() == pytest.approx(share * visible_mm, abs=0.015)
+
+
+@pytest.mark.parametrize(("noise", "done"), [(0.001, False), (0.03, True)])
+def test_half_scale_is_denoised_only_where_its_nodes_are_noisy(noise: float, done: bool) -> None:
+    known = known_sensor(matt_design(0.25))
+    data = replace(known.calibration.data, noise=np.full(3, noise))
+    frame = known.noisy(known.pressed(Cylinder(3.0, 0.6), samples=1).frame)
+    solved = NearLightSolver(data, workers=2).depth(frame, Wanted("balanced"))
+    assert ("denoising" not in solved.trace.left_out) is done

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import cv2
@@ -13,7 +14,7 @@ from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.height_map import COARSE
-from gelpolight_core.reconstruction.near_light.denoise import quieted
+from gelpolight_core.reconstruction.near_light.denoise import CALM, quieted
 from gelpolight_core.reconstruction.near_light.maps import SensorMaps, light_levels
 from gelpolight_core.reconstruction.near_light.sampling import BEYOND_FINITE, halve, sample_rows
 from gelpolight_core.reconstruction.near_light.structures import RatioImage, Region
@@ -105,8 +106,8 @@ class PressSampler:
         unmix = self._unmix if gain is None else _as_rows(self._inverse / gain)
         sampled = self._sampled(raw, region, at, linear, terms, unmix)
         edge = None
-        if factor == 1 and terms.denoising:
-            edge = quieted(sampled, self._noise(1), self._workers, self._take)
+        if terms.denoising and (factor == 1 or (factor == 2 and self._noisy)):
+            edge = quieted(sampled, self._noise(at), self._workers, self._take)
         kernel = None
         if terms.sharpening:
             blur2 = self._blur2 if at == 1 else self._blur2 + HALVING
@@ -152,6 +153,13 @@ class PressSampler:
         """Return the noise of press minus background; a node averages `factor` pixels squared."""
         sd = self.maps.calibration.noise / np.sqrt(2.0) / factor
         return tuple(np.float32(s) for s in sd)
+
+    @cached_property
+    def _noisy(self) -> bool:
+        """Whether averages over 2 x 2 pixels are noisy at the darker end of the background."""
+        light = self.maps.full.background[self.maps.usable][::64]
+        dark = np.percentile(light, 10.0, axis=0) if len(light) else np.ones(3)
+        return bool((np.array(self._noise(2)) > CALM * dark).any())
 
     def _image(self, shape: tuple[int, int], name: str) -> RatioImage:
         planes = [self._take(f"{part} {name}", (3, *shape)) for part in ("ratio", "noise")]

@@ -342,7 +342,7 @@ class NearLightSolver(OpenSolver):
                 tr("conjugate gradients, rounds: {n}").format(n=solved.integration_rounds)
             )
         self._left_out(record, factor, terms)
-        if factor == 1 and terms.denoising and found.edge is None:
+        if factor < COARSE and terms.denoising and found.edge is None:
             record.left_out(tr("denoising"), tr("the image has almost no noise"))
         if start.boundary.free is None:
             record.left_out(tr("free boundary"), tr("no contact crosses the boundary"))
@@ -379,10 +379,11 @@ class NearLightSolver(OpenSolver):
     def _left_out(self, record: TraceRecorder, factor: int, terms: Terms) -> None:
         """Note what the scale, the membrane and the terms leave out."""
         if factor > 1:
-            record.left_out(tr("denoising"), tr("averages over 2 x 2 pixels have half the noise"))
             record.left_out(LAST_ROUND[1], tr("this effort does not use it"))
-        elif not terms.denoising:
+        if not terms.denoising:
             record.left_out(tr("denoising"), tr("switched off"))
+        elif factor == COARSE:
+            record.left_out(tr("denoising"), tr("averages over 4 x 4 pixels have little noise"))
         if self.maps.membrane.interreflection is None:
             record.left_out(tr("interreflection"), tr("this membrane has none"))
         if self.maps.membrane.gloss is None:
