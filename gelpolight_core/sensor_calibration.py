@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from gelpolight_core.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
+from gelpolight_core.factors.background import LEAST_FACTOR
 from gelpolight_core.finding import Finding, QualityTable, Verdict, calibration_fault, worst_verdict
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.masks import saturated
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane

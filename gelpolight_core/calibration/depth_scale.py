@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.parallel import in_parallel, usable_cores
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.from_around import LEVEL_NZ, surface_normals
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
@@ -75,7 +76,7 @@ def ball_height_error(
         Poses from the joint refinement.
     """
     assert calibration.full is not None
-    solver = NearLightSolver(calibration, workers=1)
+    solver = NearLightSolver(calibration, workers=usable_cores())
     points, errors = calibration.table.grid.points_mm(), []
     for rgb, ball in zip(images, balls, strict=True):
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
@@ -127,16 +128,14 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
     field, depth, plateau = synthetic_press(full, table)
     height = np.median(depth[plateau])
     sizes, directions = np.linalg.eigh(covariance)
-    share = 0.0
-    for size, direction in zip(sizes, directions.T, strict=True):
-        step = np.sqrt(max(float(size), 0.0)) * direction
-        if np.abs(step).max() < LEAST_STEP:
-            continue
-        ends = [
-            found_depth(_moved(full, sign * step), field, depth)[plateau] for sign in (1.0, -1.0)
-        ]
-        share += float((np.median(ends[0]) - np.median(ends[1])) / (2.0 * height)) ** 2
-    return float(np.sqrt(share))
+    steps = (np.sqrt(np.maximum(sizes, 0.0)) * directions).T
+    steps = steps[np.abs(steps).max(axis=1) >= LEAST_STEP]
+
+    def found_mm(step: Array) -> float:
+        return float(np.median(found_depth(_moved(full, step), field, depth)[plateau]))
+
+    ends = np.reshape(list(in_parallel(found_mm, [*steps, *-steps])), (2, -1))
+    return float(np.linalg.norm((ends[0] - ends[1]) / (2.0 * height)))
 
 
 class SyntheticPress(NamedTuple):

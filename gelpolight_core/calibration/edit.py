@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.factors.background import flat_cosines
+from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
 from gelpolight_core.sensor_calibration import Calibration, HandEdit

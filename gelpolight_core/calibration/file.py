@@ -95,7 +95,7 @@ def write_calibration(
     manifest_sum = hashlib.sha256(text).hexdigest().encode()
 
     def write(stream: BinaryIO) -> None:
-        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for name, data in (
                 (MANIFEST, text),
                 (f"{MANIFEST}.sha256", manifest_sum),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import QualityTable, judge
-from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.radiance.whiteboard import RadianceResult
@@ -37,22 +37,6 @@ class FactorResult:
     factors: Map
     usable: NDArray[np.bool_]
     quality: QualityTable
-
-
-def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
-    """Return cos(theta_k) (rows, columns, 3) on the undeformed membrane.
-
-    Parameters
-    ----------
-    table : ResamplingTable
-        Table with the membrane grid.
-    led_positions_mm : (3, 3)
-        Sensor frame.
-    """
-    points = table.grid.points_mm()
-    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
-    directions, _ = light_directions(led_positions_mm, at_top)
-    return np.asarray(-directions[..., 2])
 
 
 def calibrate_factors(

@@ -13,6 +13,7 @@ from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -181,6 +182,22 @@ def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, 
     towards = led_positions_mm - np.asarray(points_mm)[..., None, :]
     distances = np.sqrt(np.einsum("...c,...c->...", towards, towards))
     return towards / distances[..., None], distances
+
+
+def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
+    """Return cos(theta_k) (rows, columns, 3) on the undeformed membrane.
+
+    Parameters
+    ----------
+    table : ResamplingTable
+        Table with the membrane grid.
+    led_positions_mm : (3, 3)
+        Sensor frame.
+    """
+    columns, rows = table.grid.x_mm, table.grid.y_mm
+    across2 = [np.add.outer((rows - y) ** 2, (columns - x) ** 2) for x, y, _ in led_positions_mm]
+    height = led_positions_mm[:, 2]
+    return np.asarray(-height / np.sqrt(np.stack(across2, axis=-1) + height**2))
 
 
 def direction_condition(led_positions_mm: Array, points_mm: Array) -> float:

@@ -145,6 +145,8 @@ def _fit_shapes(
 def _cut_windows(grey: NDArray[np.float32], base: Array, radius: Array) -> _Window:
     reach = math.ceil(float(radius.max()))
     y, x = (a.ravel().astype(np.float64) for a in np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    near = x * x + y * y <= radius.max() ** 2
+    x, y = x[near], y[near]
     u = base[:, :1] + x
     v = base[:, 1:] + y
     inside = (u >= 0) & (v >= 0) & (u < grey.shape[1]) & (v < grey.shape[0])

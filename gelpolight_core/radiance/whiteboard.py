@@ -12,7 +12,7 @@ from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
-from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.session.images import require_colour
@@ -83,13 +83,10 @@ def calibrate_radiance(
     where = f"whiteboard/{whiteboard.name}"
     require_colour(whiteboard, where=where)
     image = table.apply(whiteboard.rgb)
-    points = table.grid.points_mm()
-    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
-    directions, distances = light_directions(led_positions_mm, at_top)
-    cosines = -directions[..., 2]
+    cosines = flat_cosines(table, led_positions_mm)
     # A Lambertian LED facing the membrane: the lobe is the cosine of the same angle, as the faces
-    # are parallel.
-    law = cosines / distances**2
+    # are parallel. The distance is the height over the cosine.
+    law = cosines * cosines * cosines / led_positions_mm[:, 2] ** 2
     saturated = (image >= SATURATED).any(axis=2) & table.valid
     _refuse_hopeless(image, saturated, table.valid, where)
     sigma_px = SMOOTHING_MM / table.grid.pitch_mm

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,18 +157,21 @@ def refine_centre(
         [pixels.ray_slope, np.full_like(pixels.ray_slope[..., :1], -1.0)], axis=-1
     )
     view /= np.linalg.norm(view, axis=-1, keepdims=True)
-    up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
+    on_flat = _cosines(flat_light, np.broadcast_to([0.0, 0.0, -1.0], flat.shape), view)
     weight = pixels.weight
 
-    def model(parameters: Array) -> Array:
-        pose = BallPose(
-            (float(parameters[0]), float(parameters[1])), start.radius_mm, start.depth_mm
-        )
+    @lru_cache(maxsize=4)  # most derivatives leave the ball where it is
+    def seen(x_mm: float, y_mm: float) -> tuple[Array, tuple[Array, Array]]:
+        pose = BallPose((x_mm, y_mm), start.radius_mm, start.depth_mm)
         surface, normals = ball_surface(pixels.points_mm, pixels.ray_slope, pose)
         light, distance = light_directions(led_positions_mm, surface)
         gain = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
-        lit = _blend(light, normals, view, parameters[2:])
-        return np.asarray(gain * lit / _blend(flat_light, up, view, parameters[2:]))
+        return gain, _cosines(light, normals, view)
+
+    def model(parameters: Array) -> Array:
+        gain, cosines = seen(float(parameters[0]), float(parameters[1]))
+        lit, flat_lit = (_blend(at, parameters[2:]) for at in (cosines, on_flat))
+        return np.asarray(gain * lit / flat_lit)
 
     def residual(parameters: Array) -> Array:
         error = np.nan_to_num((model(parameters) - pixels.ratio) * weight, nan=10.0)
@@ -194,13 +198,18 @@ def refine_centre(
     return pose, relative, float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2]).max()))
 
 
-def _blend(light: Array, normals: Array, view: Array, shape: Array) -> Array:
+def _cosines(light: Array, normals: Array, view: Array) -> tuple[Array, Array]:
+    """Return the cosines (N, 3) of the light and of the half vector to the normals."""
+    cosine = np.clip(np.einsum("nkc,nc->nk", light, normals), 1e-3, 1.0)
+    half = light + view[:, None, :]
+    length = np.sqrt(np.einsum("nkc,nkc->nk", half, half))
+    return cosine, np.clip(np.einsum("nkc,nc->nk", half, normals) / length, 0.0, 1.0)
+
+
+def _blend(cosines: tuple[Array, Array], shape: Array) -> Array:
     """Return the brightness (N, 3) of a diffuse and glossy membrane.
 
     `shape` is (exponent of cos, glossy share, exponent of the half-vector cosine).
     """
-    cosine = np.clip(np.einsum("nkc,nc->nk", light, normals), 1e-3, 1.0)
-    half = light + view[:, None, :]
-    half /= np.linalg.norm(half, axis=-1, keepdims=True)
-    glossy = np.clip(np.einsum("nkc,nc->nk", half, normals), 0.0, 1.0) ** shape[2]
-    return np.asarray((1.0 - shape[1]) * cosine ** shape[0] + shape[1] * glossy)
+    diffuse, glossy = cosines[0] ** shape[0], cosines[1] ** shape[2]
+    return np.asarray((1.0 - shape[1]) * diffuse + shape[1] * glossy)

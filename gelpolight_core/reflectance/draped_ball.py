@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import k0e, k1e
+from scipy.special import k0, k1
 
 from gelpolight_core.reflectance.ball import BallPose, contact_radius_from_depth
 
@@ -42,27 +42,25 @@ def draped_ball(
     radius = pose.radius_mm
     contact = contact_radius_from_depth(pose.depth_mm, radius, decay_mm=decay_mm)
     ring = pose.depth_mm - radius + np.sqrt(radius**2 - contact**2)
-    scale = k0e(contact / decay_mm)
-    centre = np.asarray(pose.centre_mm)
+    share = ring / k0(contact / decay_mm)
+    x, y = np.ascontiguousarray((points_mm - pose.centre_mm).T)
+    slope_x, slope_y = np.ascontiguousarray(ray_slope.T)
 
     def profile(r: Array) -> Array:
-        outside = np.maximum(r, contact)
-        inside = np.minimum(r, contact)
-        drape = ring * k0e(outside / decay_mm) / scale * np.exp((contact - outside) / decay_mm)
-        ball = pose.depth_mm - radius + np.sqrt(radius**2 - inside**2)
-        return np.where(r < contact, ball, drape)
+        depth = pose.depth_mm - radius + np.sqrt(radius**2 - np.minimum(r, contact) ** 2)
+        free = r >= contact
+        depth[free] = share * k0(r[free] / decay_mm)
+        return depth
 
     depth = np.full(len(points_mm), 0.5 * pose.depth_mm)
     for _ in range(ROUNDS):  # each round shrinks the error by slope times ray slope, about a tenth
-        away = points_mm + depth[:, None] * ray_slope - centre
-        depth = profile(np.hypot(away[:, 0], away[:, 1]))
+        depth = profile(np.hypot(x + depth * slope_x, y + depth * slope_y))
     position = points_mm + depth[:, None] * ray_slope
-    away = position - centre
+    away = position - pose.centre_mm
     r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
-    outside, inside = np.maximum(r, contact), np.minimum(r, contact)
-    drape = -ring / decay_mm * k1e(outside / decay_mm) / scale
-    drape *= np.exp((contact - outside) / decay_mm)
-    slope = np.where(r < contact, -inside / np.sqrt(radius**2 - inside**2), drape)
+    free, inside = r >= contact, np.minimum(r, contact)
+    slope = -inside / np.sqrt(radius**2 - inside**2)
+    slope[free] = -share / decay_mm * k1(r[free] / decay_mm)
     normals = np.concatenate([-slope[:, None] * away / r[:, None], -np.ones((len(r), 1))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.concatenate([position, -depth[:, None]], axis=1), normals, r < contact
+    return np.concatenate([position, -depth[:, None]], axis=1), normals, ~free

@@ -273,14 +273,19 @@ def read_raw_image(path: Path) -> RawImage:
     InputError
         If the file is missing, is not an image, or is neither 8 nor 16 bit.
     """
+    import cv2
+
     raw, loss = decode_image(path)
     if raw.dtype not in (np.uint8, np.uint16):
         raise InputError(
             tr("The image contains {kind} values").format(kind=raw.dtype), path, Remedy.PNG
         )
     grey = raw.ndim == 2
-    bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
-    return RawImage(bgr[:, :, ::-1], grey, loss)
+    rgb = cv2.cvtColor(
+        raw if grey else np.ascontiguousarray(raw[:, :, :3]),
+        cv2.COLOR_GRAY2RGB if grey else cv2.COLOR_BGR2RGB,
+    )
+    return RawImage(rgb, grey, loss)
 
 
 def require_colour(image: LinearImage, *, where: str) -> None:

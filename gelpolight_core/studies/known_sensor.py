@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gelpolight_core import __version__
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.lights.positions import flat_cosines
 from gelpolight_core.measurement.score import TrueDepth
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
@@ -36,7 +36,6 @@ from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
 
 Map = NDArray[np.float32]
-LEAST_COSINE = 0.02
 MISFIT = 0.005
 """As the balls of a good calibration leave it, by their noise."""
 
@@ -149,7 +148,7 @@ def exact_calibration(
         led_positions_mm=leds,
         led_covariance_mm2=np.tile(1e-4 * np.eye(3), (3, 1, 1)),
         crosstalk=mixing,
-        radiance=(raw / _flat_cosines(leds, table)).astype(np.float32),
+        radiance=(raw / flat_cosines(table, leds)).astype(np.float32),
         factors=np.where(raw > 0.0, 1.0, 0.0).astype(np.float32),
         reflectance=cosine_table(),
         noise=np.sqrt(shot * middle + read**2),
@@ -186,13 +185,6 @@ def _raw_light(sensor: VirtualSensor, table: ResamplingTable) -> Map:
 def _plane(design: SensorDesign) -> TopPlane:
     x, y, z = design.layers.normal_camera.tolist()
     return TopPlane((x, y, z), design.layers.top_distance_mm)
-
-
-def _flat_cosines(leds_mm: NDArray[np.float64], table: ResamplingTable) -> NDArray[np.float64]:
-    points = table.grid.points_mm()
-    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
-    light, _ = light_directions(leds_mm, at_top)
-    return np.maximum(-light[..., 2], LEAST_COSINE)
 
 
 def _camera(design: SensorDesign) -> Camera:
