@@ -111,8 +111,8 @@ def lateral_scale_sd(stack: LayerStack, distance_sd_mm: float, focal_sd: float) 
     return float(np.hypot(own, focal_sd * (distance - apparent)) / apparent)
 
 
-def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -> float:
-    """Return the relative standard deviation of depths from LEDs and membrane.
+def height_gradient(full: FullModel, table: ResamplingTable, covariance: Array) -> Array:
+    """Return the relative change of a typical height by each parameter of LEDs and membrane.
 
     Parameters
     ----------
@@ -123,7 +123,12 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
     covariance : (14, 14) or (26, 26)
         Covariance of the shared parameters of the joint refinement, in their order: LEDs (9),
         exponent, gloss, roughness, reflectance for interreflected light, decay length,
-        heights of the curves.
+        heights of the curves. Each of its directions is changed by one standard deviation.
+
+    Returns
+    -------
+    (14,) or (26,)
+        For a unit of each parameter; 0 along directions without uncertainty.
     """
     field, depth, plateau = synthetic_press(full, table)
     height = np.median(depth[plateau])
@@ -135,7 +140,8 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
         return float(np.median(found_depth(_moved(full, step), field, depth)[plateau]))
 
     ends = np.reshape(list(in_parallel(found_mm, [*steps, *-steps])), (2, -1))
-    return float(np.linalg.norm((ends[0] - ends[1]) / (2.0 * height)))
+    changes = (ends[0] - ends[1]) / (2.0 * height)
+    return np.asarray(changes / (steps**2).sum(axis=1) @ steps)
 
 
 class SyntheticPress(NamedTuple):

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.ball_light import with_light_from_around
 from gelpolight_core.calibration.ball_pixels import BallPixels, thinned
 from gelpolight_core.calibration.board_reflectance import BesideBoard
+from gelpolight_core.calibration.determined import Determined
 from gelpolight_core.calibration.jackknife import jackknife_covariance
 from gelpolight_core.calibration.joint_kernel import CORRELATION
 from gelpolight_core.calibration.joint_problem import (
@@ -91,6 +92,8 @@ class JointResult:
         Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light and decay
         length and, if the membrane is one-dimensional, of the heights of its curves; from
         leaving out one press at a time. 0 for fixed parameters.
+    determined : Determined
+        How well the presses determine these parameters.
     stated : tuple of Stated
         What contradicts the presses, the most likely first. Empty if it was not looked for.
     """
@@ -100,6 +103,7 @@ class JointResult:
     ball_misfits: Array
     ball_names: tuple[str, ...]
     covariance: Array
+    determined: Determined
     stated: tuple[Stated, ...] = ()
 
 
@@ -176,7 +180,7 @@ def refine_jointly(
         _balls_of(x, pixels),
         solved.ball_misfits,
         tuple(press.name for press in presses),
-        shared_covariance(solved.problem, x),
+        *shared_covariance(solved.problem, x),
         () if bright_mm is None or len(presses) < LEAST_PRESSES else _compared(solved, bright_mm),
     )
 
@@ -375,8 +379,11 @@ def _described(problem: Problem, x: Array, limits: tuple[Array, Array]) -> _Solu
     return _Solution(x, sd, misfit, np.array(of_balls), loss, problem, limits)
 
 
-def shared_covariance(problem: Problem, x: Array) -> Array:
-    """Return the covariance of all parameters shared by the presses; 0 for fixed ones."""
+def shared_covariance(problem: Problem, x: Array) -> tuple[Array, Determined]:
+    """Return the covariance of all parameters shared by the presses, and how they are determined.
+
+    The covariance is 0 for fixed ones.
+    """
     jacobian = problem.jacobian(x)
     parts = problem.residuals(x)
     # With soft L1, larger residuals have less weight.
@@ -386,8 +393,9 @@ def shared_covariance(problem: Problem, x: Array) -> Array:
     solved = shared[problem.free[shared]]
     order = np.concatenate([solved, balls])
     rows = np.split(jacobian[:, order], np.cumsum([r.size for r in parts]))
+    weighted = [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)]
     found = jackknife_covariance(
-        [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)],
+        weighted,
         [w * r for w, r in zip(weights, parts, strict=True)],
         rows[-1],
         common=solved.size,
@@ -395,7 +403,8 @@ def shared_covariance(problem: Problem, x: Array) -> Array:
     covariance = np.zeros((shared.size, shared.size))
     index = np.flatnonzero(problem.free[shared])
     covariance[np.ix_(index, index)] = found
-    return covariance
+    curvature = np.sum([j.T @ j for j in (*weighted, rows[-1])], axis=0)
+    return covariance, Determined.of(curvature, index)
 
 
 def _relative_misfit(scaled: Array, weight: Array) -> float:

@@ -13,9 +13,10 @@ from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.board_reflectance import BesideBoard
 from gelpolight_core.calibration.depth_scale import (
     ball_height_error,
-    depth_scale_sd,
+    height_gradient,
     lateral_scale_sd,
 )
+from gelpolight_core.calibration.determined import judge_determined
 from gelpolight_core.calibration.joint import JointResult, Stated, refine_jointly
 from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
@@ -68,19 +69,19 @@ class Joint:
         With the background filled in where it is saturated, and the uncertainty of lengths.
     factors : (rows, columns, 3) float32
         Reflectance factors, filled in likewise.
-    stated : tuple of Finding
-        About what is stated of the sensor.
+    findings : tuple of Finding
+        About what is stated of the sensor, and how well its parameters are determined.
     """
 
     refined: JointResult
     full: FullModel
     factors: NDArray[np.float32]
-    stated: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     @property
     def quality(self) -> QualityTable:
         """Figures of the refinement and its model."""
-        return judge_joint(self.refined, self.full, self.stated)
+        return judge_joint(self.refined, self.full, self.findings)
 
 
 def refine(session: Session, results: Results) -> Joint:
@@ -127,11 +128,15 @@ def refine(session: Session, results: Results) -> Joint:
     lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
     stated = judge_stated(joint.stated, session.sensor, stack)
     found = Joint(joint, replace(full, background=lit), known, stated)
-    return replace(found, full=replace(found.full, scale_sd=_scale_sd(session, results, found)))
+    scale_sd, determined = _uncertainty(session, results, found)
+    full = replace(found.full, scale_sd=scale_sd)
+    return replace(found, full=full, findings=(*stated, *determined))
 
 
-def _scale_sd(session: Session, results: Results, found: Joint) -> ScaleSd:
-    """Estimate the uncertainty of lengths of the full model."""
+def _uncertainty(
+    session: Session, results: Results, found: Joint
+) -> tuple[ScaleSd, tuple[Finding, ...]]:
+    """Estimate the uncertainty of lengths of the full model, and judge what determines it."""
     full, joint = found.full, found.refined
     calibration = sensor_data(session, results, found)
     lens, pose = results[LENS], results[TOP_POSE].pose
@@ -150,13 +155,15 @@ def _scale_sd(session: Session, results: Results, found: Joint) -> ScaleSd:
     lateral = lateral_scale_sd(
         calibration.stack, pose.distance_sd_mm, lens.focal_sd_px[0] / lens.camera.fx
     )
-    fitted = depth_scale_sd(full, calibration.table, covariance)
+    gradient = height_gradient(full, calibration.table, covariance)
+    fitted = float(np.sqrt(gradient @ covariance @ gradient))
     gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
     together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
     seen, shown = {one.key: one.value for one in joint.stated}, None
     if seen:
         shown = (seen["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
-    return ScaleSd(together, lateral, unexplained, shown)
+    determined = judge_determined(joint.determined, covariance, gradient)
+    return ScaleSd(together, lateral, unexplained, shown), determined
 
 
 def press_noise(presses: Sequence[BallPress]) -> NDArray[np.float64]:
@@ -202,7 +209,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
 
 
 def judge_joint(
-    joint: JointResult, full: FullModel, stated: tuple[Finding, ...] = ()
+    joint: JointResult, full: FullModel, findings: tuple[Finding, ...] = ()
 ) -> QualityTable:
     """Judge the joint refinement and its model."""
     return QualityTable(
@@ -226,7 +233,7 @@ def judge_joint(
                 remedy=tr("Press more balls at more positions"),
             ),
             *judge_presses(joint),
-            *stated,
+            *findings,
             *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),

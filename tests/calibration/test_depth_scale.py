@@ -8,7 +8,7 @@ import scene
 
 from gelpolight_core.calibration import depth_scale
 from gelpolight_core.calibration.depth_scale import (
-    depth_scale_sd,
+    height_gradient,
     lateral_scale_sd,
 )
 from gelpolight_core.calibration.jackknife import jackknife_covariance
@@ -35,15 +35,19 @@ def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch: pytest.Mon
     calibration = scene.calibration()
     full = full_model(calibration)
     covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 0.02**2, 1.0])
-    once = depth_scale_sd(full, calibration.table, covariance)
-    twice = depth_scale_sd(full, calibration.table, 4.0 * covariance)
+
+    def depth_sd(covariance: np.ndarray) -> float:
+        gradient = height_gradient(full, calibration.table, covariance)
+        return float(np.sqrt(gradient @ covariance @ gradient))
+
+    once, twice = depth_sd(covariance), depth_sd(4.0 * covariance)
     assert twice == pytest.approx(2.0 * once, rel=0.05)
-    assert depth_scale_sd(full, calibration.table, 0.0 * covariance) == 0.0
+    assert depth_sd(0.0 * covariance) == 0.0
     # LED errors of 0.1 mm cost 0.4 % of depth, so 0.02 mm cost about 0.1 %; gloss of 0.01 costs up
     # to 1 %. A parameter that a depth does not use (decay) costs nothing.
     assert 5e-4 < once < 2e-2
     unused = np.diag([0.0] * 13 + [1.0])
-    assert depth_scale_sd(full, calibration.table, unused) < 1e-6
+    assert depth_sd(unused) < 1e-6
 
 
 def stack(glass: bool) -> LayerStack:
