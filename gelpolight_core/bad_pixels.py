@@ -14,6 +14,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiled_part import PART
+
 Pixels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
@@ -216,7 +218,7 @@ def differing(
     return marks
 
 
-@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True, forceinline=True)
+@numba.njit(fastmath={"nsz", "arcp", "contract"}, **PART)
 def _differs(p, a, b, c, d, least, share):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return whether p is far from a, b, c and d, which agree, or by more from all but one."""
     low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))

@@ -17,6 +17,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiled_part import PART
 from gelpolight_core.image.in_time import SIGMAS
 
 Array = NDArray[np.float64]
@@ -160,7 +161,7 @@ def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
     return found
 
 
-@numba.njit(nogil=True, fastmath=True, cache=True, forceinline=True)
+@numba.njit(fastmath=True, **PART)
 def _square(raw, table, r, c, apart, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     upper = table[raw[r, c, k]] - table[raw[r, c + apart, k]]
     lower = table[raw[r + apart, c, k]] - table[raw[r + apart, c + apart, k]]

@@ -13,6 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiled_part import PART
 from gelpolight_core.light.samples import PARAMETERS, Samples
 
 Array = NDArray[np.float64]
@@ -228,7 +229,7 @@ def _gross(samples: Samples, change: Array, usable: Mask) -> Array:
     return values
 
 
-@numba.njit(nogil=True, fastmath=True, cache=True, forceinline=True)
+@numba.njit(fastmath=True, **PART)
 def _remaining(normal, change, values, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write each cell's change of light (cells, 3) beyond the common one, as a share."""
     for c in range(left.shape[0]):
@@ -288,6 +289,7 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Fit and select the matching cells alternately; the last six arguments are written.
 
     With a large change, saturated cells can divide the field, so it need not be `connected`.
+    Compiling whole arrays that are assigned to others would take half of the time.
     """
     cells, size = kept.size, PARAMETERS
     scatter, strong = np.empty(cells), np.empty(cells, np.bool_)
@@ -302,7 +304,10 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     for j in range(size):
                         matrix[i, j] += normal[c, i, j]
         inverse = np.linalg.inv(matrix)
-        values[:] = inverse @ right
+        for i in range(size):
+            values[i] = 0.0
+            for j in range(size):
+                values[i] += inverse[i, j] * right[j]
         for c in range(cells):
             total = square[c]
             for i in range(size):
@@ -313,11 +318,15 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             scatter[c] = total / (3.0 * count[c])
         usual = max(np.median(scatter[kept]), 1e-6)
         widen = CORRELATED * np.sqrt(usual)
-        sd[:] = widen * np.sqrt(np.diag(inverse))
+        for i in range(size):
+            sd[i] = widen * np.sqrt(inverse[i, i])
         if step == tolerances.size - 1:
             part = np.linalg.inv(matrix[WITHOUT_OFFSETS][:, WITHOUT_OFFSETS])
-            alone[:] = part @ right[WITHOUT_OFFSETS]
-            alone_sd[:] = widen * np.sqrt(np.diag(part))
+            for i in range(alone.size):
+                alone[i] = 0.0
+                for j in range(alone.size):
+                    alone[i] += part[i, j] * right[WITHOUT_OFFSETS[j]]
+                alone_sd[i] = widen * np.sqrt(part[i, i])
         _remaining(normal, change, values, left)
         tolerance = tolerances[step]
         for c in range(cells):

@@ -19,6 +19,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiled_part import PART
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.membrane import UP, Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
@@ -45,7 +46,7 @@ _DOWN = (_POINT + 2, _NORMAL + 2, *(_LIGHT + _PER_LED * k + 2 for k in range(3))
 _TILE = WIDE**2
 """Facets of a larger facet. They lie side by side, so that one instruction handles all of them."""
 
-_part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
+_part = numba.njit(fastmath=True, error_model="numpy", **PART)
 _whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
 
 

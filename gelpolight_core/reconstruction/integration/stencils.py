@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from gelpolight_core.compiled_part import PART
+
 _flags = {"nsz", "contract", "reassoc"}
 _whole = njit(cache=True, nogil=True, fastmath=_flags)
-_part = njit(cache=True, nogil=True, fastmath=_flags, forceinline=True)
+_part = njit(fastmath=_flags, **PART)
 
 
 @_part

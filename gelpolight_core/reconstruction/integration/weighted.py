@@ -17,6 +17,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from gelpolight_core.compiled_part import PART
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.integration.columns import settled_rows, solve_columns
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -30,7 +31,7 @@ SHARED_NODES, SHARED_SUMS = 60_000, 200_000
 
 _flags = {"nsz", "arcp", "contract", "reassoc"}
 _whole = numba.njit(nogil=True, fastmath=_flags, cache=True)
-_part = numba.njit(nogil=True, fastmath=_flags, cache=True, forceinline=True)
+_part = numba.njit(fastmath=_flags, **PART)
 _SHARE = single(1.0 / 24.0)
 
 

@@ -24,6 +24,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiled_part import PART
 from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
 from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
@@ -85,7 +86,7 @@ def _starts() -> NDArray[np.float32]:
 
 STARTS = _starts()
 
-_part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
+_part = numba.njit(fastmath=True, error_model="numpy", **PART)
 _whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
 
 

@@ -43,7 +43,9 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
             marks = flags[loaded] if own else others
             solve_row(loaded, image, sensor, work, ring_x[at], ring_y[at], marks)
             if keep and own:
-                slope_x[loaded], slope_y[loaded] = ring_x[at], ring_y[at]
+                for column in range(columns):
+                    slope_x[loaded, column] = ring_x[at, column]
+                    slope_y[loaded, column] = ring_y[at, column]
             loaded += 1
         add_down(ring_y, begin, weight_y[line], field[line][left : left + columns])
         if top <= line < top + rows:

