@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -156,3 +157,18 @@ def test_commits_are_checked_as_by_the_test_command() -> None:
     commands = re.findall(r"entry: (.+)$", hooks, flags=re.MULTILINE)
     tested = re.findall(r'^check "[\w ]+" (\.venv.+?)(?: >.*)?$', TESTS.read_text(), re.MULTILINE)
     assert set(commands) == set(tested)
+
+
+def test_python_calls_no_part_of_a_compiled_loop() -> None:
+    """A part has no wrapper for Python: such a call would end the program."""
+    parts, called = set[str](), set[str]()
+    for path in (ROOT / "gelpolight_core").rglob("*.py"):
+        for made in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(made, ast.FunctionDef):
+                how = " ".join(map(ast.unparse, made.decorator_list)).lower()
+                if "part" in how:
+                    parts.add(f"{path}{made.name}" if made.name[0] == "_" else made.name)
+                elif not re.search("whole|njit|compiled", how):
+                    names = re.findall(r"\b(\w+)\(", ast.unparse(made))
+                    called |= {f"{path}{name}" if name[0] == "_" else name for name in names}
+    assert parts and not parts & called

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import ast
 import functools
-import io
-import tokenize
 from collections import Counter
 from pathlib import Path
 
@@ -14,14 +12,6 @@ WHAT_TO_DO = (
     "Remove something; or raise the number in tests/test_size.py, and say in the commit what was "
     "removed for it."
 )
-NO_CODE = {
-    tokenize.COMMENT,
-    tokenize.NL,
-    tokenize.NEWLINE,
-    tokenize.INDENT,
-    tokenize.DEDENT,
-    tokenize.ENDMARKER,
-}
 
 # Lines that are not blank, a comment or a docstring. "." holds the files beside the folders.
 MOST = {
@@ -108,12 +98,14 @@ MOST = {
 
 def code_lines(source: str) -> int:
     """Return how many lines are not blank, a comment or a docstring."""
-    lines: set[int] = set()
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type not in NO_CODE:
-            lines.update(range(token.start[0], token.end[0] + 1))
+    rows = enumerate(source.split("\n"), start=1)
+    lines = {row for row, line in rows if line.strip() and not line.lstrip().startswith("#")}
+    nodes = list(ast.walk(ast.parse(source)))
+    for node in nodes:
+        if isinstance(node, ast.Constant | ast.JoinedStr):  # a text may hold blank lines
+            lines.update(range(node.lineno, (node.end_lineno or 0) + 1))
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes:
         if isinstance(node, documented) and ast.get_docstring(node, clean=False) is not None:
             lines -= set(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
     return len(lines)

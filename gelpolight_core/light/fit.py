@@ -13,7 +13,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
 from gelpolight_core.light.samples import PARAMETERS, Samples
 
 Array = NDArray[np.float64]
@@ -229,7 +228,7 @@ def _gross(samples: Samples, change: Array, usable: Mask) -> Array:
     return values
 
 
-@numba.njit(fastmath=True, **PART)
+@numba.njit(nogil=True, fastmath=True, cache=True, forceinline=True)
 def _remaining(normal, change, values, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write each cell's change of light (cells, 3) beyond the common one, as a share."""
     for c in range(left.shape[0]):
