@@ -303,10 +303,7 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     for j in range(size):
                         matrix[i, j] += normal[c, i, j]
         inverse = np.linalg.inv(matrix)
-        for i in range(size):
-            values[i] = 0.0
-            for j in range(size):
-                values[i] += inverse[i, j] * right[j]
+        np.dot(inverse, right, values)
         for c in range(cells):
             total = square[c]
             for i in range(size):
@@ -321,10 +318,8 @@ def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             sd[i] = widen * np.sqrt(inverse[i, i])
         if step == tolerances.size - 1:
             part = np.linalg.inv(matrix[WITHOUT_OFFSETS][:, WITHOUT_OFFSETS])
+            np.dot(part, right[WITHOUT_OFFSETS], alone)
             for i in range(alone.size):
-                alone[i] = 0.0
-                for j in range(alone.size):
-                    alone[i] += part[i, j] * right[WITHOUT_OFFSETS[j]]
                 alone_sd[i] = widen * np.sqrt(part[i, i])
         _remaining(normal, change, values, left)
         tolerance = tolerances[step]
