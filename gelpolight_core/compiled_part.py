@@ -7,10 +7,5 @@ from __future__ import annotations
 
 from typing import Any
 
-PART: dict[str, Any] = {
-    "nogil": True,
-    "cache": True,
-    "forceinline": True,
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
+WITHOUT = ("no_cpython_wrapper", "no_cfunc_wrapper")
+PART: dict[str, Any] = dict.fromkeys(("nogil", "cache", "forceinline", *WITHOUT), True)
