@@ -167,7 +167,7 @@ class HealthCheck:
             return movement_px(self.samples, raw, same) if np.hypot(*sd) < most_sd else None
 
     def _cell_light(self) -> Array:
-        return self._change[:, :6:2] / self.samples.normal[:, [0, 2, 4], [0, 2, 4]]
+        return self._change[:, :6:2] / self.samples.by_gain
 
     def _faults(
         self,

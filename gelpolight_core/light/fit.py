@@ -87,7 +87,7 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     # A saturated sample contains no information about the light.
     usable = full == 0.0
     values = np.zeros(PARAMETERS)
-    light = change[:, :6:2] / samples.normal[:, [0, 2, 4], [0, 2, 4]]
+    light = change[:, :6:2] / samples.by_gain
     first = np.abs(light).max(axis=1)
     kept = usable & (first < NEAR)
     _outer_part(samples.beside, kept)
@@ -120,7 +120,7 @@ def scatter_of_cells(samples: Samples, common: CommonChange) -> Array:
     A press changes the light of neighbouring cells alike: each group of neighbours counts as one.
     """
     at, beside = common.untouched, samples.beside
-    around = common.change[beside[at]].mean(axis=1)
+    around = common.change.take(beside[at].T, axis=0).mean(axis=0)
     return np.asarray(around.std(axis=0) * math.sqrt(beside.shape[1] / at.sum()))
 
 
@@ -156,20 +156,16 @@ def uneven_change(samples: Samples, change: Array, common: CommonChange) -> Unev
     # Of few large cells, several lie in one line.
     if common.share < LEAST_START or np.linalg.matrix_rank(samples.shapes[at]) <= shapes.shape[1]:
         return None
-    by_light = samples.normal[:, [0, 2, 4]].sum(axis=1)
-    size = samples.normal[:, [0, 2, 4], [0, 2, 4]].sum(axis=1)
-    mixed = by_light[at].T @ shapes[at]
-    matrix = np.block(
-        [
-            [samples.normal[at].sum(axis=0) + np.diag(PRECISION), mixed],
-            [mixed.T, (shapes[at].T * size[at]) @ shapes[at]],
-        ]
-    )
-    light = change[:, :6:2].sum(axis=1)
-    right = np.concatenate([change[at].sum(axis=0), shapes[at].T @ light[at]])
+    size, light = samples.by_gain.sum(axis=1), change[:, :6:2].sum(axis=1)
+    own, inner = at.astype(np.float64), shapes[at]
+    matrix = np.empty((PARAMETERS + inner.shape[1],) * 2)
+    matrix[:PARAMETERS, :PARAMETERS] = np.tensordot(own, samples.normal, 1) + np.diag(PRECISION)
+    matrix[:PARAMETERS, PARAMETERS:] = samples.by_light[at].T @ inner
+    matrix[PARAMETERS:, :PARAMETERS] = matrix[:PARAMETERS, PARAMETERS:].T
+    matrix[PARAMETERS:, PARAMETERS:] = (inner.T * size[at]) @ inner
     inverse = np.linalg.inv(matrix)
-    solved = inverse @ right
-    centre = shapes[at].mean(axis=0)
+    solved = inverse @ np.concatenate([own @ change, inner.T @ light[at]])
+    centre = inner.mean(axis=0)
     shape = np.concatenate([[-centre @ solved[PARAMETERS:]], solved[PARAMETERS:]])
     share = samples.shapes @ shape
     # Around a press, interreflection makes the cells scatter by more than their noise.
@@ -188,10 +184,9 @@ def uneven_change(samples: Samples, change: Array, common: CommonChange) -> Unev
 def evened(samples: Samples, change: Array, square: Array, shape: Array) -> tuple[Array, Array]:
     """Return `change` and `square` of :func:`common_change` without an uneven change of light."""
     share = samples.shapes @ shape
-    by_light = samples.normal[:, [0, 2, 4]].sum(axis=1)
-    size = samples.normal[:, [0, 2, 4], [0, 2, 4]].sum(axis=1)
+    size = samples.by_gain.sum(axis=1)
     less = square - 2.0 * share * change[:, :6:2].sum(axis=1) + share**2 * size
-    return change - share[:, None] * by_light, less
+    return change - share[:, None] * samples.by_light, less
 
 
 def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:
@@ -205,7 +200,7 @@ def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:
         Change of each cell's light, and its part that the fit assigns to the common change.
     """
     size = float(np.abs(supposed).mean(axis=0).max())
-    around = np.abs(light[samples.beside].mean(axis=1)).max(axis=1)
+    around = np.abs(light.take(samples.beside.T, axis=0).mean(axis=0)).max(axis=1)
     part = np.asarray(around < AS_BEFORE_OFF * size)
     _outer_part(samples.beside, part)
     return part if part.mean() > LEAST_NEAR else None

@@ -66,7 +66,7 @@ def is_pressed(samples: Samples, effects: Array, change: Array, usable: Mask, le
     """
     if not usable.any():
         return False
-    sd = CORRELATED / np.sqrt(samples.normal[:, [0, 2, 4], [0, 2, 4]])
+    sd = CORRELATED / np.sqrt(samples.by_gain)
     seen, press = change / sd, effects / sd[..., None]
     weight, remaining = usable.astype(np.float64), seen
     for _ in range(ROUNDS):

@@ -71,6 +71,10 @@ class Samples:
         1 over the variance.
     normal : (cells, PARAMETERS, PARAMETERS) float64
         Sums of products of the effects.
+    by_gain : (cells, 3) float64
+        Its diagonal for the gains.
+    by_light : (cells, PARAMETERS) float64
+        Its sum over the gains: a change of all channels alike.
     count : (cells,) float64
         Samples of each cell.
     run_light : (3, runs) float64
@@ -97,6 +101,8 @@ class Samples:
     effects: Map
     weight: Map
     normal: Array
+    by_gain: Array
+    by_light: Array
     count: Array
     run_light: Array
     beside: Index
@@ -147,13 +153,16 @@ def samples_of(calibration: SensorModel) -> Samples:
         return np.stack(columns, axis=-1)
 
     middle = mean(corner)
+    normal = _normal(plain.astype(np.float64), weight, of_sample, used.size)
     return Samples(
         corner=np.ascontiguousarray(corner, np.int32),
         part=np.ascontiguousarray(np.stack([v, u], -1) - corner, np.float32),
         expected=np.ascontiguousarray(expected, np.float32),
         effects=np.ascontiguousarray(plain * weight[..., None], np.float32),
         weight=weight,
-        normal=_normal(plain.astype(np.float64), weight, of_sample, used.size),
+        normal=normal,
+        by_gain=normal[:, [0, 2, 4], [0, 2, 4]],
+        by_light=normal[:, [0, 2, 4]].sum(axis=1),
         count=count,
         run_light=np.ascontiguousarray(expected.reshape(-1, RUN, 3).sum(axis=1).T, np.float64),
         beside=_neighbours(used, across),

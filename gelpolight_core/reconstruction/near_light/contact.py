@@ -78,12 +78,12 @@ class Area:
     ----------
     blocks : int
         Along a side; odd.
-    limit : (rows, columns, 3) float32
-        Share of the light that counts; infinite where the background is not known.
+    per_limit : (rows, columns, 3) float32
+        One over the share of the light that counts; 0 where the background is not known.
     """
 
     blocks: int
-    limit: Map
+    per_limit: Map
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +101,8 @@ class ContactFinder:
     per_light, most : (rows, columns, 3) float32
         One over `expected`, and the largest share that a block adds to an area; 0 where the
         background is not known.
+    thin : (blocks,) int
+        Of known blocks, some all over the field, for medians.
     points_mm : (rows, columns, 2) float64
         Place on the membrane.
     areas : tuple of Area
@@ -119,6 +121,7 @@ class ContactFinder:
     limit: Map
     per_light: Map
     most: Map
+    thin: NDArray[np.intp]
     points_mm: NDArray[np.float64]
     areas: tuple[Area, ...]
     beside_mm: float
@@ -171,22 +174,27 @@ class ContactFinder:
 
     def _shallow(self, change: Map) -> Mask | None:
         """Return where the average over an area (rows, columns) differs; None where none does."""
+        if not self.thin.size:
+            return None
         share = change * self.per_light
         # No single block decides: a hot pixel or a speck counts as much as the noise may.
         np.minimum(share, self.most, out=share)
         np.maximum(share, -self.most, out=share)
-        thin = np.s_[::THIN, ::THIN]
-        known = self.most[thin][..., 0] > 0.0
-        if known.any():
-            # The LEDs' common change is no contact.
-            share -= np.median(share[thin][known], axis=0) * (self.per_light > 0.0)
+        # The LEDs' common change is no contact. Whole rows: numpy is slow along an axis of three.
+        common, lines = (
+            np.median(share.reshape(-1, 3)[self.thin], axis=0),
+            share.reshape(len(share), -1),
+        )
+        lines -= np.tile(common, share.shape[1]) * (self.per_light > 0.0).reshape(lines.shape)
         found = None
         for area in self.areas:
             side = (area.blocks, area.blocks)
-            z = np.abs(cv2.blur(share, side, borderType=cv2.BORDER_CONSTANT)) / area.limit
+            z = np.abs(cv2.blur(share, side, borderType=cv2.BORDER_CONSTANT)) * area.per_limit
+            if z.max() <= 1.0:
+                continue
             # An image with more noise than the calibration states has its own limit.
-            usual = float(np.median(z[thin][known])) if known.any() else 0.0
-            differs = z > max(usual * AREA_SIGMAS / MEDIAN_OF_NOISE, 1.0)
+            usual = float(np.median(z.reshape(-1, 3)[self.thin])) / MEDIAN_OF_NOISE
+            differs = z > max(usual * AREA_SIGMAS, 1.0)
             if differs.any():
                 found = _in_any(differs) if found is None else found | _in_any(differs)
         return None if found is None else _among_others(found)
@@ -277,14 +285,17 @@ def contact_finder(calibration: OpenSensor, full: FullModel) -> ContactFinder:
         change = AREA_CHANGE + CHANGE_BY_INTERREFLECTION * full.membrane.interreflection
         share = np.maximum(change, AREA_SIGMAS / (block * side) * np.sqrt(variance))
         share += 2.0 / side * unsure * per_light + cv2.blur(filled, (side, side))
-        share[~inside] = np.inf
-        areas.append(Area(side, share.astype(np.float32)))
+        per_limit = np.where(inside[..., None], 1.0 / share, 0.0)
+        areas.append(Area(side, per_limit.astype(np.float32)))
+    spread = np.zeros_like(inside)
+    spread[::THIN, ::THIN] = inside[::THIN, ::THIN]
     return ContactFinder(
         block,
         expected,
         limit.astype(np.float32),
         per_light.astype(np.float32),
         most,
+        np.flatnonzero(spread),
         middle,
         tuple(areas),
         2.0 * margin_mm(full),
@@ -302,7 +313,7 @@ def _visible_mm(
     decay length. A slope changes the light of a matt membrane by its product with the tangent of
     the light's angle from the vertical, where the membrane falls towards the light or away.
     """
-    known = np.isfinite(areas[0].limit).all(axis=2)
+    known = (areas[0].per_limit > 0.0).all(axis=2)
     if not known.any():
         return np.inf
     points = points_mm[known][::THIN]
@@ -313,7 +324,7 @@ def _visible_mm(
     for area in areas:
         width = area.blocks * side_mm
         mean = decay / width * (1.0 - np.exp(-width / decay))
-        slope = area.limit[known][::THIN] / np.maximum(tangent * mean, 1e-6)
+        slope = 1.0 / (area.per_limit[known][::THIN] * np.maximum(tangent * mean, 1e-6))
         found.append(decay * slope.min(axis=1))
     return STATED_NOISE * float(np.percentile(np.min(found, axis=0), VISIBLE_PERCENT))
 

@@ -130,7 +130,7 @@ class PaperSolver(OpenSolver):
         return Solved(
             np.zeros(self._known.shape, np.float32),
             flat_normals(self._known.shape) if wanted.normals else None,
-            np.where(self._known, np.uint8(0), np.uint8(Flag.OUTSIDE)),
+            ~self._known * np.uint8(Flag.OUTSIDE),
             (*self._condition_notes, *visible_depth_notes(visible_mm)),
             Trace(wanted.effort, tuple(record.steps)),
             visible_depth_mm=visible_mm,
