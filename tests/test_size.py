@@ -51,7 +51,7 @@ MOST = {
     "gelpolight_core/measurement": 4540,
     "gelpolight_core/optics": 1740,
     "gelpolight_core/radiance": 218,
-    "gelpolight_core/reconstruction": 5901,
+    "gelpolight_core/reconstruction": 5903,
     "gelpolight_core/recording": 494,
     "gelpolight_core/records": 487,
     "gelpolight_core/reflectance": 2327,

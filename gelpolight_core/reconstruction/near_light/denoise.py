@@ -67,11 +67,13 @@ def quieted(
     """
     ratio, noise = image.ratio, image.noise
     rows, columns = image.marks.shape
-    light, base = take("light", ratio.shape), take("base", ratio.shape)
+    # Light and background, three channels each.
+    both = take("light and base", (6, rows, columns))
+    light, base = both[:3], both[3:]
     workers.run(rows, _parted, ratio, noise, sd, light, base)
-    room = [take(name, light.shape) for name in ("quiet light", "quiet base")]
-    narrow = tuple(_average(m, QUIET_PX, r) for m, r in zip((light, base), room, strict=True))
-    own = _own_noise(light, base, narrow[0])
+    narrow = take("quiet", both.shape)
+    workers.run(len(both), _average, both, QUIET_PX, narrow)
+    own = _own_noise(light, base, narrow[:3])
     if own is None or _relative(own, base) < SILENT:
         return None
     kept: Map | None = None
@@ -79,7 +81,8 @@ def quieted(
     for width in (QUIET_PX * times for times in (1.0, 2.0, 4.0, 8.0)):
         if kept is not None and not _noisy(noise, base, kept):
             break
-        wide = tuple(_average(m, 2.0 * width, np.empty_like(m)) for m in (light, base))
+        wide = np.empty_like(both)
+        workers.run(len(both), _average, both, 2.0 * width, wide)
         workers.run(rows, _excess, narrow, wide, base, own, _left(width), edge)
         reach = 2 * round(2.0 * width / QUIET_PX) + 1
         grown = np.asarray(cv2.dilate(edge, np.ones((reach, reach), np.uint8)), np.float32)
@@ -133,10 +136,9 @@ def _left(width_px: float) -> np.float32:
     return single(SIGNIFICANT * left / np.sqrt(4.0 * np.pi))
 
 
-def _average(planes: Map, width_px: float, result: Map) -> Map:
-    for plane, target in zip(planes, result, strict=True):
+def _average(first: int, last: int, planes: Map, width_px: float, result: Map) -> None:
+    for plane, target in zip(planes[first:last], result[first:last], strict=True):
         _blurred(plane, width_px, target)
-    return result
 
 
 def _blurred(plane: Map, width_px: float, result: Map) -> None:
@@ -177,7 +179,7 @@ def _parted(first, last, ratio, noise, sd, light, base):  # type: ignore[no-unty
 @whole
 def _excess(first, last, narrow, wide, base, own, limit, edge):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write how far two averages differ beyond what noise makes of them, 0..1."""
-    (light, below), (wide_light, wide_below) = narrow, wide
+    light, below, wide_light, wide_below = narrow[:3], narrow[3:], wide[:3], wide[3:]
     least, none, one = single(LEAST), single(0.0), single(1.0)
     line = np.empty(edge.shape[1], np.float32)
     for i in range(first, last):
@@ -200,7 +202,7 @@ def _excess(first, last, narrow, wide, base, own, limit, edge):  # type: ignore[
 @whole
 def _mixed(first, last, narrow, edge, base, sd, left, everywhere, ratio, noise):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Move ratio and noise towards the average's, where there is no edge and need of it."""
-    light, below = narrow
+    light, below = narrow[:3], narrow[3:]
     least, none, one = single(LEAST), single(0.0), single(1.0)
     per_calm = single(1.0 / CALM)
     always = one if everywhere else none

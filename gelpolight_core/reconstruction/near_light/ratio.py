@@ -140,11 +140,14 @@ class PressSampler:
         # A missing or saturated pixel says nothing of its neighbours' curvature.
         usable = ((kind == 2) & (image.marks == 0)).astype(np.uint8)
         inner = cv2.erode(usable, np.ones(kernel.shape, np.uint8), borderValue=0)
-        sharp, mask = np.empty(inner.shape, np.float32), inner.astype(np.bool_)
-        for ratio in image.ratio:
-            cv2.filter2D(ratio, cv2.CV_32F, kernel, sharp, borderType=cv2.BORDER_REPLICATE)
-            np.maximum(sharp, 0.0, out=sharp)
-            np.copyto(ratio, sharp, where=mask)
+        mask = inner.astype(np.bool_)
+
+        def sharpen(first: int, last: int) -> None:
+            for ratio in image.ratio[first:last]:
+                sharp = cv2.filter2D(ratio, cv2.CV_32F, kernel, borderType=cv2.BORDER_REPLICATE)
+                np.copyto(ratio, np.maximum(sharp, 0.0, out=sharp), where=mask)
+
+        self._workers.run(len(image.ratio), sharpen)
         more = np.linalg.norm(kernel) - np.float32(1.0)
         noise = image.noise
         noise *= 1.0 + more * (inner if edge is None else inner * edge)
