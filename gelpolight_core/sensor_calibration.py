@@ -354,7 +354,7 @@ class OpenSensor:
             working_diameter_mm=self.sensor.working_diameter_mm,
         )
 
-    @cached_property
+    @property
     def background(self) -> Map:
         """The untouched membrane as the camera sees it, linear light on the grid; 0: not known."""
         if self.full is None:

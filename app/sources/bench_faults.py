@@ -10,7 +10,7 @@ from app.sources.bench import BOARDS
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.exposure import blurred
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 ROOM_LIGHT = (0.066, 0.060, 0.050)
 """Light of a lit room in the three channels at the nominal exposure; 1 is full scale."""

@@ -28,7 +28,7 @@ from gelpolight_core.simulation.virtual_sensor import (
     Whiteboard,
 )
 
-Array = NDArray[np.float64]
+Map = NDArray[np.float32]
 
 _DARK = 1e-6  # far below one count of any camera
 
@@ -41,14 +41,14 @@ class Rendering:
     ----------
     scene : Scene
         The scene that it shows.
-    signal : (rows, columns) or (rows, columns, 3)
+    signal : (rows, columns) or (rows, columns, 3) float32
         Linear light at the nominal exposure, 1 is full scale; grey for boards.
     exact : bool
         False for the coarse image that is shown until the exact one is ready.
     """
 
     scene: Scene
-    signal: Array
+    signal: Map
     exact: bool
 
 
@@ -147,7 +147,7 @@ class _Makers:
         self._small_design = bench.design.scaled(scale) if scale < 1.0 else None
         self._small: VirtualSensor | None = None
         self._large: VirtualSensor | None = None
-        self._bare: Array | None = None
+        self._bare: Map | None = None
         self._shape: tuple[Scene, State] | None = None
 
     def get_ready(self, interrupt: Interrupt) -> None:
@@ -188,21 +188,21 @@ class _Makers:
             replace(old, x0_mm=old.x0_mm + scene.x_mm, y0_mm=old.y0_mm + scene.y_mm)
         )
 
-    def _full_size(self, small: Array, scene: Scene) -> Array:
+    def _full_size(self, small: Map, scene: Scene) -> Map:
         if scene.item in BOARDS or self._small is None or self._large is None:
             return self._enlarged(small)
         # A press changes the bare membrane's image by a smooth factor, so that the membrane's fine
         # pattern stays sharp; the same is true at its edge, where there is no division.
         if self._bare is None:
-            self._bare = self._large.brightness(BareMembrane())
-        bare = self._small.brightness(BareMembrane())
+            self._bare = self._large.brightness(BareMembrane()).astype(np.float32)
+        bare = self._small.brightness(BareMembrane()).astype(np.float32)
         outside = (bare.max(axis=2) < _DARK).astype(np.uint8)
         inside = cv2.dilate(outside, np.ones((5, 5), np.uint8)) == 0
         factor = np.ones_like(bare)
         np.divide(small, np.maximum(bare, _DARK), out=factor, where=inside[..., None])
         return self._bare * self._enlarged(factor)
 
-    def _enlarged(self, image: Array) -> Array:
+    def _enlarged(self, image: Map) -> Map:
         camera = self._bench.design.camera
         return np.asarray(
             cv2.resize(image, (camera.width_px, camera.height_px), interpolation=cv2.INTER_LINEAR)
@@ -211,8 +211,8 @@ class _Makers:
 
 def _light(
     sensor: VirtualSensor, state: State, scene: Scene, interrupt: Interrupt, *, samples: int = 3
-) -> Array:
-    light = sensor.brightness(state, samples=samples, interrupt=interrupt)
+) -> Map:
+    light = sensor.brightness(state, samples=samples, interrupt=interrupt).astype(np.float32)
     return light[..., 0] if scene.item in BOARDS else light
 
 

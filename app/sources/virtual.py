@@ -137,7 +137,7 @@ class VirtualSource:
         )
         return self._developed
 
-    def _maker(self, signal: NDArray[np.float64], conditions: Conditions) -> Callable[[int], Rgb]:
+    def _maker(self, signal: NDArray[np.float32], conditions: Conditions) -> Callable[[int], Rgb]:
         camera, seed = self.bench.design.camera, self._noise_seed
         full = 2.0**camera.bit_depth - 1.0
         kind = np.uint8 if camera.bit_depth == 8 else np.uint16
@@ -145,7 +145,7 @@ class VirtualSource:
             quiet = np.rint(full * np.clip(signal, 0.0, 1.0)).astype(kind)
             return lambda number: _rgb(quiet.copy())
         depth = cv2.CV_8U if camera.bit_depth == 8 else cv2.CV_16U
-        level = full * np.maximum(signal.astype(np.float32), 0.0)
+        level = full * np.maximum(signal, 0.0)
         # Light and read noise are amplified alike: with the gain g, a signal s has the variance
         # g shot_variance s + (g read_sd)^2.
         gain, scale = full * _amplification(conditions), conditions.noise
@@ -184,9 +184,9 @@ def _period_s(conditions: Conditions) -> float:
     return max(1.0 / conditions.rate_hz, 1e-3 * conditions.exposure_ms)
 
 
-def _exposed(rendering: Rendering, conditions: Conditions, bench: Bench) -> NDArray[np.float64]:
+def _exposed(rendering: Rendering, conditions: Conditions, bench: Bench) -> NDArray[np.float32]:
     """Return the signal at the camera's exposure and gain; 1 is full scale."""
     factor = conditions.exposure_ms / NOMINAL_EXPOSURE_MS * _amplification(conditions)
     item, faults = rendering.scene.item, conditions.faults
     signal = with_faults(rendering.signal, faults, item=item, design=bench.design, seed=bench.seed)
-    return np.asarray(signal * factor)
+    return np.asarray(signal * factor, np.float32)

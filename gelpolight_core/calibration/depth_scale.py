@@ -82,7 +82,7 @@ def ball_height_error(
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
         depth = solver.depth(rgb, Wanted(normals=False)).depth_mm
         away = np.linalg.norm(points - ball.centre_mm, axis=-1)
-        top = (away < TOP_MM) & (solver.maps.scale(1).kind == 2)
+        top = (away < TOP_MM) & (solver.maps.kind == 2)
         if top.any():
             true = ball.depth_mm - ball.radius_mm + np.sqrt(ball.radius_mm**2 - away[top] ** 2)
             errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)

@@ -12,10 +12,10 @@ Array = NDArray[np.float64]
 Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
 
-def blurred(image: Array, sigma_px: float) -> Array:
+def blurred(image: NDArray[np.floating], sigma_px: float) -> Array:
     """Return the image after the Gaussian blur of the optics."""
     if sigma_px <= 0.0:
-        return image
+        return np.asarray(image)
     sigma = (sigma_px, sigma_px) + (0.0,) * (image.ndim - 2)
     return np.asarray(gaussian_filter(image, sigma, mode="nearest", truncate=5.0))
 

@@ -63,6 +63,11 @@ class SensorMaps:
         return np.asarray(binary_fill_holes(self.usable))
 
     @cached_property
+    def kind(self) -> NDArray[np.uint8]:
+        """`Scale.kind` at full scale, which an effort can need without the rest of that scale."""
+        return kinds(self.usable, self.inside, 1)
+
+    @cached_property
     def flags(self) -> NDArray[np.uint8]:
         """Flags of the whole grid while nothing is pressed."""
         without_light = int(Flag.OUTSIDE | Flag.INVALID)

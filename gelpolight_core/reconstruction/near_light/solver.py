@@ -416,7 +416,7 @@ class NearLightSolver(OpenSolver):
         )
         at, whole = solved.region.at(COARSE)
         outside, factor = int(Flag.OUTSIDE), scale.factor
-        kind = self.maps.scale(1).kind
+        kind = self.maps.kind
         rows = (placed, marks, factor, at, outside, kind, depth, flags)
         self.workers.run(whole[0], show_depth, *rows)
         if normals is not None:

@@ -54,7 +54,9 @@ def test_without_noise_each_state_equals_the_virtual_sensor_image(
     got = settled(source)
     sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
     expected = sensor.frame(state_of(bench, bench.design, bench.scene))
-    assert np.array_equal(got.rgb, expected)
+    # The source keeps float32: values half-way between two counts may be rounded the other way.
+    away = np.abs(got.rgb.astype(int) - expected)
+    assert away.max() <= 1 and away.mean() < 1e-4
 
 
 def test_a_stage_shows_the_images_of_a_simulated_session(source: VirtualSource) -> None:
