@@ -233,8 +233,7 @@ def value_at(heightmap: HeightMap, values: NDArray[np.floating], x_mm: Array, y_
         Places in the sensor frame.
     """
     column, row = index_of(heightmap, x_mm, y_mm)
-    position = np.stack([row, column])
-    return np.asarray(map_coordinates(values, position, order=1, mode="nearest"), np.float64)
+    return between_nodes(values, row, column)
 
 
 def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:

@@ -11,6 +11,7 @@ from scipy.optimize import brentq, least_squares
 from scipy.special import k0e, k1e
 
 from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.reflectance.surroundings import view_directions
 
 Array = NDArray[np.float64]
 TYPICAL_DECAY_MM = 0.7
@@ -153,10 +154,7 @@ def refine_centre(
     """
     flat = np.concatenate([pixels.points_mm, np.zeros_like(pixels.points_mm[..., :1])], axis=-1)
     flat_light, flat_distance = light_directions(led_positions_mm, flat)
-    view = np.concatenate(
-        [pixels.ray_slope, np.full_like(pixels.ray_slope[..., :1], -1.0)], axis=-1
-    )
-    view /= np.linalg.norm(view, axis=-1, keepdims=True)
+    view = view_directions(pixels.ray_slope)
     on_flat = _cosines(flat_light, np.broadcast_to([0.0, 0.0, -1.0], flat.shape), view)
     weight = pixels.weight
 
