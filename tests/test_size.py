@@ -51,7 +51,7 @@ MOST = {
     "gelpolight_core/measurement": 4539,
     "gelpolight_core/optics": 1740,
     "gelpolight_core/radiance": 218,
-    "gelpolight_core/reconstruction": 5906,
+    "gelpolight_core/reconstruction": 5911,
     "gelpolight_core/recording": 494,
     "gelpolight_core/records": 487,
     "gelpolight_core/reflectance": 2325,
@@ -59,7 +59,7 @@ MOST = {
     "gelpolight_core/response": 398,
     "gelpolight_core/session": 982,
     "gelpolight_core/simulation": 2120,
-    "gelpolight_core/studies": 1137,
+    "gelpolight_core/studies": 1200,
     "tests/.": 1478,
     "tests/app": 10995,
     "tests/batch": 501,
@@ -92,7 +92,7 @@ MOST = {
     "tests/session": 479,
     "tests/simulation": 694,
     "tests/strangers": 1031,
-    "tests/studies": 1506,
+    "tests/studies": 1535,
 }
 
 

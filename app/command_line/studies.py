@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -105,25 +106,24 @@ class WorkPrecision(Command):
     output: Path = output("OUT", writes=False)
     calibration: Path | None = file(tr("measure with this calibration (default: calibrate first)"))
     repeats: int = option(default=REPEATS, metavar="N")
-    seed: int = option(tr("seed of the virtual sensor"), default=0, metavar="N")
+    seed: int = option(tr("seed of the virtual sensor and its presses"), default=0, metavar="N")
+    curves: bool = option(tr("also change rounds, steps and tolerance of the best mode"))
 
     def run(self) -> None:
         """Measure all modes, print the table, and write table and figure."""
         session = None if self.session is None else read_session(self.session)
         calibration = None if self.calibration is None else read_calibration(self.calibration)
         _make_folder_for(self.output / "work-precision.csv")
-        repeats = max(self.repeats, 1)
+        options: dict[str, Any] = {"repeats": max(self.repeats, 1), "curves": self.curves}
         with stage_progress() as progress:
             if session is None:
                 points = measure_virtual(
-                    SensorDesign(), calibration, repeats=repeats, seed=self.seed, progress=progress
+                    SensorDesign(), calibration, **options, seed=self.seed, progress=progress
                 )
             else:
                 if calibration is None:
                     calibration = calibrate(session, progress=progress).calibration
-                points = measure_session(
-                    session.folder, calibration, repeats=repeats, progress=progress
-                )
+                points = measure_session(session.folder, calibration, **options, progress=progress)
         say(point_table(points), end="\n\n")
         _say_saved(write_work_precision(points, self.output))
 

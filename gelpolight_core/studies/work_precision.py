@@ -1,21 +1,28 @@
 """Error against run time of each mode, on presses with a known truth.
 
-Errors are differences from the true depth, which no mode uses. Every press is reconstructed by all
-modes in turn, so that a slow phase of the machine affects all.
+Errors are differences from the true depth, which no mode uses. The virtual sensor's presses are
+drawn by the seed, so that no mode was tuned on them. Every press is reconstructed by all modes in
+turn, so that a slow phase of the machine affects all. Curves change one parameter of the most
+accurate mode, such as its number of rounds.
 """
 
 from __future__ import annotations
 
+import copy
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
 
+from gelpolight_core import __version__
 from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.design.parts import Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.drawing_thread import Figure
 from gelpolight_core.errors import InputError, Remedy
@@ -23,13 +30,18 @@ from gelpolight_core.io.atomic import write_files
 from gelpolight_core.io.table import csv_of
 from gelpolight_core.measurement.press import read_truth
 from gelpolight_core.measurement.score import (
+    EDGE_MM,
     TrueDepth,
     read_true_depth,
     score_depth,
     scored_radius_mm,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
-from gelpolight_core.reconstruction.modes import MODES, PAPER, Mode
+from gelpolight_core.reconstruction.modes import Mode
+from gelpolight_core.reconstruction.near_light.settings import SETTINGS
+from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.report.drawing import png
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_raw_image
@@ -42,6 +54,16 @@ Progress = Callable[[str, float], None]
 WIDTHS = (320, 640, 1280)
 """Of the virtual sensor's images, in pixels."""
 REPEATS = 2
+PRESSES = 8
+SIZES, DEPTHS = (0.25, 0.6), (0.03, 0.11)
+"""Of new presses, over the radius of the compared area: walls from gentle to steep."""
+CURVES: dict[str, tuple[float, ...]] = {
+    "around_rounds": (1, 2, 3, 4, 6),
+    "steps": (1, 2, 4, 8),
+    "tolerance": (1e-1, 1e-2, 1e-3, 1e-4),
+}
+"""Values of each parameter of `Settings` that has a curve."""
+CONFIDENCE = 0.95
 FLAT_TOPPED = ("cylinder", "cuboid")
 ERRORS = ("rms_um", "normal_deg", "height_percent", "size_percent")
 TOUCHED_MM = 0.02
@@ -69,6 +91,13 @@ class Point:
     rms_um, normal_deg, height_percent, size_percent : float
         Mean absolute errors over the presses: depth (RMS), direction of the normal where the
         membrane is pressed (RMS), plateau height, size at half height.
+    within : tuple of 4 floats
+        Half widths of the intervals that hold these means with a confidence of 95 %, by Student's t
+        over the presses; NaN for a single press.
+    curve : str
+        The parameter that is changed, for a point on a curve; empty for a mode.
+    version : str
+        Of the program.
     """
 
     sensor: str
@@ -83,11 +112,23 @@ class Point:
     normal_deg: float
     height_percent: float
     size_percent: float
+    within: tuple[float, ...] = (np.nan,) * 4
+    curve: str = ""
+    version: str = __version__
 
 
-def modes() -> dict[str, Mode]:
-    """Return each mode by its name: the model's, or the effort of the full model."""
-    return {PAPER: MODES[-1], **{mode.effort: mode for mode in MODES[:-1]}}
+def new_presses(design: SensorDesign, seed: int, count: int = PRESSES) -> tuple[Press, ...]:
+    """Return cylinders and cuboids in turn, drawn by a seed, inside the compared area."""
+    random = np.random.default_rng([41, seed])
+    radius_mm = 0.5 * design.membrane.working_diameter_mm - EDGE_MM
+    presses = []
+    for shape in (FLAT_TOPPED * count)[:count]:
+        size, depth = (radius_mm * random.uniform(*limits) for limits in (SIZES, DEPTHS))
+        # The corners of a cuboid and the drape stay inside, too.
+        reach, yaw = radius_mm - size / np.sqrt(2.0) - 2.0 * depth, random.uniform(-45.0, 45.0)
+        place = np.sqrt(random.uniform()) * reach * np.exp(2j * np.pi * random.uniform())
+        presses.append(Press(shape, size, depth, float(place.real), float(place.imag), yaw))
+    return tuple(presses)
 
 
 def measure_virtual(
@@ -97,21 +138,24 @@ def measure_virtual(
     widths: Sequence[int] = WIDTHS,
     repeats: int = REPEATS,
     seed: int = 0,
+    curves: bool = False,
     progress: Progress = lambda _what, _share: None,
 ) -> tuple[Point, ...]:
-    """Measure the modes on rendered presses of the virtual sensor.
+    """Measure the modes on `new_presses` of the virtual sensor.
 
     Parameters
     ----------
     design : SensorDesign
-        The sensor, with its presses.
+        The sensor; its own presses are not used.
     calibration : Calibration, optional
         Of the virtual sensor, at any image size. By default it is calibrated from a rendered
         session, at each of `widths`.
     widths : sequence of int, optional
         Of the images, in pixels; with a calibration, its own.
     repeats, seed : int, optional
-        How often each press is timed; seed of the virtual sensor.
+        How often each press is timed; seed of the presses and of the virtual sensor.
+    curves : bool, optional
+        Whether `CURVES` are measured, too.
     progress : callable, optional
         Called with the present task and the share done; its exceptions stop the work.
 
@@ -123,6 +167,7 @@ def measure_virtual(
     if calibration is not None:
         _refuse_other(design.serial, calibration, tr("virtual sensor"))
         widths = (calibration.camera.width,)
+    design = replace(design, presses=new_presses(design, seed))
     points: list[Point] = []
     for number, width in enumerate(widths):
         phase = partial(_phase, progress, number, len(widths))
@@ -141,7 +186,9 @@ def measure_virtual(
                 calibrating = partial(phase, 0.3, 0.6)
                 made = calibrate(read_session(folder), progress=calibrating).calibration
             measuring = partial(phase, 0.6, 1.0)
-            points += measure_session(folder, made, repeats=repeats, progress=measuring)
+            points += measure_session(
+                folder, made, repeats=repeats, curves=curves, progress=measuring
+            )
     return tuple(points)
 
 
@@ -156,6 +203,7 @@ def measure_session(
     calibration: Calibration,
     *,
     repeats: int = REPEATS,
+    curves: bool = False,
     progress: Progress = lambda _what, _share: None,
 ) -> tuple[Point, ...]:
     """Measure the modes with a calibration on the presses of a session folder with truth.
@@ -168,6 +216,8 @@ def measure_session(
         Of the session's sensor.
     repeats : int, optional
         How often each press is timed, after a first run for the error.
+    curves : bool, optional
+        Whether `CURVES` are measured, too.
     progress : callable, optional
         Called with the present task and the share done; its exceptions stop the work.
 
@@ -185,6 +235,10 @@ def measure_session(
             Remedy.CHOOSE_SESSION,
         )
     solvers = dict(reversed(solvers_of(calibration).items()))
+    labels = {name: (Mode(s.model, s.effort).label, "") for name, s in solvers.items()}
+    if curves and EFFORTS[-1] in solvers:
+        for curve, name, solver in curve_solvers(solvers[EFFORTS[-1]]):
+            solvers[name], labels[name] = solver, (name, curve)
     radius_mm = scored_radius_mm(calibration.open_sensor.sensor)
     times_ms: dict[str, list[float]] = {name: [] for name in solvers}
     errors: dict[str, list[tuple[float, ...]]] = {name: [] for name in solvers}
@@ -202,13 +256,32 @@ def measure_session(
                     errors[name].append(_errors(found, truth, row.truth.height_mm, radius_mm))
     progress("", 1.0)
     points = []
-    for name in solvers:
-        median, p95 = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
-        means = np.abs(errors[name]).mean(axis=0).tolist()
-        label, width = modes()[name].label, calibration.camera.width
-        sensor, pitch_mm = calibration.serial, calibration.table.grid.pitch_mm
-        points.append(Point(sensor, name, label, width, pitch_mm, len(rows), median, p95, *means))
+    same = calibration.camera.width, calibration.table.grid.pitch_mm, len(rows)
+    for name, (label, curve) in labels.items():
+        times = np.percentile(times_ms[name], [50.0, 95.0]).tolist()
+        means, within = mean_within(np.abs(errors[name]))
+        point = Point(calibration.serial, name, label, *same, *times, *means)
+        points.append(replace(point, within=within, curve=curve))
     return tuple(points)
+
+
+def curve_solvers(best: Reconstructor) -> Iterator[tuple[str, str, Reconstructor]]:
+    """Yield a parameter, the name of a point on its curve, and the reconstructor, of `CURVES`."""
+    assert isinstance(best.solver, NearLightSolver)
+    for parameter, values in CURVES.items():
+        for value in values:
+            changed = replace(SETTINGS[best.effort], **{parameter: value})  # type: ignore[arg-type]
+            other = copy.copy(best)
+            other.solver = best.solver.with_settings({**SETTINGS, best.effort: changed})
+            yield parameter, f"{parameter} = {value:g}", other
+
+
+def mean_within(errors: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return means (columns,) over rows, and the half widths of their intervals of `CONFIDENCE`."""
+    count = len(errors)
+    factor = stdtrit(count - 1, 0.5 + 0.5 * CONFIDENCE) / np.sqrt(count) if count > 1 else np.nan
+    within = factor * errors.std(axis=0, ddof=min(count - 1, 1))
+    return tuple(errors.mean(axis=0).tolist()), tuple(within.tolist())
 
 
 def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
@@ -255,12 +328,13 @@ def normal_error_deg(found: HeightMap, truth: TrueDepth, radius_mm: float) -> fl
 
 
 def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the points of each width that no other exceeds in both time and depth error.
+    """Return the modes of each width that no other exceeds in both time and depth error.
 
-    The fastest comes first. A slower point must be better by `WORTH`.
+    The fastest comes first. A slower one must be better by `WORTH`.
     """
     front: list[Point] = []
-    for point in sorted(points, key=lambda p: (p.width, p.median_ms, p.rms_um)):
+    modes = [point for point in points if not point.curve]
+    for point in sorted(modes, key=lambda p: (p.width, p.median_ms, p.rms_um)):
         known = front[-1] if front and front[-1].width == point.width else None
         if known is None or point.rms_um < (1.0 - WORTH) * known.rms_um:
             front.append(point)
@@ -292,13 +366,16 @@ def recommended(
 
 def point_table(points: Sequence[Point]) -> str:
     """Return the points as lines of text; a star marks the front."""
-    front = pareto_front(points)
-    heads = ("ms", "p95", "RMS um", "deg", tr("height %"), tr("size %"))
-    lines = [f"  {tr('mode'):<24}{tr('width'):>6}" + "".join(f"{head:>10}" for head in heads)]
+    front, heads = pareto_front(points), ("RMS um", "deg", tr("height %"), tr("size %"))
+    first = f"  {tr('mode'):<24}{tr('width'):>6}{'ms':>10}{'p95':>10}"
+    title = tr("GelPoLight Studio {version}; means with intervals of {share:.0%}")
+    title = title.format(version=__version__, share=CONFIDENCE)
+    lines = [title, first + "".join(f"{head:>17}" for head in heads)]
     for p in points:
-        numbers = [getattr(p, name) for name in ("median_ms", "p95_ms", *ERRORS)]
-        cells = "".join(f"{number:10.2f}" for number in numbers)
-        lines.append(f"{'*' if p in front else ' '} {p.label:<24}{p.width:6d}{cells}")
+        means = zip((getattr(p, name) for name in ERRORS), p.within, strict=True)
+        cells = "".join(f"{mean:9.2f} ±{within:6.2f}" for mean, within in means)
+        start = f"{'*' if p in front else ' '} {p.label:<24}{p.width:6d}"
+        lines.append(f"{start}{p.median_ms:10.2f}{p.p95_ms:10.2f}{cells}")
     return "\n".join(lines)
 
 
@@ -316,20 +393,26 @@ def write_work_precision(points: Sequence[Point], folder: Path) -> tuple[Path, .
         If a file cannot be written.
     """
     front = pareto_front(points)
-    rows = [{**asdict(point), "on_front": point in front} for point in points]
+    keys = [f"{name}_within" for name in ERRORS]
+    rows = [
+        {**asdict(p), **dict(zip(keys, p.within, strict=True)), "on_front": p in front}
+        for p in points
+    ]
     contents = {"csv": csv_of(rows).encode(), "png": figure_png(points)}
     return write_files(folder, {f"work-precision.{end}": made for end, made in contents.items()})
 
 
 def _paint(figure: Figure, points: Sequence[Point]) -> None:
     depth, height = figure.subplots(1, 2)
-    for mode in dict.fromkeys(point.mode for point in points):
-        mine = [point for point in points if point.mode == mode]
+    for line in dict.fromkeys(point.curve or point.label for point in points):
+        mine = [point for point in points if line in (point.curve, point.label)]
         times = [point.median_ms for point in mine]
         late = [[0.0] * len(mine), [point.p95_ms - point.median_ms for point in mine]]
         for axes, name in ((depth, "rms_um"), (height, "height_percent")):
             values = [getattr(point, name) for point in mine]
-            axes.errorbar(times, values, xerr=late, marker="o", label=mine[0].label)
+            within = [point.within[ERRORS.index(name)] for point in mine]
+            bars = {} if mine[0].curve else {"yerr": within, "xerr": late, "marker": "o"}
+            axes.errorbar(times, values, **{"marker": ".", **bars}, label=line)
     for width in dict.fromkeys(point.width for point in points):
         front = [(p.median_ms, p.rms_um) for p in pareto_front(points) if p.width == width]
         depth.step(*zip(*front, strict=True), "k:", where="post")
@@ -338,6 +421,6 @@ def _paint(figure: Figure, points: Sequence[Point]) -> None:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.grid(which="both", color="0.92")
-        axes.set_xlabel(tr("time of a frame (ms); bar: to the 95th percentile"))
+        axes.set_xlabel(tr("time of a frame (ms); to the 95th percentile"))
         axes.set_ylabel(label)
     height.legend(title=tr("dotted: the front of each width"))

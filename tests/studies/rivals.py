@@ -4,8 +4,11 @@
 
 SESSION holds presses with their true depth. A table from colour to slope as if light were parallel,
 a ridge polynomial and a small neural network in colour and position; each is integrated correctly,
-and with the faults that are common in open tactile libraries. Beside them: the paper's model and
-the full model, from the same session. Each row is the mean absolute error over the presses.
+and with the faults that are common in open tactile libraries. They are as strong as they can be:
+they learn the true slopes of the balls and of the drape around them, along the camera's rays, where
+published ones learn those of a sphere seen from straight above. Balls have slopes up to 38 degrees,
+the presses up to 57. Beside them: the paper's model and the full model, from the same session. Each
+row is the mean absolute error over the presses.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.linear import as_linear, linearised
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reflectance.press import BallPress, contact_mask
+from gelpolight_core.reflectance.draped_ball import draped_ball
+from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 from tests.studies.integrators import shifted_cosine_transform
@@ -40,8 +44,8 @@ from tests.studies.presses import (
 
 Predict = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """From relative changes (N, 3) and positions in mm (N, 2) to slopes (N, 2)."""
-FLAT_PIXELS, AWAY_MM = 4000, 4.0
-"""Pixels beside each contact, and their least distance from it."""
+FLAT_PIXELS, AWAY_MM = 4000, 2.0
+"""Pixels that are farther than this from the contact of each press; nearer ones are all used."""
 DARK = 0.01
 """A background below this share of full scale has no ratio."""
 BINS, SPREAD = 48, 99.8
@@ -68,34 +72,31 @@ def relative_change(light: np.ndarray, background: np.ndarray) -> np.ndarray:
     return np.where(lit, light / np.where(lit, background, 1.0) - 1.0, 0.0).astype(np.float32)
 
 
-def ball_samples(results: Results) -> Samples:
-    """Return the pixels of all ball presses, inside and far outside the contact."""
+def ball_samples(results: Results, decay_mm: float) -> Samples:
+    """Return the pixels of all ball presses: the ball, its drape, and some far outside."""
     table, background, balls = results[TOP_POSE].table, results[BACKGROUND].light, results[BALLS]
     parts = [
-        _samples_of(number, press, relative_change(image, background), table)
+        _samples_of(number, press, relative_change(image, background), table, decay_mm)
         for number, (press, image) in enumerate(zip(balls.presses, balls.images, strict=True))
     ]
     return Samples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
 def _samples_of(
-    number: int, press: BallPress, change: np.ndarray, table: ResamplingTable
+    number: int, press: BallPress, change: np.ndarray, table: ResamplingTable, decay_mm: float
 ) -> Samples:
-    contact = np.nonzero(contact_mask(press, table) & table.valid)
     x, y = np.meshgrid(table.grid.x_mm, table.grid.y_mm)
     far = np.hypot(x - press.pose.centre_mm[0], y - press.pose.centre_mm[1])
-    beside = np.argwhere((far > press.contact_radius_mm + AWAY_MM) & table.valid)
+    far -= press.contact_radius_mm
+    around = np.argwhere((far <= AWAY_MM) & table.valid)
+    beside = np.argwhere((far > AWAY_MM) & table.valid)
     beside = np.random.default_rng(0).permutation(beside)[:FLAT_PIXELS]
-    rows, columns = np.concatenate([np.transpose(contact), beside]).T
+    rows, columns = np.concatenate([around, beside]).T
     position = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
-    slopes = np.zeros((rows.size, 2))
-    inside = slice(0, contact[0].size)
-    away = position[inside] - press.seen_centre_mm(table.ray_slope[contact].mean(axis=0))
-    below = np.sqrt(np.maximum(press.pose.radius_mm**2 - (away**2).sum(axis=1), 1e-6))
-    slopes[inside] = -away / below[:, None]
-    ball = np.full(rows.size, number)
-    values = (change[rows, columns], position, slopes)
-    return Samples(*(a.astype(np.float32) for a in values), ball)
+    rays = table.ray_slope[rows, columns].astype(np.float64)
+    normals = draped_ball(position, rays, press.pose, decay_mm=decay_mm)[1]
+    values = (change[rows, columns], position, normals[:, :2] / normals[:, 2:])
+    return Samples(*(a.astype(np.float32) for a in values), np.full(rows.size, number))
 
 
 def fit_table(samples: Samples) -> Predict:
@@ -227,7 +228,8 @@ def compare(
     table, background = full.table, results[BACKGROUND].light
     grid, valid = table.grid, table.valid
     radius_mm = scored_radius_mm(full.data.sensor)
-    samples = ball_samples(results)
+    assert full.data.full is not None
+    samples = ball_samples(results, full.data.full.decay_mm)
     solver = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm)
 
     def errors(depth_of: Callable[[TruePress], np.ndarray]) -> dict[str, float]:

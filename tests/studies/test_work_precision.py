@@ -21,8 +21,10 @@ from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.studies import work_precision
 from gelpolight_core.studies.work_precision import (
     Point,
+    mean_within,
     measure_session,
     measure_virtual,
+    new_presses,
     normal_error_deg,
     pareto_front,
     recommended,
@@ -89,9 +91,43 @@ def test_every_press_is_timed_and_scored_in_every_mode(
     assert best.rms_um < paper.rms_um < 60.0
     assert 0.5 < best.normal_deg < paper.normal_deg < 10.0
     for point in points:
-        assert point.presses == 2
+        assert point.presses == 2 and not point.curve
+        assert all(0.0 < within for within in point.within)
         assert point.p95_ms >= point.median_ms > 0.0
     assert best in pareto_front(points)
+
+
+def test_a_curve_changes_one_parameter_of_the_best_mode(
+    two_presses: Path, virtual_calibration: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work_precision, "CURVES", {"tolerance": (0.3, 3e-4), "steps": (1,)})
+    points = measure_session(two_presses, virtual_calibration, repeats=1, curves=True)
+    um = {point.mode: point.rms_um for point in points}
+    assert [p.mode for p in points if p.curve == "tolerance"] == [
+        "tolerance = 0.3",
+        "tolerance = 0.0003",
+    ]
+    # The mode's own value changes nothing, a loose one does; the mode itself is left as it was.
+    assert um["tolerance = 0.0003"] == um["best"] < 0.9 * um["tolerance = 0.3"]
+    assert um["steps = 1"] != um["best"]
+    assert all(not point.curve for point in pareto_front(points))
+
+
+def test_new_presses_follow_the_seed_and_stay_inside_the_compared_area() -> None:
+    design = SensorDesign()
+    drawn = [new_presses(design, seed, 40) for seed in (0, 1, 1)]
+    assert drawn[0] != drawn[1] == drawn[2]
+    assert {press.shape for press in drawn[0]} == {"cylinder", "cuboid"}
+    reach = [np.hypot(p.x_mm, p.y_mm) + p.size_mm / np.sqrt(2.0) + p.depth_mm for p in drawn[0]]
+    assert max(reach) < 0.5 * design.membrane.working_diameter_mm
+    assert not {p.size_mm for p in drawn[0]} & {p.size_mm for p in design.presses}
+
+
+def test_nineteen_of_twenty_intervals_hold_the_mean_and_one_press_has_none() -> None:
+    errors = np.random.default_rng(5).normal(3.0, 1.0, (8, 4000))
+    means, within = map(np.array, mean_within(errors))
+    assert np.mean(np.abs(means - 3.0) <= within) == pytest.approx(0.95, abs=0.02)
+    assert np.isnan(mean_within(errors[:1])[1]).all()
 
 
 def test_a_calibration_of_the_papers_model_has_this_mode_only(
@@ -109,8 +145,9 @@ def test_the_virtual_sensor_is_calibrated_at_each_width(
 ) -> None:
     scales: list[float] = []
 
-    def simulate(_design: object, out: Path, *, scale: float, **_: object) -> None:
+    def simulate(design: SensorDesign, out: Path, *, scale: float, **_: object) -> None:
         scales.append(scale)
+        assert design.presses == new_presses(SensorDesign(), 0)
         shutil.copytree(small_session, out)
 
     monkeypatch.setattr(work_precision, "simulate_session", simulate)

@@ -7,6 +7,7 @@ by tests.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -142,6 +143,12 @@ class NearLightSolver(OpenSolver):
         self._around = FromAround(self.maps, self.workers)
         self._solver = RegionSolver(self.maps, self.workers, buffers, self._around)
         self._lock = Lock()
+
+    def with_settings(self, settings: Mapping[str, Settings]) -> NearLightSolver:
+        """Return a solver with other settings, for studies; it shares all data and buffers."""
+        other = copy.copy(self)
+        other._settings = settings
+        return other
 
     @cached_property
     def visible_mm(self) -> float:
