@@ -198,6 +198,11 @@ class Preview(QWidget):
         self._curves = curves
         self._ask()
 
+    @property
+    def busy(self) -> bool:
+        """Whether an effect is being computed."""
+        return self._jobs.busy
+
     def stop(self) -> bool:
         """Stop the thread; return whether it has stopped."""
         return self._jobs.close()

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.calibrate.page import CalibratePage
+from app.calibrate.reflectance.lut_plot import Preview
 from app.calibrate.wizard import Wizard
 from app.sources.source import Frame, Setting, SourceLost
 from gelpolight_core.calibration.project import Project
@@ -102,8 +103,13 @@ class Technician:
         self.rest()
 
     def rest(self) -> None:
-        """Wait until no work is in progress."""
-        self._qtbot.waitUntil(lambda: not self.wizard.model.busy, timeout=REST_MS)
+        """Wait until no work is in progress, which may compile what it needs first."""
+
+        def at_rest() -> bool:
+            previews = self.page.findChildren(Preview)
+            return not (self.wizard.model.busy or any(preview.busy for preview in previews))
+
+        self._qtbot.waitUntil(at_rest, timeout=REST_MS)
 
     def until(self, what: Callable[[], object]) -> None:
         """Wait until a condition is true."""

@@ -296,6 +296,7 @@ def curves_of(technician: Technician, project: Project) -> Curves:
     step = technician.wizard.at("result")
     step.tabs.setCurrentIndex(2)
     technician.until(lambda: step.curves.editor is not None)
+    technician.rest()
     return step.curves
 
 
