@@ -61,7 +61,7 @@ MOST = {
     "gelpolight_core/simulation": 2120,
     "gelpolight_core/studies": 1200,
     "tests/.": 1478,
-    "tests/app": 11000,
+    "tests/app": 11007,
     "tests/batch": 501,
     "tests/calibration": 1780,
     "tests/command_line": 1189,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import sys
 import threading
 import time
 import traceback
@@ -171,8 +172,9 @@ def _left_windows(before: list[QWidget]) -> list[QWidget]:
 def _left_threads(before: set[threading.Thread]) -> list[str]:
     end = time.monotonic() + GRACE_S
     while True:
+        at = sys._current_frames()
         left = [
-            thread.name
+            f"{thread.name} at {''.join(traceback.format_stack(at.get(thread.ident or 0), 6))}"
             for thread in threading.enumerate()
             if thread not in before
             and type(thread).__name__ not in LASTING_THREADS

@@ -15,6 +15,8 @@ from technician import ScriptedCamera, Technician, read_rgb
 
 from app.calibrate.reflectance.curves import Curves
 from app.context.context import AppContext
+from gelpolight_core.calibration.ball_stage import REFLECTANCE
+from gelpolight_core.calibration.edit_effect import ball_effect
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
@@ -292,10 +294,15 @@ def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_agai
 
 def curves_of(technician: Technician, project: Project) -> Curves:
     """Open the curves of a project, and return them when their editor is there."""
+    # What its preview calls is compiled here: that takes longer than a closed editor waits for it.
+    run = project.finish()
+    ball_effect(run)({}, run.results[REFLECTANCE].table.presses[0].name)
     technician.begin(project, "result")
     step = technician.wizard.at("result")
     step.tabs.setCurrentIndex(2)
     technician.until(lambda: step.curves.editor is not None)
+    # Shown later than made, and only then at work.
+    technician.until(step.curves.editor.preview.isVisible)
     technician.rest()
     return step.curves
 
@@ -322,7 +329,6 @@ def test_curves_and_other_corrections_share_one_history(
     technician: Technician, computed_project: Made, qtbot: QtBot
 ) -> None:
     step = curves_of(technician, computed_project())
-    technician.until(step.editor.isVisible)
     editor, undo = step.editor, technician.wizard.model.undo
     fitted = editor.curves
     technician.click("lut.smooth")
@@ -339,6 +345,7 @@ def test_curves_and_other_corrections_share_one_history(
     technician.rest()
     technician.until(lambda: step.editor is not None)
     assert step.editor.curves == fitted
+    technician.until(step.editor.preview.isVisible)
     technician.rest()
 
 
