@@ -40,7 +40,7 @@ MOST = {
     "gelpolight_core/calibration": 3973,
     "gelpolight_core/design": 295,
     "gelpolight_core/design_check": 316,
-    "gelpolight_core/export": 708,
+    "gelpolight_core/export": 704,
     "gelpolight_core/factors": 182,
     "gelpolight_core/image": 671,
     "gelpolight_core/in_place": 1416,

@@ -34,7 +34,7 @@ class Banner(QWidget):
     on_act : callable
         Called with the name of the advised action when its button is clicked.
     over : QWidget
-        The views. That the calibration in use is not for the images is said over their upper edge.
+        The views. If the calibration in use is for other images, their upper edge says so.
     """
 
     def __init__(

@@ -284,10 +284,19 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
+def extent_m(heightmap: HeightMap) -> tuple[float, float, float, float]:
+    """Return width, height, left and upper edge in metres.
+
+    They include half a pixel beyond the outermost pixel centres.
+    """
+    rows, columns = heightmap.depth_mm.shape
+    pitch_m = heightmap.pitch_mm * 1e-3
+    left, top = (float(axis[0]) * 1e-3 - pitch_m / 2 for axis in (heightmap.x_mm, heightmap.y_mm))
+    return columns * pitch_m, rows * pitch_m, left, top
+
+
 def write_gsf(heightmap: HeightMap, file: BinaryIO) -> None:
     """Write a Gwyddion Simple Field: the depth in metres, as required by the format.
-
-    Its lengths include half a pixel beyond the outermost pixel centres.
 
     Parameters
     ----------
@@ -301,14 +310,11 @@ def write_gsf(heightmap: HeightMap, file: BinaryIO) -> None:
     Gwyddion user guide, "Simple Field Files".
     """
     rows, columns = heightmap.depth_mm.shape
-    pitch_m = heightmap.pitch_mm * 1e-3
+    extent = zip(("XReal", "YReal", "XOffset", "YOffset"), extent_m(heightmap), strict=True)
     header = {
         "XRes": columns,
         "YRes": rows,
-        "XReal": columns * pitch_m,
-        "YReal": rows * pitch_m,
-        "XOffset": float(heightmap.x_mm[0]) * 1e-3 - pitch_m / 2,
-        "YOffset": float(heightmap.y_mm[0]) * 1e-3 - pitch_m / 2,
+        **dict(extent),
         "XYUnits": "m",
         "ZUnits": "m",
         "Title": _one_line(f"Depth {heightmap.source}"),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.export.raster import has_depth
+from gelpolight_core.export.raster import extent_m, has_depth
 from gelpolight_core.reconstruction.height_map import HeightMap
 
 
@@ -73,8 +73,6 @@ def write_sdf(heightmap: HeightMap, file: BinaryIO) -> None:
 def write_gwy(heightmap: HeightMap, file: BinaryIO) -> None:
     """Write GWY, the file of Gwyddion: the depth in metres, with places without depth masked.
 
-    Its lengths include half a pixel beyond the outermost pixel centres.
-
     Parameters
     ----------
     heightmap : HeightMap
@@ -85,15 +83,9 @@ def write_gwy(heightmap: HeightMap, file: BinaryIO) -> None:
     from gwyfile.objects import GwyContainer, GwyDataField, GwySIUnit  # only needed here
 
     known = has_depth(heightmap)
-    rows, columns = known.shape
-    pitch_m = 1e-3 * heightmap.pitch_mm
-    extent = {
-        "xreal": columns * pitch_m,
-        "yreal": rows * pitch_m,
-        "xoff": 1e-3 * float(heightmap.x_mm[0]) - pitch_m / 2,
-        "yoff": 1e-3 * float(heightmap.y_mm[0]) - pitch_m / 2,
-        "si_unit_xy": GwySIUnit(unitstr="m"),
-    }
+    names = ("xreal", "yreal", "xoff", "yoff")
+    extent = dict(zip(names, extent_m(heightmap), strict=True))
+    extent["si_unit_xy"] = GwySIUnit(unitstr="m")
     depth_m = np.where(known, -_heights_m(heightmap), 0.0)
     channel = GwyContainer(
         {

@@ -166,7 +166,7 @@ def _sharpened(window: WindowData, smoothed_mm2: float) -> Array:
 
 
 class PressedMap(NamedTuple):
-    """The usable part of a height map, and what is pressed there.
+    """The usable part of a height map, with its pressed regions.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ def find_object(
 
 
 def pressed_map(heightmap: HeightMap) -> PressedMap:
-    """Return the usable part of a height map, and what is pressed there."""
+    """Return the usable part of a height map, with its pressed regions."""
     x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
     outside = (heightmap.flags & np.uint8(Flag.OUTSIDE)) != 0
     weight = np.where(heightmap.flags != 0, DOUBTFUL_WEIGHT, 1.0)
