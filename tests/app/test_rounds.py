@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
@@ -14,8 +15,6 @@ ROUNDS = 11
 SETTLED = 4
 # Of memory that is asked for and not given back; a wizard's frames and images alone are 3 MB.
 KEPT_MB = 0.1
-# Rounds at the beginning and the end whose medians are compared.
-ENDS = 3
 
 SCRIPT = """
 import gc, json, sys, threading
@@ -104,5 +103,4 @@ def test_many_rounds_leave_no_widget_thread_or_memory(tmp_path: Path) -> None:
     assert len(set(widgets)) == 1
     assert len(set(threads)) == 1
     # A frame may be under way at any count, and what is compiled late shows once.
-    kept_mb = median(memory_mb[-ENDS:]) - median(memory_mb[:ENDS])
-    assert kept_mb / (len(memory_mb) - ENDS) < KEPT_MB
+    assert median(after - before for before, after in pairwise(memory_mb)) < KEPT_MB

@@ -177,6 +177,7 @@ class Preview(QWidget):
 
         self._work = both
         self._jobs = Jobs("lut-effect", self)
+        self._stopped = False
         self.press = named(ComboBox(), "lut.press", tr("Ball press to show"))
         for name in presses:
             self.press.addItem(PurePath(name).stem, name)
@@ -204,7 +205,8 @@ class Preview(QWidget):
         return self._jobs.busy
 
     def stop(self) -> bool:
-        """Stop the thread; return whether it has stopped."""
+        """Stop the thread for good, also if shown later; return whether it has stopped."""
+        self._stopped = True
         return self._jobs.close()
 
     def apply_theme(self) -> None:
@@ -223,7 +225,7 @@ class Preview(QWidget):
 
     def _ask(self) -> None:
         name = self.press.currentData()
-        if name is not None and self.isVisible():
+        if name is not None and self.isVisible() and not self._stopped:
             if not self.words.text():
                 self.words.setText(tr("Reconstructing the press."))
             work, show = partial(self._work, self._curves, name), partial(self._show, name)

@@ -15,8 +15,6 @@ from technician import ScriptedCamera, Technician, read_rgb
 
 from app.calibrate.reflectance.curves import Curves
 from app.context.context import AppContext
-from gelpolight_core.calibration.ball_stage import REFLECTANCE
-from gelpolight_core.calibration.edit_effect import ball_effect
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
@@ -294,9 +292,6 @@ def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_agai
 
 def curves_of(technician: Technician, project: Project) -> Curves:
     """Open the curves of a project, and return them when their editor is there."""
-    # What its preview calls is compiled here: that takes longer than a closed editor waits for it.
-    run = project.finish()
-    ball_effect(run)({}, run.results[REFLECTANCE].table.presses[0].name)
     technician.begin(project, "result")
     step = technician.wizard.at("result")
     step.tabs.setCurrentIndex(2)

@@ -148,3 +148,10 @@ def test_each_tool_can_be_undone(editor: LutEditor, name: str) -> None:
     while editor.undo_stack.canUndo():
         editor.undo_stack.undo()
     assert editor.curve == model.thin_nodes(model.fitted_curves(fitted())[0])
+
+
+def test_a_stopped_editor_that_is_shown_late_starts_no_thread(editor: LutEditor) -> None:
+    editor.hide()
+    assert editor.stop()
+    editor.show()
+    assert not editor.preview.busy
