@@ -78,6 +78,7 @@ def _can_turn(scene: Scene) -> bool:
 # A coin that can be solved in seconds; the board in front of the lens may be anywhere in view.
 _LARGEST_MM = 12.0
 _DEEPEST_MM = 3.0
+_HALVINGS = 30  # of a few mm: far below a micrometre
 _MM = " " + tr("mm")
 TIMES = " " + tr("times")
 ABOUT_NOISE = tr("0 is no noise, 1 is the noise of the design")
@@ -289,6 +290,14 @@ class Bench:
             return None
         ray = trace_points(camera, layers, *pixel)
         x, y = float(ray.x_mm), float(ray.y_mm)
+        if scene.item in PRESSED:
+            membrane, slope_x, slope_y = self.design.membrane, ray.slope_x, ray.slope_y
+            low, high = 0.0, membrane.apex_height_mm
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                at = membrane.height_mm(np.hypot(x + middle * slope_x, y + middle * slope_y))
+                low, high = (middle, high) if at > middle else (low, middle)
+            x, y = float(x + low * slope_x), float(y + low * slope_y)
         return (x, y) if math.isfinite(x) and math.isfinite(y) else None
 
     def depth_range_mm(self, scene: Scene) -> tuple[float, float]:

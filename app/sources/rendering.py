@@ -175,7 +175,7 @@ class _Makers:
 
     def _coarse_state(self, design: SensorDesign, scene: Scene, interrupt: Interrupt) -> State:
         """Return the state for a preview: during a drag, an object's shape is solved only once."""
-        if scene.item not in PRESSED:
+        if scene.item not in PRESSED or design.membrane.apex_height_mm > 0.0:
             return state_of(self._bench, design, scene, interrupt)
         middle = replace(scene, x_mm=0.0, y_mm=0.0)
         if self._shape is None or self._shape[0] != middle:

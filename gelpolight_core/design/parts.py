@@ -162,6 +162,9 @@ class MembraneDesign:
     ----------
     working_diameter_mm : float
         Diameter of the coated and visible circle.
+    apex_height_mm : float
+        Height of the undeformed membrane on its axis, a spherical cap over that circle, away from
+        the camera; 0: flat. At most a third of the diameter.
     diffuse_reflectance : float
         Reflectance of the diffuse component.
     specular_weight : float
@@ -183,6 +186,7 @@ class MembraneDesign:
     """
 
     working_diameter_mm: float = _within(26.0, 0.5, 500.0)
+    apex_height_mm: float = _within(0.0, 0.0, 500.0)
     diffuse_reflectance: float = _within(0.8, 0.0, 1.0)
     specular_weight: float = _within(0.3, 0.0, 1.0)
     specular_reflectance: float = _within(0.73, 0.0, 1.0)
@@ -192,6 +196,27 @@ class MembraneDesign:
     speck_count: int = _within(30, 0, 10000)
     decay_length_mm: float = _within(0.7, 0.05, 20.0)
     bounces: int = _within(0, 0, 64)
+
+    @property
+    def curvature_per_mm(self) -> float:
+        """1 / radius of the cap's sphere; 0 if the membrane is flat."""
+        return (
+            2.0
+            * self.apex_height_mm
+            / (0.25 * self.working_diameter_mm**2 + self.apex_height_mm**2)
+        )
+
+    def height_mm(self, radius_mm: Array) -> Array:
+        """Return the height of the undeformed membrane over the plane of its boundary.
+
+        Parameters
+        ----------
+        radius_mm : (...)
+            Distance from its axis; the sphere goes on below that plane.
+        """
+        bent = np.square(self.curvature_per_mm * radius_mm)
+        fall = self.curvature_per_mm * np.square(radius_mm)
+        return np.asarray(self.apex_height_mm - fall / (1.0 + np.sqrt(np.maximum(1.0 - bent, 0.0))))
 
 
 @dataclass(frozen=True, slots=True)

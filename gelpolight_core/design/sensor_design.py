@@ -153,6 +153,14 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
             f"{where} [layers]",
             Remedy.CORRECT_VALUE,
         )
+    if design.membrane.apex_height_mm > design.membrane.working_diameter_mm / 3.0:
+        raise InputError(
+            tr("The membrane's apex is {a} mm high, more than a third of its diameter").format(
+                a=design.membrane.apex_height_mm
+            ),
+            f"{where} [membrane]",
+            Remedy.CORRECT_VALUE,
+        )
     if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
         raise InputError(
             tr("The camera has {w} x {h} pixels, more than {n} megapixels").format(

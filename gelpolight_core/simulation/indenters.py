@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from gelpolight_core.design.parts import MembraneDesign
+from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
@@ -24,9 +26,16 @@ Array = NDArray[np.float64]
 PITCH_MM = 0.025
 """Default cell size of a pressed surface: one pixel of the default sensor's image."""
 
+_FLAT = MembraneDesign()
+
 MARGIN_DECAYS = 8.0
 """Margin around an indenter in decay lengths: the depth falls to exp(-8) of its value at the edge.
 """
+
+
+def image_pitch_mm(design: SensorDesign) -> float:
+    """Return the cell size of a surface as fine as the image shows it."""
+    return max(PITCH_MM, 0.7 * design.layers.top_distance_mm / design.camera.fx)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,14 +189,16 @@ def press(
     y_mm: float = 0.0,
     yaw_deg: float = 0.0,
     decay_mm: float = 0.7,
+    rest: MembraneDesign = _FLAT,
     pitch_mm: float = PITCH_MM,
     margin_mm: float = 0.0,
     interrupt: Interrupt = never,
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
 
-    An axisymmetric shape is solved in closed form; any other on a grid in its own frame, which is
-    then rotated.
+    On a flat membrane, an axisymmetric shape is solved in closed form; any other on a grid in its
+    own frame, which is then rotated. A shape stays upright on a curved membrane, and its depth is
+    the indentation at its axis.
 
     Parameters
     ----------
@@ -197,6 +208,8 @@ def press(
         Position, and rotation (from x to y).
     decay_mm : float, optional
         Decay length of the membrane.
+    rest : MembraneDesign, optional
+        The membrane, of which the shape at rest is used.
     pitch_mm : float, optional
         Cell size of the surface.
     margin_mm : float, optional
@@ -209,13 +222,20 @@ def press(
     half = indenter.reach_mm * (_square_reach(yaw_deg) if turned else 1.0) + margin
     xs, ys = _cells(x_mm, half, pitch_mm), _cells(y_mm, half, pitch_mm)
     dx, dy = np.meshgrid(xs - x_mm, ys - y_mm)
-    if isinstance(indenter, (Ball, Cylinder)):
+    if isinstance(indenter, (Ball, Cylinder)) and rest.apex_height_mm == 0.0:
         depth, contact = _round_drape(indenter, np.hypot(dx, dy), decay_mm)
     else:
-        yaw = math.radians(yaw_deg)
-        along = dx * math.cos(yaw) + dy * math.sin(yaw)
-        across = dy * math.cos(yaw) - dx * math.sin(yaw)
-        depth, contact = _turned_drape(indenter, along, across, decay_mm, pitch_mm, interrupt)
+        cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
+
+        def obstacle(along: Array, across: Array) -> Array:
+            x, y = x_mm + along * cos - across * sin, y_mm + along * sin + across * cos
+            height = rest.height_mm(np.hypot(x, y)) - rest.height_mm(np.hypot(x_mm, y_mm))
+            return indenter.obstacle(along, across) + height
+
+        along, across = dx * cos + dy * sin, dy * cos - dx * sin
+        depth, contact = _turned_drape(
+            indenter, obstacle, along, across, decay_mm, pitch_mm, interrupt
+        )
     return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
 
 
@@ -244,7 +264,8 @@ def _round_drape(
 
 
 def _turned_drape(
-    indenter: Cuboid | Relief,
+    indenter: Indenter,
+    obstacle: Callable[[Array, Array], Array],
     along: Array,
     across: Array,
     decay_mm: float,
@@ -255,15 +276,13 @@ def _turned_drape(
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
     # The outline lies on cells, so that the block has its nominal side.
     count = math.ceil(half / pitch_mm)
-    step = indenter.reach_mm / max(1, round(indenter.reach_mm / pitch_mm))
+    step = indenter.reach_mm / max(1, round(indenter.reach_mm / pitch_mm)) or pitch_mm
     cells = step * np.arange(-count, count + 1, dtype=np.float64)
-    depth, contact = solve_drape(
-        indenter.obstacle, cells, cells, decay_mm=decay_mm, interrupt=interrupt
-    )
+    depth, contact = solve_drape(obstacle, cells, cells, decay_mm=decay_mm, interrupt=interrupt)
     position = [across / step + count, along / step + count]
     turned = map_coordinates(depth, position, order=3, mode="constant", cval=0.0, prefilter=True)
     touched = map_coordinates(contact.astype(np.float64), position, order=1, cval=0.0) > 0.5
-    return np.clip(turned, 0.0, indenter.depth_mm), touched
+    return np.clip(turned, 0.0, max(indenter.depth_mm, float(depth.max()))), touched
 
 
 def _heights(half_mm: float, height: Callable[[Array, Array], Array]) -> Array:

@@ -118,11 +118,12 @@ def _on_lattice(
     x, y = np.meshgrid(cells, cells)
     at = ((x - surface.x0_mm) / surface.pitch_mm, (y - surface.y0_mm) / surface.pitch_mm)
     depth = sample_all(surface.depth_mm, *at)
+    pressed = sample_all(np.asarray(surface.depth_mm - surface.rest_mm), *at)
     slopes = [sample_all(slope, *at) for slope in (surface.slope_x, surface.slope_y)]
     within = np.hypot(x, y) <= rim_mm + 1.5 * coarsest * FINEST_MM
     maps = np.zeros((2 * count // coarsest + 1, 2 * count // coarsest + 1, lamps))
     previous = coarsest
-    for step, paths, wanted in zip(_STEPS, _PATHS, _wanted(depth, slopes), strict=True):
+    for step, paths, wanted in zip(_STEPS, _PATHS, _wanted(pressed, slopes), strict=True):
         maps, previous = _between(maps, previous // step), step
         rows, columns = step * np.argwhere((wanted & within)[::step, ::step]).T
         points = np.stack([cells[columns], cells[rows], -depth[rows, columns]], axis=-1)
@@ -131,9 +132,9 @@ def _on_lattice(
     return IndirectLight(np.ascontiguousarray(np.moveaxis(maps, -1, 0)), float(cells[0]), FINEST_MM)
 
 
-def _wanted(depth: Array, slopes: list[Array]) -> tuple[NDArray[np.bool_], ...]:
+def _wanted(pressed: Array, slopes: list[Array]) -> tuple[NDArray[np.bool_], ...]:
     """Return where nodes of each distance are needed, coarse to fine."""
-    near = maximum_filter(depth, size=2 * round(_NEAR_MM / FINEST_MM) + 1) > _PRESSED_MM
+    near = maximum_filter(pressed, size=2 * round(_NEAR_MM / FINEST_MM) + 1) > _PRESSED_MM
     bends = [maximum_filter(slope, size=5) - minimum_filter(slope, size=5) for slope in slopes]
     return np.ones_like(near), near, near & (np.hypot(*bends) > _BENT)
 

@@ -26,7 +26,7 @@ EXPOSURE_MS = 8.0
 
 def session_stages(design: SensorDesign) -> tuple[str, ...]:
     """Return the image folders of a session of a design."""
-    left_out = set()
+    left_out = {"whiteboard", "response", "single_led"} if design.membrane.apex_height_mm else set()
     if design.session.response_pictures == 0:
         left_out.add("response")
     if not design.session.single_led:
@@ -54,6 +54,12 @@ def press_names(presses: tuple[Press, ...]) -> tuple[str, ...]:
     return tuple(names)
 
 
+def membrane_table(design: SensorDesign) -> str:
+    """Return the lines of session.toml for a curved membrane, or nothing."""
+    apex = design.membrane.apex_height_mm
+    return f'\n[membrane]\nshape = "spherical_cap"\napex_height_mm = {apex!r}\n' if apex else ""
+
+
 def camera_table(design: SensorDesign) -> str:
     """Return the lines of session.toml that declare the camera response, if any."""
     camera = design.camera
@@ -68,7 +74,7 @@ def response_tables(design: SensorDesign) -> str:
     """Return the lines of session.toml for the camera response and its series, if any."""
     text = camera_table(design)
     series = exposure_series(design)
-    if series:
+    if "response" in session_stages(design):
         lines = (f'"{name}" = {EXPOSURE_MS * x!r}\n' for name, x in series.items())
         text += f"\n[response]\n{''.join(lines)}"
     return text

@@ -24,12 +24,12 @@ from gelpolight_core.io.atomic import make_folder, write_atomically, write_text
 from gelpolight_core.simulation.boards import BoardPose, board_views
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.indenters import (
-    PITCH_MM,
     Ball,
     Cuboid,
     Cylinder,
     Indenter,
     coin,
+    image_pitch_mm,
     nut,
     press,
 )
@@ -37,6 +37,7 @@ from gelpolight_core.simulation.plan import (
     AVERAGED,
     camera_table,
     exposure_series,
+    membrane_table,
     press_names,
     response_tables,
     session_stages,
@@ -93,7 +94,8 @@ def simulate_session(
 
     The folder contains 16 checkerboard views, the board on the top surface, mirror, whiteboard,
     background, the balls and presses of the design, and the optional stages of its ``session``: the
-    whiteboard at several exposures, and with a single LED on.
+    whiteboard at several exposures, and with a single LED on. The whiteboard fits only a flat
+    membrane.
 
     Parameters
     ----------
@@ -241,8 +243,8 @@ def pressed_membrane(
             y_mm=y_mm,
             yaw_deg=yaw_deg,
             decay_mm=design.membrane.decay_length_mm,
-            # As fine as the image shows it.
-            pitch_mm=max(PITCH_MM, 0.7 * design.layers.top_distance_mm / design.camera.fx),
+            rest=design.membrane,
+            pitch_mm=image_pitch_mm(design),
             interrupt=interrupt,
         )
     )
@@ -320,7 +322,7 @@ elastomer_refractive_index = {layers.elastomer_refractive_index!r}
 window_thickness_mm = {layers.window_thickness_mm!r}
 window_refractive_index = {layers.window_refractive_index!r}
 working_diameter_mm = {design.membrane.working_diameter_mm!r}
-
+{membrane_table(design)}
 [checkerboard]
 inner_corners = {corners}
 square_mm = {_VIEW_SQUARE_MM}

@@ -253,7 +253,7 @@ def shade_pressed(
     if window is None:
         return
     rows, columns = window
-    chosen = np.argwhere(np.ones((rows.stop - rows.start, columns.stop - columns.start), bool))
+    chosen = np.argwhere(np.isfinite(rays.x_mm[window]))
     corner = np.array([rows.start, columns.start])
     parts = (
         (rays.x_mm, rays.y_mm, rays.slope_x, rays.slope_y, rays.transmission),

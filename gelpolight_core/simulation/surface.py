@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
+
+from gelpolight_core.design.parts import MembraneDesign
 
 Array = NDArray[np.float64]
 
@@ -28,6 +31,8 @@ class PressedSurface:
         Position of the first cell's centre, sensor frame.
     pitch_mm : float
         Distance between cells.
+    rest_mm : (rows, columns) or float, optional
+        Depth of the membrane at rest, see :meth:`on`.
     """
 
     depth_mm: Array
@@ -35,6 +40,7 @@ class PressedSurface:
     x0_mm: float
     y0_mm: float
     pitch_mm: float
+    rest_mm: Array | float = 0.0
     slope_x: Array = field(init=False, repr=False)
     slope_y: Array = field(init=False, repr=False)
     tile_max: Array = field(init=False, repr=False)
@@ -64,6 +70,31 @@ class PressedSurface:
     def y_mm(self) -> Array:
         """(rows,) positions of the cells."""
         return self.y0_mm + self.pitch_mm * np.arange(self.depth_mm.shape[0], dtype=np.float64)
+
+    def on(self, membrane: MembraneDesign) -> PressedSurface:
+        """Return the whole surface of a curved membrane that is pressed in like this one.
+
+        Its depth is measured from the plane of the apex, so that it is nowhere negative. A flat
+        membrane is zero outside the grid already.
+        """
+        if membrane.apex_height_mm == 0.0:
+            return self
+        # Level only beyond the cells that the slope at the boundary is read from.
+        end = 0.5 * membrane.working_diameter_mm + 3.0 * self.pitch_mm
+        ends = ((self.y_mm[0], self.y_mm[-1]), (self.x_mm[0], self.x_mm[-1]))
+        room = [
+            [max(0, math.ceil(gap / self.pitch_mm)) for gap in (end + first, end - last)]
+            for first, last in ends
+        ]
+        y0, x0 = (first - r[0] * self.pitch_mm for (first, _), r in zip(ends, room, strict=True))
+        depth, contact = np.pad(self.depth_mm, room), np.pad(self.contact, room)
+        y, x = (
+            start + self.pitch_mm * np.arange(n)
+            for start, n in zip((y0, x0), depth.shape, strict=True)
+        )
+        radius = np.minimum(np.hypot(x[None], y[:, None]), end)
+        rest = membrane.apex_height_mm - membrane.height_mm(radius)
+        return PressedSurface(depth + rest, contact, x0, y0, self.pitch_mm, rest)
 
 
 def _tiles(depth_mm: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.design.parts import BallPress
+from gelpolight_core.design.parts import BallPress, MembraneDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.io.table import csv_text
 from gelpolight_core.simulation.drape import contact_radius
@@ -65,12 +65,13 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
                 "file": f"ball_{number:02d}.png",
                 "radius_mm": ball.radius_mm,
                 "depth_mm": ball.depth_mm,
-                "contact_radius_mm": _ball_contact(ball, membrane.decay_length_mm),
+                "contact_radius_mm": _ball_contact(ball, membrane),
                 "centre_sensor_xy_mm": [ball.x_mm, ball.y_mm],
             }
             for number, ball in enumerate(design.balls)
         ],
         "membrane": {
+            "apex_height_mm": membrane.apex_height_mm,
             "kind": "blend" if membrane.specular_weight > 0.0 else "diffuse",
             "diffuse": membrane.diffuse_reflectance,
             "spec_weight": membrane.specular_weight,
@@ -113,6 +114,8 @@ def _photometry_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str,
     }
 
 
-def _ball_contact(ball: BallPress, decay_mm: float) -> float:
-    shape = Ball(ball.radius_mm, ball.depth_mm)
-    return contact_radius(shape.profile, shape.reach_mm, decay_mm)
+def _ball_contact(ball: BallPress, membrane: MembraneDesign) -> float:
+    # As for a flat membrane and a ball that is more strongly curved by as much as the cap is.
+    radius_mm = ball.radius_mm / (1.0 + ball.radius_mm * membrane.curvature_per_mm)
+    shape = Ball(radius_mm, ball.depth_mm)
+    return contact_radius(shape.profile, shape.reach_mm, membrane.decay_length_mm)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.boards import BoardPose, board_image, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
+from gelpolight_core.simulation.indenters import image_pitch_mm
 from gelpolight_core.simulation.indirect_light import IndirectLight
 from gelpolight_core.simulation.interreflection import FLAT, indirect_light
 from gelpolight_core.simulation.lamps import PointLamp, lamp_table, lamps_of
@@ -29,6 +30,9 @@ from gelpolight_core.simulation.shading import Material, flat_brightness, shade_
 from gelpolight_core.simulation.surface import PressedSurface
 
 Array = NDArray[np.float64]
+
+Factors = tuple[Array, float, float, float]
+"""Reflectance factor over the membrane, as :func:`reflectance_factor` returns it."""
 
 _MIRROR_SAMPLES = 8
 
@@ -117,26 +121,38 @@ class VirtualSensor:
         self.seed = seed
         self.lamps = lamps_of(design) if lamps is None else lamps
         self.material = Material.of_membrane(design.membrane)
-        self._table = lamp_table(self.lamps)
+        apex, layers = design.membrane.apex_height_mm, design.layers
+        # Rays, lamps and depths are those from the plane of the apex, so that no depth is negative.
+        self._table = lamp_table(
+            tuple(replace(lamp, height_mm=lamp.height_mm + apex) for lamp in self.lamps)
+        )
+        self._lit = replace(
+            design,
+            layers=replace(
+                layers,
+                top_distance_mm=layers.top_distance_mm + apex,
+                elastomer_thickness_mm=layers.elastomer_thickness_mm + apex,
+            ),
+        )
+        self._bare = FLAT
+        if apex > 0.0:
+            self._bare = replace(FLAT, pitch_mm=image_pitch_mm(design)).on(design.membrane)
         self._count = 0
-        self.rays = trace_pixels(design.camera, design.layers, interrupt=interrupt)
+        self.rays = trace_pixels(design.camera, self._lit.layers, interrupt=interrupt)
+        self._even = even_factor(design.membrane)
         self.factors = reflectance_factor(
             design.membrane, np.random.default_rng([seed, zlib.crc32(b"membrane")])
         )
         interrupt()
         self._board = Material(design.photometry.whiteboard_reflectance)
         self._board_light = indirect_light(
-            design,
-            self._table,
-            FLAT,
-            even_factor(design.membrane),
-            self._board,
-            interrupt=interrupt,
+            self._lit, self._table, self._bare, self._even, self._board, interrupt=interrupt
         )
-        self.exposure = self._exposure()
+        self.exposure = self._exposure(interrupt)
         interrupt()
         self._cover = self._rim_cover()
-        self._membrane = self._flat_membrane(self._membrane_light(FLAT, interrupt))
+        indirect = self._membrane_light(self._bare, interrupt)
+        self._membrane = self._at_rest(self.material, self.factors, indirect, interrupt)
 
     def brightness(self, state: State, *, samples: int = 3, interrupt: Interrupt = never) -> Array:
         """Return the exact image (rows, columns, 3), linear, before noise and saturation.
@@ -158,20 +174,21 @@ class VirtualSensor:
         if isinstance(state, Mirror):
             light = self._mirror() * photometry.mirror_peak
         elif isinstance(state, Whiteboard):
-            light = self._flat(self._board, self._board_light)
+            light = self._at_rest(self._board, self._even, self._board_light, interrupt)
             light *= self.exposure * state.exposure
             if state.led is not None:
                 light[..., np.arange(light.shape[2]) != state.led] = 0.0
         else:
             light = self._membrane.copy()
             if isinstance(state, PressedMembrane):
-                indirect = self._membrane_light(state.surface, interrupt)
+                surface = state.surface.on(self.design.membrane)
+                indirect = self._membrane_light(surface, interrupt)
                 if self.design.membrane.bounces > 0:
-                    light = self._flat_membrane(indirect)
+                    light = self._flat(self.material, self.factors, indirect)
                 shade_pressed(
                     light,
                     self.rays,
-                    state.surface,
+                    surface,
                     self.factors,
                     self._table,
                     self.material,
@@ -217,18 +234,32 @@ class VirtualSensor:
 
     def _membrane_light(self, surface: PressedSurface, interrupt: Interrupt) -> IndirectLight:
         return indirect_light(
-            self.design, self._table, surface, self.factors, self.material, interrupt=interrupt
+            self._lit, self._table, surface, self.factors, self.material, interrupt=interrupt
         )
 
-    def _flat_membrane(self, indirect: IndirectLight) -> Array:
-        return self._flat(self.material, indirect) * self._factor_seen()[..., None]
+    def _at_rest(
+        self, material: Material, factors: Factors, indirect: IndirectLight, interrupt: Interrupt
+    ) -> Array:
+        """Brightness of the surface at rest at each pixel, before exposure."""
+        light = self._flat(material, factors, indirect)
+        shade_pressed(
+            light,
+            self.rays,
+            self._bare,
+            factors,
+            self._table,
+            material,
+            indirect,
+            interrupt=interrupt,
+        )
+        return light
 
-    def _flat(self, material: Material, indirect: IndirectLight) -> Array:
-        """Brightness of the flat top surface at each pixel, before exposure."""
+    def _flat(self, material: Material, factors: Factors, indirect: IndirectLight) -> Array:
+        """Brightness of a flat surface in the plane of the apex, before exposure."""
         light = flat_brightness(self.rays, self._table, material)
         indirect.add_flat(light, self.rays)
         light *= (self.rays.transmission * self._cover)[..., None]
-        return np.nan_to_num(light)
+        return np.nan_to_num(light) * self._factor_seen(factors)[..., None]
 
     def _rim_cover(self) -> Array:
         """Share of each pixel that lies inside the working circle."""
@@ -238,20 +269,34 @@ class VirtualSensor:
         cover = np.clip((rim - radius) / np.maximum(pixel, 1e-9) + 0.5, 0.0, 1.0)
         return np.asarray(np.nan_to_num(cover))
 
-    def _factor_seen(self) -> Array:
-        factor, first, pitch, _ = self.factors
+    def _factor_seen(self, factors: Factors) -> Array:
+        factor, first, pitch, _ = factors
         rays = self.rays
         column, row = (rays.x_mm - first) / pitch, (rays.y_mm - first) / pitch
         return sample_all(factor, np.asarray(column), np.asarray(row))
 
-    def _exposure(self) -> float:
-        """Exposure at which the brightest point of the whiteboard image has the stated peak."""
+    def _exposure(self, interrupt: Interrupt) -> float:
+        """Exposure at which the brightest point of the whiteboard image has the stated peak.
+
+        A curved membrane is thought to be covered by the white of the board.
+        """
         photometry = self.design.photometry
         rim = 0.5 * self.design.membrane.working_diameter_mm
         rays = self.rays
         light = flat_brightness(rays, self._table, self._board)
         self._board_light.add_flat(light, rays)
         light *= rays.transmission[..., None]
+        shade_pressed(
+            light,
+            rays,
+            self._bare,
+            self._even,
+            self._table,
+            self._board,
+            self._board_light,
+            samples=1,
+            interrupt=interrupt,
+        )
         inside = np.hypot(rays.x_mm, rays.y_mm) <= rim
         seen = mixed(light[inside], photometry.crosstalk)
         peak = float(seen.max(initial=0.0))

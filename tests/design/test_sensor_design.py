@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.design.sensor_design import SensorDesign, read_design, validate_design
 from gelpolight_core.errors import InputError
 
@@ -73,6 +75,8 @@ def test_values_from_a_file_replace_defaults(tmp_path: Path) -> None:
         ("[session]\nsingle_led = 1", "single_led"),
         ("[session]\nresponse_pictures = true", "response_pictures"),
         ("[layers]\ntop_distance_mm = 10.0", "layers"),
+        ("[membrane]\napex_height_mm = 8.7", "[membrane]"),
+        ("[membrane]\napex_height_mm = -0.1", "apex_height_mm"),
         ("[[leds]]\nx_mm = 1.0", "LEDs"),
         ("[leds]\nx_mm = 1.0", "leds"),
         ("[[presses]]\nshape = 'pyramid'", "pyramid"),
@@ -106,3 +110,14 @@ def test_the_hard_design_that_is_shipped_is_as_hard_as_it_says() -> None:
     rim = 0.5 * design.membrane.working_diameter_mm
     reach = [math.hypot(p.x_mm, p.y_mm) + 0.5 * p.size_mm for p in design.presses]
     assert max(reach) > rim
+
+
+@pytest.mark.parametrize("apex_mm", [0.05, 2.0, 8.0])
+def test_a_curved_membrane_is_a_part_of_one_sphere_over_its_circle(apex_mm: float) -> None:
+    membrane = MembraneDesign(working_diameter_mm=26.0, apex_height_mm=apex_mm)
+    radius_mm = (13.0**2 + apex_mm**2) / (2.0 * apex_mm)
+    away = np.linspace(0.0, 13.0, 27)
+    expected = np.sqrt(radius_mm**2 - away**2) - (radius_mm - apex_mm)
+    assert membrane.height_mm(away) == pytest.approx(expected, abs=1e-11)
+    assert membrane.curvature_per_mm == pytest.approx(1.0 / radius_mm)
+    assert not MembraneDesign().height_mm(away).any()
