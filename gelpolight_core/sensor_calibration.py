@@ -34,6 +34,7 @@ from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import SENSOR_RANGES, SensorData
+from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 from gelpolight_core.validation import Validation
 
@@ -306,6 +307,8 @@ class OpenSensor:
         calibrations by programs that did not measure it.
     grain : Grain or None
         Grain of the ball presses' images; None in calibrations by programs that did not measure it.
+    shape : Surface or None
+        The undeformed membrane; None: flat.
 
     Raises
     ------
@@ -328,6 +331,12 @@ class OpenSensor:
     bad: BadPixels | None = None
     lens_blur_px: float | None = None
     grain: Grain | None = None
+    shape: Surface | None = None
+
+    @property
+    def surface(self) -> Surface:
+        """The undeformed membrane."""
+        return self.shape or FLAT
 
     @property
     def serial(self) -> str:
@@ -352,6 +361,7 @@ class OpenSensor:
             self.plane,
             self.stack,
             working_diameter_mm=self.sensor.working_diameter_mm,
+            surface=self.surface,
         )
 
     @property
@@ -416,6 +426,8 @@ class OpenSensor:
             arrays.append(self.bad.pixels)
         if self.lens_blur_px is not None:
             hashed.update(repr(self.lens_blur_px).encode())
+        if self.shape is not None:
+            hashed.update(repr(self.shape).encode())
         for array in arrays:
             hashed.update(np.ascontiguousarray(array).tobytes())
         return hashed.digest()
@@ -442,6 +454,7 @@ class OpenSensor:
         if self.bad is not None and (self.bad.width, self.bad.height) != lengths[:2]:
             raise ValueError("the bad pixels are of another image size")
         self.reflectance.check()
+        self.surface.check()
         shapes: list[tuple[NDArray[Any], tuple[int, ...]]] = [
             (self.led_positions_mm, (3, 3)),
             (self.led_covariance_mm2, (3, 3, 3)),
@@ -474,7 +487,8 @@ class OpenSensor:
 
     def to_pixels(self, points_mm: Array) -> Array:
         """Return the camera pixels (N, 2) that see points (N, 2) of the undeformed membrane."""
-        directions = membrane_to_camera(np.asarray(points_mm, float), self.plane, self.stack)
+        points = np.asarray(points_mm, float)
+        directions = membrane_to_camera(points, self.plane, self.stack, self.surface)
         return np.asarray(self.camera.project(directions))
 
 

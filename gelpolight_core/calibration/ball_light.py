@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -56,10 +57,12 @@ def with_light_from_around(
         return []
     view = pixels[0].view_of_field
     shape = view.reflecting.shape
-    points = np.concatenate([view.points_mm, np.zeros((len(view.points_mm), 1))], axis=1)
-    facets = points.reshape(*shape, 3)
+    points, at_rest = view.points_mm, view.surface
+    facets = at_rest.points(points).reshape(*shape, 3)
+    up = at_rest.normals(points).reshape(*shape, 3)
     flat, returned = flat_light(
         facets,
+        up,
         view.view,
         view.reflecting,
         leds_mm,
@@ -71,17 +74,18 @@ def with_light_from_around(
 
     def lit(pair: tuple[BallPixels, BallPose]) -> BallPixels:
         own, ball = pair
-        surface, normals, _ = draped_ball(view.points_mm, view.ray_slope, ball, decay_mm=decay_mm)
+        drape = partial(draped_ball, pose=ball, decay_mm=decay_mm, surface=at_rest)
+        surface, normals, _ = drape(points, view.ray_slope)
         field = Surface(
             surface.reshape(*shape, 3),
             normals.reshape(*shape, 3),
             view.view,
             own.field * background,
         )
-        points, at, _ = draped_ball(own.points_mm, own.ray_slope, ball, decay_mm=decay_mm)
+        places, at, _ = drape(own.points_mm, own.ray_slope)
         place = view.index(own.points_mm)
         nearest = np.clip(np.round(place), 0, np.array(shape) - 1)
-        receivers = Receivers(points, at, own.view, nearest)
+        receivers = Receivers(places, at, own.view, nearest)
         found = gathered(field, receivers, leds_mm, membrane, view.pitch_mm, slab=slab)
         level = np.maximum(_at(flat, place), 1e-9)
         return replace(own, around=found / level, around_flat=_at(returned, place) / level)

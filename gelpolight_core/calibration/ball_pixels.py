@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED
+from gelpolight_core.optics.refraction import LIFTS
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average, middles
 from gelpolight_core.reflectance.gathered_light import ratio_reflected
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
 from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -36,7 +38,7 @@ class CoarseView:
     Attributes
     ----------
     points_mm, ray_slope : (rows * columns, 2)
-        Where the rays meet the flat membrane, and their slope.
+        Where the rays meet the undeformed membrane, and their slope.
     view : (rows, columns, 3)
         Unit directions back to the camera.
     reflecting : (rows, columns) float32
@@ -45,6 +47,8 @@ class CoarseView:
         Distance between nodes.
     factor : int
         Nodes of the calibration's grid to one of these, along an axis.
+    surface : Surface
+        The undeformed membrane.
     """
 
     points_mm: Array
@@ -53,6 +57,7 @@ class CoarseView:
     reflecting: Map
     pitch_mm: float
     factor: int
+    surface: Surface = FLAT
 
     @classmethod
     def of(cls, table: ResamplingTable, reflecting: NDArray[np.bool_]) -> CoarseView:
@@ -64,9 +69,8 @@ class CoarseView:
         x, y = (middles(axis, factor) for axis in (grid.x_mm, grid.y_mm))
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         pitch = factor * grid.pitch_mm
-        return cls(
-            points, ray_slope.reshape(-1, 2), view_directions(ray_slope), share, pitch, factor
-        )
+        view = view_directions(ray_slope)
+        return cls(points, ray_slope.reshape(-1, 2), view, share, pitch, factor, table.surface)
 
     def index(self, points_mm: Array) -> Array:
         """Return row and column (N, 2) of points (N, 2)."""
@@ -92,6 +96,8 @@ class BallPixels:
     around, around_flat : (N, 3)
         Light that they receive from the rest of a membrane that absorbs nothing, in the press and
         while the membrane is flat, in units of the flat membrane's direct light.
+    surface : Surface
+        The undeformed membrane.
     """
 
     points_mm: Array
@@ -104,6 +110,15 @@ class BallPixels:
     field: Map
     around: Array
     around_flat: Array
+    surface: Surface = FLAT
+
+    def on(self, surface: Surface) -> BallPixels:
+        """Return the same rays with another membrane at rest."""
+        at, above = self.points_mm, self.surface.height(self.points_mm)
+        for _ in range(LIFTS):
+            lift = above - surface.height(at)
+            at = self.points_mm + lift[:, None] * self.ray_slope
+        return replace(self, points_mm=at, surface=surface)
 
 
 def gather_ball_pixels(
@@ -140,6 +155,7 @@ def gather_ball_pixels(
     field = ratio_reflected(seen, whole, view.reflecting)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
+    centre = centre + press.lean_mm(table.surface)
     away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
     contact = press.contact_radius_mm
     random = np.random.default_rng(0)
@@ -169,6 +185,7 @@ def gather_ball_pixels(
         field.astype(np.float32),
         np.zeros_like(value),
         np.zeros_like(value),
+        table.surface,
     )
 
 

@@ -15,7 +15,6 @@ from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
     LENS,
     LIGHTS,
-    RADIANCE,
     TOP_POSE,
     linear,
     same_size,
@@ -29,6 +28,7 @@ from gelpolight_core.finding import (
     joined_tables,
     judge_left_out,
 )
+from gelpolight_core.surface import FLAT
 from gelpolight_core.translation import pattern, tr
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from gelpolight_core.reflectance.stage import ReflectanceResult
     from gelpolight_core.session.decisions import PlacedCircle
     from gelpolight_core.session.session import Session
+    from gelpolight_core.surface import Surface
 
     Map = NDArray[np.float32]
 
@@ -172,7 +173,7 @@ def _run_balls(work: Work) -> Balls:
         for found in seen:
             work.progress(len(balls) / len(files))
             balls.append(found)
-    table = work[TOP_POSE].table
+    table = work[BACKGROUND].table
     untouched = [ball.cells for ball in balls if ball.cells is not None]
     agreement = judge_background(cells_of(work[BACKGROUND].light, table), untouched, table)
     found_balls = Balls(tuple(balls), agreement)
@@ -186,36 +187,41 @@ def _find_ball(path: Path, key: str, session: Session, work: Work, bare: Map) ->
     from gelpolight_core.sensor_calibration import sensor_stack
     from gelpolight_core.session.images import require_colour
 
-    lens, lights, top = work[LENS], work[LIGHTS], work[TOP_POSE]
-    radius_mm, plane = session.ball_radius_mm(path.name), top.pose.plane
+    lens, lights, bare_membrane = work[LENS], work[LIGHTS], work[BACKGROUND]
+    table, plane = bare_membrane.table, work[TOP_POSE].pose.plane
+    radius_mm = session.ball_radius_mm(path.name)
     placed, seen = session.decisions.balls.get(path.name), None
     try:
         image = session.image(path)
         require_colour(image, where=str(path))
         same_size(image, lens, BALLS.folder)
-        seen = top.table.apply(work[BACKGROUND].bad.left_out(image.rgb))
+        seen = table.apply(bare_membrane.bad.left_out(image.rgb))
         contact = None
         if placed is not None:
             stack = sensor_stack(session.sensor, plane)
-            contact = placed_contact(placed, lens.camera, plane, stack)
+            contact = placed_contact(placed, lens.camera, plane, stack, table.surface)
         press = find_ball(
             unmix(seen, lights.crosstalk.matrix),
             bare,
-            top.table,
+            table,
             lights.leds.led_positions_mm,
             radius_mm=radius_mm,
             name=f"{BALLS.folder}/{path.name}",
-            usable=work[RADIANCE].usable,
+            usable=bare_membrane.radiance.usable,
             placed=contact,
         )
     except InputError as fault:
-        cells = None if seen is None else cells_of(seen, top.table)
+        cells = None if seen is None else cells_of(seen, table)
         return SeenBall(path.name, key, fault=fault, cells=cells)
-    return SeenBall(path.name, key, seen, press, cells=cells_of(seen, top.table, press))
+    return SeenBall(path.name, key, seen, press, cells=cells_of(seen, table, press))
 
 
 def placed_contact(
-    circle: PlacedCircle, camera: Camera, plane: TopPlane, stack: LayerStack
+    circle: PlacedCircle,
+    camera: Camera,
+    plane: TopPlane,
+    stack: LayerStack,
+    surface: Surface = FLAT,
 ) -> PlacedContact:
     """Return the circle on the undeformed membrane for a circle set in the raw image.
 
@@ -230,7 +236,8 @@ def placed_contact(
     turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     u = circle.u_px + circle.radius_px * np.cos(turns)
     v = circle.v_px + circle.radius_px * np.sin(turns)
-    edge_mm, _ = camera_to_membrane(camera.directions(np.stack([u, v], axis=-1)), plane, stack)
+    pixels = np.stack([u, v], axis=-1)
+    edge_mm, _ = camera_to_membrane(camera.directions(pixels), plane, stack, surface)
     if not np.isfinite(edge_mm).all():
         raise InputError(
             tr("The circle set by hand extends beyond the visible membrane"),
@@ -286,8 +293,9 @@ def _run_reflectance(work: Work) -> Reflectance:
     from gelpolight_core.factors.background import calibrate_factors
     from gelpolight_core.reflectance.stage import calibrate_reflectance
 
-    table, leds_mm = work[TOP_POSE].table, work[LIGHTS].leds.led_positions_mm
-    radiance, bare, balls = work[RADIANCE], work[BACKGROUND].light, work[BALLS]
+    found, balls = work[BACKGROUND], work[BALLS]
+    table, leds_mm = found.table, work[LIGHTS].leds.led_positions_mm
+    radiance, bare = found.radiance, found.light
     presses, images = balls.presses, balls.images
     first = calibrate_reflectance(presses, images, table, leds_mm, radiance)
     factors = calibrate_factors(bare, table, leds_mm, radiance, first.table)

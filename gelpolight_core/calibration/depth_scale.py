@@ -38,9 +38,10 @@ from gelpolight_core.reconstruction.near_light.structures import (
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
-from gelpolight_core.reflectance.membrane import UP
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
+from gelpolight_core.surface import FLAT
+from gelpolight_core.surface import Surface as AtRest
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -78,13 +79,16 @@ def ball_height_error(
     assert calibration.full is not None
     solver = NearLightSolver(calibration, workers=usable_cores())
     points, errors = calibration.table.grid.points_mm(), []
+    height_mm = calibration.surface.height(points)
     for rgb, ball in zip(images, balls, strict=True):
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
         depth = solver.depth(rgb, Wanted(normals=False)).depth_mm
         away = np.linalg.norm(points - ball.centre_mm, axis=-1)
         top = (away < TOP_MM) & (solver.maps.kind == 2)
         if top.any():
-            true = ball.depth_mm - ball.radius_mm + np.sqrt(ball.radius_mm**2 - away[top] ** 2)
+            lowest_mm = calibration.surface.height(np.array(ball.centre_mm)) - ball.depth_mm
+            sagitta_mm = ball.radius_mm - np.sqrt(ball.radius_mm**2 - away[top] ** 2)
+            true = height_mm[top] - lowest_mm - sagitta_mm
             errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else 0.0
 
@@ -238,10 +242,10 @@ def _shaded(
     return np.where(usable[..., None], seen_as, 1.0).astype(np.float32), around.astype(np.float32)
 
 
-def direct_flat(full: FullModel, points_mm: Array, view: Array) -> Array:
-    """Return the brightness (N, 3) of points (N, 2) of the flat membrane, as `Surface.seen`."""
-    flat = np.concatenate([points_mm, np.zeros_like(points_mm[:, :1])], axis=1)
-    return -full.membrane.direct(full.led_positions_mm, flat, np.array(UP), view)
+def direct_flat(full: FullModel, points_mm: Array, view: Array, at_rest: AtRest = FLAT) -> Array:
+    """Return the brightness (N, 3) of points (N, 2) of the membrane at rest, as `Surface.seen`."""
+    places, normals = at_rest.points(points_mm), at_rest.normals(points_mm)
+    return -full.membrane.direct(full.led_positions_mm, places, normals, view)
 
 
 def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> Array:
@@ -290,7 +294,7 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     x, y = np.meshgrid(field.x_mm, field.y_mm)
-    normals = surface_normals(depth_mm, np.s_[:rows, :columns], field.ray_slope, scale.pitch_mm)
+    normals = surface_normals(depth_mm, np.s_[:rows, :columns], scale)
     for _ in range(ROUNDS_WITH_AROUND if reflected else ROUNDS):
         image = field.image
         if reflected:

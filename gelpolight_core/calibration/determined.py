@@ -169,4 +169,6 @@ def parameter_name(index: int) -> str:
             channel=channel_name(channel), cosine=CURVE_COSINES[node]
         )
     names = tr("exponent"), tr("gloss"), tr("roughness"), tr("interreflection"), tr("decay length")
-    return names[index - 9]
+    axis = tr("axis of the membrane: {side}")
+    shape = tr("height of the membrane"), axis.format(side="x"), axis.format(side="y")
+    return (*names, *shape)[index - 9]

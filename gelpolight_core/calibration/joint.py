@@ -30,9 +30,11 @@ from gelpolight_core.calibration.joint_problem import (
     COMMON,
     CURVE_SIZE,
     DECAY,
+    SHAPE,
     STATED,
     Problem,
     diffuse_curves,
+    shaped,
 )
 from gelpolight_core.least_squares import fit_least_squares
 from gelpolight_core.parallel import in_parallel
@@ -42,6 +44,7 @@ from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import FullModel
+from gelpolight_core.surface import Surface
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -88,12 +91,14 @@ class JointResult:
         Robust relative misfit of each press; NaN if it has no usable pixels.
     ball_names : tuple of str
         Names of these presses.
-    covariance : (14, 14) or (26, 26)
-        Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light and decay
-        length and, if the membrane is one-dimensional, of the heights of its curves; from
-        leaving out one press at a time. 0 for fixed parameters.
+    covariance : (17, 17) or (29, 29)
+        Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light, decay
+        length, rise and axis of a curved membrane and, if the membrane is one-dimensional, of the
+        heights of its curves; from leaving out one press at a time. 0 for fixed parameters.
     determined : Determined
         How well the presses determine these parameters.
+    surface : Surface
+        The membrane at rest, refined if it is curved.
     stated : tuple of Stated
         What contradicts the presses, the most likely first. Empty if it was not looked for.
     """
@@ -104,6 +109,7 @@ class JointResult:
     ball_names: tuple[str, ...]
     covariance: Array
     determined: Determined
+    surface: Surface
     stated: tuple[Stated, ...] = ()
 
 
@@ -171,7 +177,7 @@ def refine_jointly(
         misfit=solved.misfit,
         held_out=held_out,
         kept="refined" if refine else "mirror",
-        membrane_sd=dict(zip(_NAMES, sd[9:COMMON].tolist(), strict=True)),
+        membrane_sd=dict(zip(_NAMES, sd[9 : SHAPE.start].tolist(), strict=True)),
         membrane_held_out=membranes,
         membrane_kept=MEMBRANES[int(curves)],
     )
@@ -181,6 +187,7 @@ def refine_jointly(
         solved.ball_misfits,
         tuple(press.name for press in presses),
         *shared_covariance(solved.problem, x),
+        shaped(pixels[0].surface, x),
         () if bright_mm is None or len(presses) < LEAST_PRESSES else _compared(solved, bright_mm),
     )
 
@@ -253,7 +260,7 @@ def _start(
     """Return the start values of the fit, and which parameters are free."""
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
     glossy = not curves
-    common = [1.0, 0.05 * glossy, 0.5, 0.1 * around, 0.7]
+    common = [1.0, 0.05 * glossy, 0.5, 0.1 * around, 0.7, 0.0, 0.0, 0.0]
     heights = np.zeros(CURVE_SIZE if curves else 0)
     start = np.concatenate([leds.ravel(), common, np.ravel(balls), heights])
     free = np.ones(start.size, dtype=bool)
@@ -279,11 +286,12 @@ def _solve(
     Starts from a solution that is `near`, if there is one. A `reflectance` may be expected.
     """
     start, free = _start(presses, leds, around, curves=curves)
+    free[SHAPE] = refine and not pixels[0].surface.flat
     balls = slice(COMMON, COMMON + 3 * len(pixels))
     free[:9] &= refine
     low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
-    low[9:COMMON] = [0.5, 0.0, 0.15, 0.0, 0.15]
-    high[9:COMMON] = [1.8, 0.9, 1.0, 1.5, 3.0]
+    low[9 : SHAPE.start] = [0.5, 0.0, 0.15, 0.0, 0.15]
+    high[9 : SHAPE.start] = [1.8, 0.9, 1.0, 1.5, 3.0]
     depth_at = slice(COMMON + 2, balls.stop, 3)
     low[depth_at] = 0.02
     high[depth_at] = [0.95 * p.radius_mm for p in pixels]
@@ -361,7 +369,9 @@ def _compared(solved: _Solution, bright_mm: Array) -> tuple[Stated, ...]:
         left = float(2.0 * (np.sqrt(1.0 + residuals(found) ** 2) - 1.0).sum())
         return Stated(key, float(found[-1]), sd, left)
 
-    return tuple(sorted(in_parallel(fitted, STATED), key=lambda one: one.chi_square))
+    # The height of a curved membrane is refined in any case.
+    keys = [key for key in STATED if key != "membrane" or problem.presses[0].surface.flat]
+    return tuple(sorted(in_parallel(fitted, keys), key=lambda one: one.chi_square))
 
 
 def _described(problem: Problem, x: Array, limits: tuple[Array, Array]) -> _Solution:

@@ -47,8 +47,8 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     Parameters
     ----------
     pixels : tuple
-        Points (N, 2), directions to the camera (N, 3), ratio, weight, interreflected light in the
-        press and on the flat membrane (N, 3).
+        Of the membrane at rest, points and normals (N, 3); directions to the camera, ratio, weight,
+        interreflected light in the press and at rest (N, 3).
     seen : tuple
         Points (N, 3), normals (N, 3) and whether they are on the ball (N,).
     leds : (3, 3)
@@ -64,24 +64,26 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     result : (N, 3)
         Written.
     """
-    points, view, ratio, weight, around, around_flat = pixels
+    points, up, view, ratio, weight, around, around_flat = pixels
     surface, normals, _ = seen
     for i in range(points.shape[0]):
         normal = (normals[i, 0], normals[i, 1], normals[i, 2])
+        rest = (up[i, 0], up[i, 1], up[i, 2])
         towards = (view[i, 0], view[i, 1], view[i, 2])
         for k in range(3):
             light, far = _towards(leds, k, surface[i, 0], surface[i, 1], surface[i, 2])
-            flat, flat_far = _towards(leds, k, points[i, 0], points[i, 1], 0.0)
+            flat, flat_far = _towards(leds, k, points[i, 0], points[i, 1], points[i, 2])
             facing = light[0] * normal[0] + light[1] * normal[1] + light[2] * normal[2]
             cosine = min(max(facing, LEAST_COSINE), 1.0)
-            flat_cosine = min(max(-flat[2], LEAST_COSINE), 1.0)
+            flat_facing = flat[0] * rest[0] + flat[1] * rest[1] + flat[2] * rest[2]
+            flat_cosine = min(max(flat_facing, LEAST_COSINE), 1.0)
             if heights.size:
                 direct = cosine / flat_cosine
                 direct *= exp(_rise(bumps, heights, k, cosine, flat_cosine))
             else:
                 direct = brightness(light, normal, towards, k, lobes, no_curves)
                 # A solver step may move an LED above the membrane, where it gives no light.
-                level = brightness(flat, (0.0, 0.0, -1.0), towards, k, lobes, no_curves)
+                level = brightness(flat, rest, towards, k, lobes, no_curves)
                 direct /= max(level, LEAST_COSINE)
             direct *= light[2] / flat[2] * (flat_far / far) ** 2
             lit = min(max((facing - SHADOW_COSINE) / SHADOW_COSINE, 0.0), 1.0)

@@ -14,24 +14,30 @@ from gelpolight_core.calibration.joint_kernel import model_press
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.draped_ball import draped_ball
 from gelpolight_core.reflectance.membrane import CURVE_NODES
+from gelpolight_core.surface import Surface
 
 Array = NDArray[np.float64]
-Surface = tuple[Array, Array, NDArray[np.bool_]]
+Seen = tuple[Array, Array, NDArray[np.bool_]]
 LED_LATERAL_SD_MM = 0.05
 LED_HEIGHT_SD_MM = 0.2
+SHAPE_SD_MM = np.array([0.03, 0.05, 0.05])
+"""Tolerance of a mould's height, and of its axis by the circle in the background."""
 PRIOR_STRENGTH = 3.0
-# LEDs (9), exponent, gloss, roughness, reflectance for interreflected light, decay length.
-COMMON, DECAY = 14, 13
+# LEDs (9), exponent, gloss, roughness, reflectance for interreflected light, decay length; rise and
+# shift of the axis (x, y) of a curved membrane.
+COMMON, DECAY, SHAPE = 17, 13, slice(14, 17)
 # The one-dimensional membrane: cos times the exponential of a spline through these cosines; it is 0
 # at the last. Below the first, which balls hardly reach, it continues with Lambert's law.
 CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
 CURVE_SIZE = 3 * (CURVE_COSINES.size - 1)
 CURVE_SD = 0.1
 _STEP = 1e-4
-STATED = ("radius", "layers", "square", "led_height", "coating")
+STATED = ("radius", "layers", "square", "led_height", "coating", "membrane")
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
-coating that stays as it is where it is stretched."""
+coating that stays as it is where it is stretched, a membrane that is flat."""
+RISE_SHARE = 0.1
+"""Height of a cap over the field's width, for a factor of 2 on the flat membrane."""
 
 
 def _bumps() -> Array:
@@ -58,6 +64,13 @@ def bent_curves(
     """Return a membrane's diffuse curves with the spline's heights (`CURVE_SIZE`,) raised."""
     bent = np.asarray(curves) * np.exp(heights.reshape(3, -1) @ _BUMPS.T)
     return tuple(tuple(np.maximum.accumulate(curve).tolist()) for curve in bent)
+
+
+def shaped(surface: Surface, x: Array) -> Surface:
+    """Return a membrane at rest with the rise and the shift of its axis in the parameters."""
+    rise, dx, dy = x[SHAPE].tolist()
+    axis = surface.axis_mm[0] + dx, surface.axis_mm[1] + dy
+    return replace(surface, rise_mm=surface.rise_mm + rise, axis_mm=axis)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,13 +101,19 @@ class Problem:
         Parameters
         ----------
         key, value
-            A factor on a stated length, or 1 plus the coating's exponent.
+            A factor on a stated length, or 1 plus the coating's exponent, or 1 plus the height of a
+            cap over `RISE_SHARE` of the field's width.
         bright_mm : (3, 2)
             Where the LEDs are seen in the mirror.
         """
         presses, leds = self.presses, self.start[:9].reshape(3, 3).copy()
         if key == "coating":
             return replace(self, coating=value - 1.0)
+        if key == "membrane":
+            width_mm = float(np.ptp(presses[0].view_of_field.points_mm[:, 0]))
+            rise_mm = (value - 1.0) * RISE_SHARE * width_mm
+            cap = replace(presses[0].surface, diameter_mm=width_mm, rise_mm=rise_mm)
+            return replace(self, presses=[p.on(cap) for p in presses])
         if key == "radius":
             presses = [replace(p, radius_mm=value * p.radius_mm) for p in presses]
         elif key == "led_height":
@@ -106,31 +125,36 @@ class Problem:
         start = np.concatenate([leds.ravel(), self.start[9:]])
         return replace(self, presses=presses, start=start)
 
-    def residuals(self, x: Array, surfaces: Sequence[Surface] | None = None) -> list[Array]:
+    def residuals(self, x: Array, surfaces: Sequence[Seen] | None = None) -> list[Array]:
         """Return the weighted residuals of each press, (3 N,); on known surfaces if given."""
         seen = self._surfaces(x) if surfaces is None else surfaces
-        return [self._press(x, i, surface).ravel() for i, surface in enumerate(seen)]
+        pairs = zip(self._pixels(x), seen, strict=True)
+        return [self._press(x, pixels, surface).ravel() for pixels, surface in pairs]
 
-    def _surfaces(self, x: Array) -> list[Surface]:
+    def _surfaces(self, x: Array) -> list[Seen]:
         """Return the visible points and normals (N, 3) of each ball, and where it is in contact."""
-        seen = []
-        for pixels, ball in zip(
-            self.presses, x[COMMON : self.balls_end].reshape(-1, 3), strict=True
-        ):
+        seen, decay_mm = [], float(x[DECAY])
+        balls = x[COMMON : self.balls_end].reshape(-1, 3)
+        for pixels, ball in zip(self._pixels(x), balls, strict=True):
             pose = BallPose((float(ball[0]), float(ball[1])), pixels.radius_mm, float(ball[2]))
-            seen.append(
-                draped_ball(pixels.points_mm, pixels.ray_slope, pose, decay_mm=float(x[DECAY]))
-            )
+            at, rays, surface = pixels.points_mm, pixels.ray_slope, pixels.surface
+            seen.append(draped_ball(at, rays, pose, decay_mm=decay_mm, surface=surface))
         return seen
 
-    def _press(self, x: Array, index: int, seen: Surface) -> Array:
+    def _pixels(self, x: Array) -> Sequence[BallPixels]:
+        """Return the presses on the membrane at rest that the parameters give."""
+        if not x[SHAPE].any():
+            return self.presses
+        return [pixels.on(shaped(pixels.surface, x)) for pixels in self.presses]
+
+    def _press(self, x: Array, pixels: BallPixels, seen: Seen) -> Array:
         """Return the weighted residuals of a press, (N, 3)."""
-        pixels = self.presses[index]
         result = np.empty(pixels.ratio.shape)
         grey = (-seen[1][:, 2:]) ** self.coating
         model_press(
             (
-                pixels.points_mm,
+                pixels.surface.points(pixels.points_mm),
+                pixels.surface.normals(pixels.points_mm),
                 pixels.view,
                 pixels.ratio / grey,
                 pixels.weight * grey,
@@ -161,6 +185,7 @@ class Problem:
                 [PRIOR_STRENGTH * (x[9] - 1.0) / 0.01, (x[11] - 0.5) / 0.3],
                 [] if expected is None else [(x[12] - expected[0]) / expected[1]],
                 x[self.balls_end :] / CURVE_SD,
+                PRIOR_STRENGTH * x[SHAPE] / SHAPE_SD_MM if self.free[SHAPE].any() else [],
             ]
         )
 
@@ -182,7 +207,7 @@ class Problem:
         result = np.zeros((ends[-1] + prior.size, x.size))
 
         def slopes(
-            columns: slice | list[int], surfaces: Sequence[Surface] | None
+            columns: slice | list[int], surfaces: Sequence[Seen] | None
         ) -> Iterator[tuple[int, slice, Array]]:
             """Yield each press, its rows, and its derivatives when all `columns` are moved."""
             moved = x.copy()
@@ -198,7 +223,7 @@ class Problem:
             for i, rows, slope in slopes(slice(COMMON + axis, self.balls_end, 3), None):
                 result[rows, COMMON + 3 * i + axis] = slope
         for alone in (9 + np.flatnonzero(self.free[9:COMMON])).tolist():
-            for _, rows, slope in slopes([alone], None if alone == DECAY else surfaces):
+            for _, rows, slope in slopes([alone], None if alone >= DECAY else surfaces):
                 result[rows, alone] = slope
         for j in np.flatnonzero(self.free):
             moved = x.copy()

@@ -72,11 +72,17 @@ class Background:
         Pixels of the camera that do not follow the light.
     quality : QualityTable
         Figures of both.
+    table : ResamplingTable
+        From image to membrane; of a curved one, with its axis in the middle of the circle.
+    radiance : RadianceResult
+        Light intensity on it; of a curved membrane by the positions of the LEDs.
     """
 
     light: NDArray[np.float32]
     bad: BadPixels
     quality: QualityTable
+    table: ResamplingTable
+    radiance: RadianceResult
 
 
 def linear(session: Session, results: Results) -> Session:
@@ -198,6 +204,7 @@ def _run_top_pose(work: Work) -> TopSurface:
         pose.plane,
         sensor_stack(session.sensor, pose.plane),
         working_diameter_mm=session.sensor.working_diameter_mm,
+        surface=session.surface,
     )
     return TopSurface(pose, table)
 
@@ -236,6 +243,7 @@ TOP_POSE = Stage(
         s.sensor.window_thickness_mm,
         s.sensor.window_refractive_index,
         s.sensor.working_diameter_mm,
+        s.surface,
     ),
     share=10,
     about=tr("Finds the top surface from a checkerboard that lies on it"),
@@ -354,6 +362,7 @@ RADIANCE = Stage(
     _run_radiance,
     (LIGHTS,),
     "whiteboard",
+    used=lambda s: s.surface.flat,
     share=3,
     one_image=True,
     colour=True,
@@ -365,6 +374,7 @@ RADIANCE = Stage(
 def _run_background(work: Work) -> Background:
     from gelpolight_core.bad_pixels import find_bad_pixels, no_bad_pixels
     from gelpolight_core.factors.bare_membrane import check_bare_membrane
+    from gelpolight_core.radiance.whiteboard import radiance_by_positions
 
     table, image = work[TOP_POSE].table, stage_image(work, BACKGROUND.folder)
     _refuse_unlit(image)
@@ -377,8 +387,33 @@ def _run_background(work: Work) -> Background:
     if whiteboard is not None and whiteboard.shape == image.rgb.shape:
         lit = linear(work.session, work.results).averaged(board).rgb
         bad = find_bad_pixels([image.rgb, lit], noise=0.0)
-    figures = QualityTable((*seen.quality.figures, _judge_bad_pixels(bad)))
-    return Background(table.apply(bad.left_out(image.rgb)), bad, figures)
+    figures = (*seen.quality.figures, _judge_bad_pixels(bad))
+    whole = bad.left_out(image.rgb)
+    radiance = work.results.get(RADIANCE)
+    if radiance is None:
+        table, found = _table_about_axis(work, whole)
+        figures = (*figures, *found.figures)
+    light = table.apply(whole)
+    if radiance is None:
+        radiance = radiance_by_positions(light, table, work[LIGHTS].leds.led_positions_mm)
+    return Background(light, bad, QualityTable(figures), table, radiance)
+
+
+def _table_about_axis(
+    work: Work, image: NDArray[np.float32]
+) -> tuple[ResamplingTable, QualityTable]:
+    """Return the table of a curved membrane about its axis, as the background shows it."""
+    from gelpolight_core.optics.boundary_circle import centred
+    from gelpolight_core.optics.resampling import build_resampling_table
+    from gelpolight_core.sensor_calibration import sensor_stack
+
+    sensor, camera, plane = work.session.sensor, work[LENS].camera, work[TOP_POSE].pose.plane
+    optics = camera, plane, sensor_stack(sensor, plane)
+    surface, found = centred(work.session.surface, image, *optics)
+    table = build_resampling_table(
+        *optics, working_diameter_mm=sensor.working_diameter_mm, surface=surface
+    )
+    return table, found
 
 
 def _judge_bad_pixels(bad: BadPixels) -> Finding:
@@ -419,7 +454,7 @@ BACKGROUND = Stage(
     "background",
     tr("Background"),
     _run_background,
-    (RADIANCE,),
+    (LIGHTS, RADIANCE),
     "background",
     share=2,
     one_image=True,

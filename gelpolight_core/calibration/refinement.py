@@ -18,6 +18,7 @@ from gelpolight_core.calibration.depth_scale import (
 )
 from gelpolight_core.calibration.determined import judge_determined
 from gelpolight_core.calibration.joint import JointResult, Stated, refine_jointly
+from gelpolight_core.calibration.joint_problem import RISE_SHARE
 from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
     LENS,
@@ -34,6 +35,7 @@ from gelpolight_core.labels import label
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.masks import reflects_light
 from gelpolight_core.optics.refraction import LayerStack
+from gelpolight_core.optics.resampling import build_resampling_table
 from gelpolight_core.reflectance.agreement import LEAST_PRESSES
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.press import BallPress
@@ -100,8 +102,8 @@ def refine(session: Session, results: Results) -> Joint:
         If an earlier stage was not run.
     """
     top, lights, balls = results[TOP_POSE], results[LIGHTS], results[BALLS]
-    bare, factors = results[BACKGROUND].light, results[REFLECTANCE].factors
-    table, crosstalk = top.table, lights.crosstalk.matrix
+    untouched, factors = results[BACKGROUND], results[REFLECTANCE].factors
+    table, bare, crosstalk = untouched.table, untouched.light, lights.crosstalk.matrix
     background, leds_mm = unmix(bare, crosstalk), lights.leds.led_positions_mm
     noise = press_noise(balls.presses)
     view = CoarseView.of(table, reflects_light(table.valid, background))
@@ -113,8 +115,10 @@ def refine(session: Session, results: Results) -> Joint:
     ]
     stack = sensor_stack(session.sensor, top.pose.plane)
     slab = Slab.of(stack)
-    radiance = results[RADIANCE].radiance
-    board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds_mm)
+    board = None
+    if RADIANCE.used(session):
+        radiance = untouched.radiance.radiance
+        board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds_mm)
     contacts_px = [press.indentation.contact_radius_px for press in balls.presses]
     large = bool(contacts_px) and float(np.median(contacts_px)) >= LEAST_CONTACT_PX
     bright_mm = lights.leds.bright_points_mm if large else None
@@ -125,6 +129,17 @@ def refine(session: Session, results: Results) -> Joint:
     if full.kept == "mirror":
         variance = np.diagonal(lights.leds.led_covariance_mm2, axis1=1, axis2=2)
         full = replace(full, led_sd_mm=np.sqrt(variance))
+    if joint.surface != table.surface:
+        width_mm = session.sensor.working_diameter_mm
+        table = build_resampling_table(
+            results[LENS].camera,
+            top.pose.plane,
+            stack,
+            working_diameter_mm=width_mm,
+            surface=joint.surface,
+        )
+        bare = table.apply(untouched.bad.left_out(session.averaged(BACKGROUND.folder).rgb))
+        full = replace(full, background=unmix(bare, crosstalk))
     lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
     stated = judge_stated(joint.stated, session.sensor, stack)
     found = Joint(joint, replace(full, background=lit), known, stated)
@@ -190,6 +205,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
     """
     lens, pose, lights = results[LENS], results[TOP_POSE].pose, results[LIGHTS]
     made, bad = results[REFLECTANCE], results[BACKGROUND].bad
+    surface = results[BACKGROUND].table.surface if joint is None else joint.refined.surface
     return OpenSensor(
         sensor=session.sensor,
         camera=lens.camera,
@@ -197,7 +213,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
         led_positions_mm=lights.leds.led_positions_mm,
         led_covariance_mm2=lights.leds.led_covariance_mm2,
         crosstalk=lights.crosstalk.matrix,
-        radiance=results[RADIANCE].radiance,
+        radiance=results[BACKGROUND].radiance.radiance,
         factors=made.factors.factors if joint is None else joint.factors,
         reflectance=made.table.table,
         noise=press_noise(results[BALLS].presses),
@@ -205,6 +221,7 @@ def sensor_data(session: Session, results: Results, joint: Joint | None = None) 
         response=results[RESPONSE].response,
         bad=bad if bad.pixels.size else None,
         lens_blur_px=pose.blur_px,
+        shape=None if surface.flat else surface,
     )
 
 
@@ -295,6 +312,7 @@ def judge_stated(
         "radius": tr("the ball diameters ({x:.3f} times the stated ones fit)"),
         "square": tr("the squares of the board on the top surface ({x:.3f} times the stated fit)"),
         "led_height": tr("the LED height ({height:.1f} mm fits)"),
+        "membrane": tr("the membrane, which is not flat (a cap {cap:.1f} mm high fits)"),
         "coating": tr("the coating (stretched to twice its area, it has {light:.0%} of its light)"),
         "layers": tr(
             "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
@@ -312,6 +330,7 @@ def judge_stated(
             gel=(1.0 - one.value) * apparent_mm * gel,
             window=(1.0 - one.value) * apparent_mm * window,
             light=2.0 ** (1.0 - one.value),
+            cap=(one.value - 1.0) * RISE_SHARE * sensor.working_diameter_mm,
         )
         for one in stated
         # As likely as the first.

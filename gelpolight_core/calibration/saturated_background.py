@@ -78,7 +78,10 @@ def _filled_light(
 ) -> Map:
     """Return the light (rows, columns, 3) of a part of the membrane, saturated channels filled."""
     grid = table.grid
-    flat = _flat(full, grid.x_mm[box[1]], grid.y_mm[box[0]], table.ray_slope[box])
+    places = np.stack(np.meshgrid(grid.x_mm[box[1]], grid.y_mm[box[0]]), axis=-1)
+    view = view_directions(np.nan_to_num(table.ray_slope[box]).astype(np.float64))
+    light_at_rest = direct_flat(full, places.reshape(-1, 2), view.reshape(-1, 3), table.surface)
+    flat = np.asarray(light_at_rest.reshape(view.shape), np.float32)
     light = background.copy()
     margin = round(MARGIN_MM / grid.pitch_mm)
     field = cv2.erode(
@@ -91,14 +94,6 @@ def _filled_light(
     # What the camera would have shown; from it the other channels follow.
     shown = np.where(lost, light @ crosstalk.T.astype(np.float32), bare)
     return unmix(np.asarray(shown, np.float32), crosstalk)
-
-
-def _flat(full: FullModel, x_mm: Array, y_mm: Array, ray_slope: NDArray[np.floating]) -> Map:
-    """Return the flat membrane's brightness (rows, columns, 3) by the model."""
-    points = np.stack(np.meshgrid(x_mm, y_mm), axis=-1)
-    view = view_directions(np.nan_to_num(ray_slope).astype(np.float64))
-    flat = direct_flat(full, points.reshape(-1, 2), view.reshape(-1, 3))
-    return np.asarray(flat, np.float32).reshape(view.shape)
 
 
 def _evened(values: Map, known: Mask, pitch_mm: float) -> Map:

@@ -17,6 +17,8 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
+LEAST_COSINE = 1e-3
+"""Of a curved membrane, which may face away from a light."""
 CONDITION_LIMIT = 50.0
 """Condition number of the light directions at the sensor's centre: above it, 1 % of noise changes a
 normal by half."""
@@ -194,6 +196,11 @@ def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
     led_positions_mm : (3, 3)
         Sensor frame.
     """
+    if not table.surface.flat:
+        place = table.grid.points_mm()
+        light, _ = light_directions(led_positions_mm, table.surface.points(place))
+        facing = np.einsum("...kc,...c->...k", light, table.surface.normals(place))
+        return np.asarray(np.maximum(facing, LEAST_COSINE))
     columns, rows = table.grid.x_mm, table.grid.y_mm
     across2 = [np.add.outer((rows - y) ** 2, (columns - x) ** 2) for x, y, _ in led_positions_mm]
     height = led_positions_mm[:, 2]

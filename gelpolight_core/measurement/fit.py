@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -11,7 +12,8 @@ from scipy import ndimage
 from scipy.fft import irfft2, next_fast_len, rfft2
 
 from gelpolight_core.least_squares import fit_least_squares, forward_differences
-from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
+from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel, model_on
+from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -26,6 +28,9 @@ HUBER = 2.5
 MODEL_ERROR = 0.001
 """Error of the closed forms of the drape (near corners), as a share of the height. A finer scale of
 the residual would only exclude the edges, which determine the size."""
+RISE_ERROR = 0.005
+"""The same on a curved membrane, as a share of its rise across the face: where the membrane leaves
+a fillet changes along the edge."""
 EDGES_MM = (0.0, 0.1, 0.2, 0.35, 0.6, 1.0)
 """Fillets that are compared with the fitted one; larger ones are not fitted."""
 THINNED = 8
@@ -86,6 +91,8 @@ class WindowData:
         Share of the first 1.5 mm of the drape that is on the map.
     reach_mm : float
         Least correlation length of the map's errors; 0 if they can be white noise.
+    at_rest : Surface
+        The undeformed membrane.
     """
 
     x_mm: Array
@@ -96,6 +103,7 @@ class WindowData:
     pitch_mm: float
     seen_share: float
     reach_mm: float = 0.0
+    at_rest: Surface = FLAT
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +192,7 @@ def fit_indenter(
     most_rounds : int, optional
         Rounds of reweighting; one is enough to see whether a shape fits at all.
     """
+    model = model_on(model, window.at_rest)
     fit, others = _fit(model, window, start, edge, most_rounds)
     if others is None:
         return fit
@@ -262,7 +271,9 @@ def _fit(
         scale = np.sqrt(weight * robust * clear / inflation) / sigma
         vector, jacobian, converged = _solve(problem, vector, scale)
         left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
-        sigma = max(_robust_scale(left * np.sqrt(weight)), MODEL_ERROR * start["height_mm"])
+        rise = window.at_rest.height(model.outline(dict(zip(names, vector, strict=True))))
+        least = math.hypot(MODEL_ERROR * start["height_mm"], RISE_ERROR * float(np.ptp(rise)))
+        sigma = max(_robust_scale(left * np.sqrt(weight)), least)
         ratio = np.abs(left) * np.sqrt(weight) / (HUBER * sigma)
         robust = 1.0 / np.maximum(ratio, 1.0)
         residual = window.depth_mm - problem.depth(vector, window.x_mm, window.y_mm)

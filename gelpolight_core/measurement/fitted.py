@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.measurement.indenter import MODELS, model_on
 from gelpolight_core.measurement.measure import MARGIN_MM
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.surface import FLAT, Surface
 
 
 def fitted_depth(
-    measurement: Measurement, x_mm: NDArray[np.floating], y_mm: NDArray[np.floating]
+    measurement: Measurement,
+    x_mm: NDArray[np.floating],
+    y_mm: NDArray[np.floating],
+    at_rest: Surface = FLAT,
 ) -> NDArray[np.float64]:
     """Return the depth (mm) of the fitted object with its drape and baseline.
 
@@ -22,6 +26,8 @@ def fitted_depth(
         A fitted cylinder, cuboid or ball.
     x_mm, y_mm : arrays of one shape
         Places in the sensor frame.
+    at_rest : Surface, optional
+        The undeformed membrane.
 
     Returns
     -------
@@ -44,7 +50,8 @@ def fitted_depth(
         assert measurement.diameter_mm is not None
         values["diameter_mm"] = measurement.diameter_mm
     x, y = np.asarray(x_mm, np.float64), np.asarray(y_mm, np.float64)
-    return MODELS[measurement.shape].depth(values, x, y) + measurement.baseline_mm
+    model = model_on(MODELS[measurement.shape], at_rest)
+    return model.depth(values, x, y) + measurement.baseline_mm
 
 
 def fit_residual(heightmap: HeightMap, measurement: Measurement) -> NDArray[np.float32]:
@@ -70,7 +77,7 @@ def fit_residual(heightmap: HeightMap, measurement: Measurement) -> NDArray[np.f
     if rows.size and columns.size:
         here = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         x, y = np.meshgrid(heightmap.x_mm[here[1]], heightmap.y_mm[here[0]])
-        depth = fitted_depth(measurement, x, y)
+        depth = fitted_depth(measurement, x, y, heightmap.at_rest)
         outside = heightmap.flags[here] & np.uint8(Flag.OUTSIDE) != 0
         residual[here] = np.where(outside, np.nan, heightmap.depth_mm[here] - depth)
     return residual

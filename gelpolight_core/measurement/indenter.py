@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from gelpolight_core.measurement.drape import (
     cylinder_depth,
 )
 from gelpolight_core.measurement.segmentation import PressedRegion
+from gelpolight_core.reflectance.ball import BallPose
+from gelpolight_core.reflectance.draped_ball import draped_ball
+from gelpolight_core.surface import Surface
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -184,3 +187,55 @@ MODELS: Mapping[str, IndenterModel] = {
         "ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline, _no_corners
     ),
 }
+
+
+def model_on(model: IndenterModel, surface: Surface) -> IndenterModel:
+    """Return the model of a shape that is pressed into a membrane along z.
+
+    A flat face stays a plane in space: in the contact, the depth is that on a flat membrane plus the
+    rise of the undeformed one. Outside, both obey the same linear equation, the rise with the value
+    at the nearest point of the contact.
+    """
+    if surface.flat:
+        return model
+
+    def depth(values: Values, x_mm: Array, y_mm: Array) -> Array:
+        if model.shape == "ball":
+            return _ball_on(surface, values, x_mm, y_mm)
+        contact = _contact(values)
+        nearest = np.stack(_nearest(contact, x_mm, y_mm), axis=-1)
+        rise = surface.height(nearest) - surface.height(np.array([values["x_mm"], values["y_mm"]]))
+        return model.depth(values, x_mm, y_mm) + rise * model.depth(contact, x_mm, y_mm)
+
+    return replace(model, depth=depth)
+
+
+def _ball_on(surface: Surface, values: Values, x_mm: Array, y_mm: Array) -> Array:
+    centre = float(values["x_mm"]), float(values["y_mm"])
+    pose = BallPose(centre, float(values["diameter_mm"]) / 2.0, float(values["height_mm"]))
+    points = np.stack([x_mm, y_mm], axis=-1)
+    upright = points.reshape(-1, 2), np.zeros((x_mm.size, 2))
+    seen, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
+    return np.asarray(surface.height(points) - seen[:, 2].reshape(x_mm.shape))
+
+
+def _contact(values: Values) -> dict[str, float]:
+    """Return a face 1 mm deep with a sharp edge, as large as the contact: up to the fillet."""
+    steep = values["height_mm"] / values["drape_decay_mm"]
+    inset = values["edge_radius_mm"] * (1.0 - steep / math.hypot(steep, 1.0))
+    sizes = ("diameter_mm", "side_a_mm", "side_b_mm")
+    smaller = {key: values[key] - 2.0 * inset for key in sizes if key in values}
+    return {**values, **smaller, "height_mm": 1.0, "edge_radius_mm": 0.0}
+
+
+def _nearest(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
+    """Return the points of the face of a cylinder or cuboid that are nearest to points."""
+    x, y = x_mm - values["x_mm"], y_mm - values["y_mm"]
+    if "diameter_mm" in values:
+        radius = values["diameter_mm"] / 2.0
+        share = radius / np.maximum(np.hypot(x, y), radius)
+        return values["x_mm"] + share * x, values["y_mm"] + share * y
+    half = 0.5 * values["side_a_mm"], 0.5 * values["side_b_mm"]
+    inside = [np.clip(a, -h, h) for a, h in zip(_turned(x, y, values["yaw"]), half, strict=True)]
+    x, y = _turned(*inside, -values["yaw"])
+    return values["x_mm"] + x, values["y_mm"] + y

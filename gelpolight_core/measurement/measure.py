@@ -40,6 +40,7 @@ from gelpolight_core.measurement.spread import (
 )
 from gelpolight_core.reconstruction.checks import MOST_PITCH
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -176,6 +177,8 @@ class PressedMap(NamedTuple):
         The grid.
     regions : list of PressedRegion
         The bumps, tallest first.
+    at_rest : Surface
+        The undeformed membrane.
     """
 
     depth_mm: Array
@@ -183,6 +186,7 @@ class PressedMap(NamedTuple):
     y_mm: Array
     weight: Array
     regions: list[PressedRegion]
+    at_rest: Surface = FLAT
 
 
 def find_object(
@@ -206,7 +210,7 @@ def find_object(
     InputError
         As :func:`measure_object`, but for the shape.
     """
-    depth, x, y, weight, regions = pressed
+    depth, x, y, weight, regions, at_rest = pressed
     if min(weight.shape) < 8 or not weight.any():
         raise InputError(
             tr("no pixel is usable"), tr("depth map"), tr("Check the image and the working area")
@@ -220,7 +224,8 @@ def find_object(
             tr("depth map"),
             Remedy.PRESS_MIDDLE,
         )
-    window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
+    window = _window(depth, x, y, weight, region, regions)
+    window = replace(window, reach_mm=reach_mm, at_rest=at_rest)
     blur, known = (window.pitch_mm**2, UNKNOWN_BLUR_MM**2), False
     if mode is not None and mode.blur_mm2 > 0.0:
         blur = mode.blur_mm2, mode.blur_sd_mm2
@@ -238,7 +243,7 @@ def pressed_map(heightmap: HeightMap) -> PressedMap:
     weight[outside | ~np.isfinite(heightmap.depth_mm)] = 0.0
     depth = np.where(weight > 0.0, heightmap.depth_mm.astype(np.float64), 0.0)
     regions = find_pressed_regions(depth, x, y, weight > 0.0) if weight.any() else []
-    return PressedMap(depth, x, y, weight, regions)
+    return PressedMap(depth, x, y, weight, regions, heightmap.at_rest)
 
 
 def _chosen_region(

@@ -15,9 +15,13 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
+LIFTS = 12
+"""Steps from the plane of the boundary to a curved membrane: each shrinks the error by the product
+of its slope and the ray's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +88,9 @@ def build_stack(
     return LayerStack(tuple(t for t, _ in kept), tuple(n for _, n in kept))
 
 
-def radius_on_membrane(tangent_in_air: Array, stack: LayerStack) -> tuple[Array, Array]:
+def radius_on_membrane(
+    tangent_in_air: Array, stack: LayerStack, beyond_mm: Array | float = 0.0
+) -> tuple[Array, Array]:
     """Return the radius at which a ray meets the top surface, and its slope in the elastomer.
 
     Parameters
@@ -93,6 +99,8 @@ def radius_on_membrane(tangent_in_air: Array, stack: LayerStack) -> tuple[Array,
         Tangent of the ray's angle to the stack's normal, in air.
     stack : LayerStack
         The layers.
+    beyond_mm : (...), optional
+        How much farther the ray goes in the last layer, along its normal.
 
     Returns
     -------
@@ -108,10 +116,10 @@ def radius_on_membrane(tangent_in_air: Array, stack: LayerStack) -> tuple[Array,
         inside = sine / index
         tangent = inside / np.sqrt(1.0 - inside**2)
         radius = radius + thickness * tangent
-    return radius, tangent
+    return radius + beyond_mm * tangent, tangent
 
 
-def tangent_in_air(radius_mm: Array, stack: LayerStack) -> Array:
+def tangent_in_air(radius_mm: Array, stack: LayerStack, beyond_mm: Array | float = 0.0) -> Array:
     """Return the tangent in air of the ray that meets the top surface at `radius_mm`.
 
     Newton's method on the concave, monotone :func:`radius_on_membrane`: a start below the root
@@ -123,35 +131,41 @@ def tangent_in_air(radius_mm: Array, stack: LayerStack) -> Array:
         Distance from the foot of the perpendicular.
     stack : LayerStack
         The layers.
+    beyond_mm : (...), optional
+        As in :func:`radius_on_membrane`.
     """
     radius = np.asarray(radius_mm, dtype=np.float64)
     # The paraxial slope is the steepest, so its estimate lies below the root.
     paraxial = sum(t / n for t, n in zip(stack.thicknesses_mm, stack.indices, strict=True))
-    tangent = radius / paraxial
+    tangent = radius / (paraxial + beyond_mm / stack.indices[-1])
     for _ in range(60):
-        value, _ = radius_on_membrane(tangent, stack)
+        value, _ = radius_on_membrane(tangent, stack, beyond_mm)
         error = value - radius
         if not np.any(np.abs(error) > 1e-12):
             break
-        tangent = np.maximum(tangent - error / _radius_slope(tangent, stack), 0.0)
+        tangent = np.maximum(tangent - error / _radius_slope(tangent, stack, beyond_mm), 0.0)
     return tangent
 
 
-def _radius_slope(tangent: Array, stack: LayerStack) -> Array:
+def _radius_slope(tangent: Array, stack: LayerStack, beyond_mm: Array | float) -> Array:
     """Return the derivative of the radius with respect to the tangent in air."""
     sine = tangent / np.sqrt(1.0 + tangent**2)
     sine_slope = (1.0 + tangent**2) ** -1.5
     slope = np.zeros_like(tangent)
-    for thickness, index in zip(stack.thicknesses_mm, stack.indices, strict=True):
+    layers = (
+        *zip(stack.thicknesses_mm, stack.indices, strict=True),
+        (beyond_mm, stack.indices[-1]),
+    )
+    for thickness, index in layers:
         inside = sine / index
         slope = slope + thickness / index * (1.0 - inside**2) ** -1.5 * sine_slope
     return slope
 
 
 def camera_to_membrane(
-    directions: Array, plane: TopPlane, stack: LayerStack
+    directions: Array, plane: TopPlane, stack: LayerStack, surface: Surface = FLAT
 ) -> tuple[Array, Array]:
-    """Follow camera rays to the undeformed top surface.
+    """Follow camera rays to the undeformed membrane.
 
     Parameters
     ----------
@@ -159,11 +173,13 @@ def camera_to_membrane(
         Ray directions in the camera frame, any length.
     plane, stack
         Top surface and layers.
+    surface : Surface, optional
+        The membrane over the top surface.
 
     Returns
     -------
     points_mm : (..., 2)
-        Points (x, y) where the rays meet the top surface, sensor frame; NaN for rays that never do.
+        Points (x, y) where the rays meet the membrane, sensor frame; NaN for rays that never do.
     ray_slope : (..., 2)
         Ray slope: lateral shift (x, y) of the visible surface point per mm of indentation depth; it
         points towards the foot of the perpendicular.
@@ -173,19 +189,27 @@ def camera_to_membrane(
     forward = np.where(in_sensor[..., 2] > 0.0, in_sensor[..., 2], np.nan)
     radius, tangent_gel = radius_on_membrane(sideways / forward, stack)
     unit = in_sensor[..., :2] / np.maximum(sideways, 1e-300)[..., None]
-    return unit * radius[..., None], -unit * tangent_gel[..., None]
+    foot, ray_slope = unit * radius[..., None], -unit * tangent_gel[..., None]
+    points = foot
+    for _ in range(0 if surface.flat else LIFTS):
+        points = foot - surface.height(points)[..., None] * ray_slope
+    return points, ray_slope
 
 
-def membrane_to_camera(points_mm: Array, plane: TopPlane, stack: LayerStack) -> Array:
-    """Return the camera-frame directions (..., 3) towards points of the top surface.
+def membrane_to_camera(
+    points_mm: Array, plane: TopPlane, stack: LayerStack, surface: Surface = FLAT
+) -> Array:
+    """Return the camera-frame directions (..., 3) towards points of the undeformed membrane.
 
     Parameters
     ----------
     points_mm : (..., 2)
-        Points (x, y) of the undeformed top surface, sensor frame.
+        Points (x, y) of the undeformed membrane, sensor frame.
+    plane, stack, surface
+        As in :func:`camera_to_membrane`.
     """
     radius = np.hypot(points_mm[..., 0], points_mm[..., 1])
-    tangent = tangent_in_air(radius, stack)
+    tangent = tangent_in_air(radius, stack, 0.0 if surface.flat else surface.height(points_mm))
     unit = points_mm / np.maximum(radius, 1e-300)[..., None]
     in_sensor = np.concatenate(
         [unit * tangent[..., None], np.ones_like(tangent)[..., None]], axis=-1

@@ -18,6 +18,7 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane, membrane_to_camera
 from gelpolight_core.parallel import in_parallel
+from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ LEAST_NODES = 32
 
 @dataclass(frozen=True, slots=True)
 class MembraneGrid:
-    """A regular grid on the undeformed top surface, sensor frame.
+    """A regular grid of points (x, y) of the undeformed membrane, sensor frame.
 
     Attributes
     ----------
@@ -78,6 +79,8 @@ class ResamplingTable:
         Visible to the camera and inside the working circle.
     ray_slope : (rows, columns, 2) float32
         Ray slope: lateral shift (x, y) of the visible surface point per mm of depth.
+    surface : Surface
+        The undeformed membrane, on which the nodes lie.
     """
 
     grid: MembraneGrid
@@ -85,6 +88,7 @@ class ResamplingTable:
     v_px: NDArray[np.float32]
     valid: NDArray[np.bool_]
     ray_slope: NDArray[np.float32]
+    surface: Surface = FLAT
 
     def apply(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
         """Resample a raw image (height, width[, 3]) onto the grid, bilinear; 0 outside."""
@@ -101,6 +105,7 @@ def build_resampling_table(
     stack: LayerStack,
     *,
     working_diameter_mm: float,
+    surface: Surface = FLAT,
     pitch_mm: float | None = None,
 ) -> ResamplingTable:
     """Build the table for the part of the working circle that the camera sees.
@@ -110,7 +115,9 @@ def build_resampling_table(
     camera, plane, stack
         Optics.
     working_diameter_mm : float
-        Diameter of the working circle around the origin of the sensor frame.
+        Diameter of the working circle around the membrane's axis.
+    surface : Surface, optional
+        The undeformed membrane.
     pitch_mm : float, optional
         Node spacing; by default the footprint of one raw pixel at the origin.
 
@@ -129,11 +136,11 @@ def build_resampling_table(
         )
     grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
     points = grid.points_mm()
-    in_circle = np.hypot(points[..., 0], points[..., 1]) <= working_diameter_mm / 2
+    in_circle = np.linalg.norm(points - surface.axis_mm, axis=-1) <= working_diameter_mm / 2
 
     def seen_from(rows: slice) -> tuple[Map, Mask, Map]:
         """Return raw pixels, whether they are in the image, and ray slopes, for some rows."""
-        directions = membrane_to_camera(points[rows], plane, stack)
+        directions = membrane_to_camera(points[rows], plane, stack, surface)
         pixels = camera.project(directions)
         inside = (
             (directions[..., 2] > 0.0)
@@ -158,6 +165,7 @@ def build_resampling_table(
         np.ascontiguousarray(pixels[..., 1]),
         inside & in_circle,
         ray_slope,
+        surface,
     )
 
 

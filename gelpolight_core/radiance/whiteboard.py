@@ -12,7 +12,7 @@ from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.image.linear import LinearImage
-from gelpolight_core.lights.positions import flat_cosines
+from gelpolight_core.lights.positions import flat_cosines, light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.session.images import require_colour
@@ -108,6 +108,29 @@ def calibrate_radiance(
     return RadianceResult(
         radiance, usable, saturated, dust, _judge(radiance, table.valid, usable, saturated, dust)
     )
+
+
+def radiance_by_positions(
+    background: Map, table: ResamplingTable, led_positions_mm: Array
+) -> RadianceResult:
+    """Return the light intensity of Lambertian LEDs, where no board shows it.
+
+    Parameters
+    ----------
+    background : (rows, columns, 3) float32
+        The membrane, whose median reflectance factor is 1.
+    table, led_positions_mm
+        As in :func:`calibrate_radiance`.
+    """
+    points = table.surface.points(table.grid.points_mm())
+    light, distance = light_directions(led_positions_mm, points)
+    law = -light[..., 2] / distance**2
+    seen = law * flat_cosines(table, led_positions_mm)
+    lit = table.valid & (background > LEAST_LIGHT).all(axis=2)
+    level = np.median(background[lit] / seen[lit], axis=0) if lit.any() else np.zeros(3)
+    radiance = np.where(table.valid[..., None], level * law, 0.0).astype(np.float32)
+    dark = np.zeros_like(lit)
+    return RadianceResult(radiance, lit, dark, dark, _judge(radiance, table.valid, lit, dark, dark))
 
 
 def _refuse_hopeless(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.finding import Finding
 from gelpolight_core.light.finding import Health
 from gelpolight_core.reconstruction.trace import Trace
+from gelpolight_core.surface import FLAT, Surface
 
 COARSE = 4
 """Nodes of the grid to a node of the coarsest scale, and of examples of noise, along an axis."""
@@ -71,7 +72,7 @@ class HeightMap:
     Attributes
     ----------
     depth_mm : (rows, columns) float32
-        Indentation towards the camera; the surface is at z = -depth.
+        Indentation along z towards the camera, from the undeformed membrane.
     x_mm : (columns,)
         Places of the columns, at `pitch_mm` from each other, rising.
     y_mm : (rows,)
@@ -120,6 +121,8 @@ class HeightMap:
     lateral_per_mm : float
         Relative error of the width of an object per mm of its depth: the paper's model uses the
         point where the ray meets the undeformed surface. 0 for the full model.
+    at_rest : Surface
+        The undeformed membrane.
 
     Raises
     ------
@@ -157,6 +160,15 @@ class HeightMap:
     trace: Trace | None = None
     health: Health | None = None
     lateral_per_mm: float = 0.0
+    at_rest: Surface = FLAT
+
+    @property
+    def height_mm(self) -> NDArray[np.float32]:
+        """Height (rows, columns) of the pressed membrane itself over the plane of its boundary."""
+        if self.at_rest.flat:
+            return -self.depth_mm
+        points = np.stack(np.meshgrid(self.x_mm, self.y_mm), axis=-1)
+        return np.asarray(self.at_rest.height(points) - self.depth_mm, np.float32)
 
     @property
     def doubts(self) -> tuple[Finding, ...]:

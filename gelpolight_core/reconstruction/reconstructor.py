@@ -303,6 +303,7 @@ class Reconstructor:
             trace=solved.trace,
             health=health,
             lateral_per_mm=solved.lateral_per_mm,
+            at_rest=self.calibration.table.surface,
         )
 
     def _wanted(self, health: Health, *, normals: bool = True, uncertainty: bool = False) -> Wanted:

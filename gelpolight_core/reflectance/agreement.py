@@ -206,8 +206,7 @@ def _gather(
     stride = max(rows.size // MOST_PIXELS, 1)
     rows, columns = rows[::stride], columns[::stride]
     points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
-    top = np.concatenate([points, np.zeros_like(points[:, :1])], axis=1)
-    light, _ = light_directions(led_positions_mm, top)
+    light, _ = light_directions(led_positions_mm, table.surface.points(points))
     ray_slope = table.ray_slope[rows, columns].astype(np.float64)
     centre = press.seen_centre_mm(ray_slope.mean(axis=0)) if rows.size else np.zeros(2)
     raw = image[rows, columns].astype(np.float64)

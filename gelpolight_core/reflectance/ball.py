@@ -12,6 +12,7 @@ from scipy.special import k0e, k1e
 
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
 TYPICAL_DECAY_MM = 0.7
@@ -28,16 +29,25 @@ class BallPose:
     radius_mm : float
         Of the ball.
     depth_mm : float
-        Indentation of the ball's lowest point.
+        Indentation of the ball's lowest point, along z.
     """
 
     centre_mm: tuple[float, float]
     radius_mm: float
     depth_mm: float
 
+    def middle_mm(self, surface: Surface = FLAT) -> Array:
+        """Return the middle (3,) of the ball over a membrane."""
+        level_mm = float(surface.height(np.asarray(self.centre_mm)))
+        return np.array([*self.centre_mm, level_mm + self.radius_mm - self.depth_mm])
+
 
 def ball_depth_from_contact(
-    contact_radius_mm: float, radius_mm: float, *, decay_mm: float = TYPICAL_DECAY_MM
+    contact_radius_mm: float,
+    radius_mm: float,
+    *,
+    decay_mm: float = TYPICAL_DECAY_MM,
+    curvature_per_mm: float = 0.0,
 ) -> float:
     """Return a ball's indentation depth from its contact radius.
 
@@ -51,48 +61,62 @@ def ball_depth_from_contact(
         Of the contact and of the ball.
     decay_mm : float, optional
         Decay length of the membrane.
+    curvature_per_mm : float, optional
+        Of the membrane at rest, positive where it bulges outwards.
     """
     a = min(contact_radius_mm, 0.98 * radius_mm)
     to_centre = np.sqrt(radius_mm**2 - a**2)
-    ring_mm = (a / to_centre) * decay_mm * k0e(a / decay_mm) / k1e(a / decay_mm)
-    return float(radius_mm - to_centre + ring_mm)
+    slope = a / to_centre + curvature_per_mm * a
+    ring_mm = slope * decay_mm * k0e(a / decay_mm) / k1e(a / decay_mm)
+    return float(radius_mm - to_centre + 0.5 * curvature_per_mm * a**2 + ring_mm)
 
 
 def contact_radius_from_depth(
-    depth_mm: float, radius_mm: float, *, decay_mm: float = TYPICAL_DECAY_MM
+    depth_mm: float,
+    radius_mm: float,
+    *,
+    decay_mm: float = TYPICAL_DECAY_MM,
+    curvature_per_mm: float = 0.0,
 ) -> float:
     """Return the contact radius at an indentation depth; inverse of ball_depth_from_contact."""
     limit = 0.98 * radius_mm
 
     def excess(a: float) -> float:
-        return ball_depth_from_contact(a, radius_mm, decay_mm=decay_mm) - depth_mm
+        reached = ball_depth_from_contact(
+            a, radius_mm, decay_mm=decay_mm, curvature_per_mm=curvature_per_mm
+        )
+        return reached - depth_mm
 
     if excess(limit) <= 0.0:
         return limit
     return float(brentq(excess, 1e-6 * radius_mm, limit))
 
 
-def ball_surface(points_mm: Array, ray_slope: Array, pose: BallPose) -> tuple[Array, Array]:
+def ball_surface(
+    points_mm: Array, ray_slope: Array, pose: BallPose, surface: Surface = FLAT
+) -> tuple[Array, Array]:
     """Intersect the camera's rays with the ball.
 
     Parameters
     ----------
     points_mm : (..., 2)
-        Where the rays meet the undeformed top surface.
+        Where the rays meet the undeformed membrane.
     ray_slope : (..., 2)
         Lateral displacement of the ray per mm of depth.
     pose : BallPose
         The ball.
+    surface : Surface, optional
+        The undeformed membrane.
 
     Returns
     -------
     surface_mm : (..., 3)
-        Seen points of the ball, sensor frame (z = -depth); NaN where a ray misses it.
+        Seen points of the ball, sensor frame; NaN where a ray misses it.
     normals : (..., 3)
         Unit normals there, towards the camera (z < 0).
     """
-    centre = np.array([*pose.centre_mm, pose.radius_mm - pose.depth_mm])
-    start = np.concatenate([points_mm, np.zeros_like(points_mm[..., :1])], axis=-1) - centre
+    centre = pose.middle_mm(surface)
+    start = surface.points(points_mm) - centre
     along = np.concatenate([ray_slope, np.full_like(ray_slope[..., :1], -1.0)], axis=-1)
     a = (along**2).sum(-1)
     b = (start * along).sum(-1)
@@ -125,7 +149,7 @@ class ShadedPixels:
 
 
 def refine_centre(
-    pixels: ShadedPixels, start: BallPose, led_positions_mm: Array
+    pixels: ShadedPixels, start: BallPose, led_positions_mm: Array, at_rest: Surface = FLAT
 ) -> tuple[BallPose, float, float]:
     """Refine the position of the ball so that its shading explains the image.
 
@@ -142,6 +166,8 @@ def refine_centre(
         First estimate; radius and depth are kept.
     led_positions_mm : (3, 3)
         Sensor frame.
+    at_rest : Surface, optional
+        The undeformed membrane.
 
     Returns
     -------
@@ -152,16 +178,16 @@ def refine_centre(
     sd_mm : float
         Standard deviation of the centre from the misfit, larger axis.
     """
-    flat = np.concatenate([pixels.points_mm, np.zeros_like(pixels.points_mm[..., :1])], axis=-1)
+    flat = at_rest.points(pixels.points_mm)
     flat_light, flat_distance = light_directions(led_positions_mm, flat)
     view = view_directions(pixels.ray_slope)
-    on_flat = _cosines(flat_light, np.broadcast_to([0.0, 0.0, -1.0], flat.shape), view)
+    on_flat = _cosines(flat_light, at_rest.normals(pixels.points_mm), view)
     weight = pixels.weight
 
     @lru_cache(maxsize=4)  # most derivatives leave the ball where it is
     def seen(x_mm: float, y_mm: float) -> tuple[Array, tuple[Array, Array]]:
         pose = BallPose((x_mm, y_mm), start.radius_mm, start.depth_mm)
-        surface, normals = ball_surface(pixels.points_mm, pixels.ray_slope, pose)
+        surface, normals = ball_surface(pixels.points_mm, pixels.ray_slope, pose, at_rest)
         light, distance = light_directions(led_positions_mm, surface)
         gain = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
         return gain, _cosines(light, normals, view)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.compiled_part import PART
 from gelpolight_core.optics.refraction import LayerStack
-from gelpolight_core.reflectance.membrane import UP, Membrane
+from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
 
 Map = NDArray[np.float32]
@@ -226,25 +226,26 @@ def _mirrored(sent: Map, depth_mm: float) -> Map:
 def returned_to_flat(
     flat: NDArray[np.floating],
     points_mm: NDArray[np.floating],
+    normals: NDArray[np.floating],
     view: NDArray[np.floating],
     leds_mm: NDArray[np.float64],
     membrane: Membrane,
     side_mm: float,
     slab: Slab,
 ) -> Map:
-    """Return the light that the lower face returns to the flat membrane, (rows, columns, 3).
+    """Return the light that the membrane at rest receives from itself, (rows, columns, 3).
 
     The membrane absorbs nothing. It changes slowly, and is computed on some of the facets.
 
     Parameters
     ----------
     flat : (rows, columns, 3)
-        Light of the flat membrane to the camera, as `Surface.seen`.
-    points_mm, view, leds_mm, membrane, side_mm, slab
+        Its light to the camera, as `Surface.seen`.
+    points_mm, normals, view, leds_mm, membrane, side_mm, slab
         As in :func:`gathered`.
     """
     rows, columns = flat.shape[:2]
-    surface = Surface(points_mm, np.broadcast_to(UP, view.shape), view, flat)
+    surface = Surface(points_mm, normals, view, flat)
     step = 2 * WIDE
     where = np.zeros((rows, columns), bool)
     where[::step, ::step] = True
@@ -258,6 +259,7 @@ def returned_to_flat(
 
 def flat_light(
     points_mm: NDArray[np.float64],
+    normals: NDArray[np.float64],
     view: NDArray[np.float64],
     reflecting: NDArray[np.floating],
     leds_mm: NDArray[np.float64],
@@ -265,20 +267,20 @@ def flat_light(
     side_mm: float,
     slab: Slab,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return direct light of the flat membrane, and what a lower face returns, (..., 3) each.
+    """Return direct light of the membrane at rest, and what returns to it, (..., 3) each.
 
     Parameters
     ----------
-    points_mm, view, leds_mm, membrane, side_mm, slab
+    points_mm, normals, view, leds_mm, membrane, side_mm, slab
         As in :func:`gathered`; what returns is that of a membrane that absorbs nothing.
     reflecting : (rows, columns)
         Share of each facet that reflects light.
     """
-    direct = -membrane.direct(leds_mm, points_mm, np.array(UP), view)
+    direct = -membrane.direct(leds_mm, points_mm, normals, view)
     returned = np.zeros_like(direct)
     for _ in range(2):
         seen = (direct + membrane.interreflection * returned) * reflecting[..., None]
-        more = returned_to_flat(seen, points_mm, view, leds_mm, membrane, side_mm, slab)
+        more = returned_to_flat(seen, points_mm, normals, view, leds_mm, membrane, side_mm, slab)
         returned = np.asarray(more, np.float64)
     return direct, returned
 

@@ -20,6 +20,7 @@ from gelpolight_core.reflectance.ball import (
 from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.contour import Circle
 from gelpolight_core.reflectance.indentation import Indentation, indentation_at
+from gelpolight_core.surface import Surface
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -67,9 +68,33 @@ class BallPress:
         The rays meet the contact ring below the surface and nearer to the middle, by `ray_slope`
         per mm.
         """
-        sagitta = self.pose.radius_mm - np.sqrt(self.pose.radius_mm**2 - self.contact_radius_mm**2)
+        sagitta = self.pose.radius_mm - self._to_ring
         centre: Array = np.asarray(self.pose.centre_mm, np.float64)
         return centre - float(self.pose.depth_mm - sagitta) * ray_slope
+
+    def lean_mm(self, surface: Surface) -> Array:
+        """Return how far the contact's middle is beside the ball's on a slope, (2,)."""
+        return lean_mm(surface, np.asarray(self.pose.centre_mm), self._to_ring)
+
+    @property
+    def _to_ring(self) -> float:
+        """Distance in mm from the ball's middle to the plane of the contact's edge."""
+        return float(np.sqrt(self.pose.radius_mm**2 - self.contact_radius_mm**2))
+
+
+def lean_mm(surface: Surface, centre_mm: Array, to_ring_mm: float) -> Array:
+    """Return how far a contact's middle is beside its ball's, (2,): towards the higher membrane.
+
+    Parameters
+    ----------
+    surface : Surface
+        The undeformed membrane.
+    centre_mm : (2,)
+        Of the ball.
+    to_ring_mm : float
+        Distance from the ball's middle to the plane of the contact's edge.
+    """
+    return np.asarray(to_ring_mm * surface.normals(centre_mm)[:2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,15 +163,16 @@ def find_ball(
     if contact >= radius_mm:
         raise larger_contact(contact, radius_mm, name)
     depth = ball_depth_from_contact(contact, radius_mm)
-    ray_slope = _ray_slope_at(table, seen)
-    ring = depth - (radius_mm - np.sqrt(radius_mm**2 - contact**2))
+    ray_slope, to_ring = _ray_slope_at(table, seen), float(np.sqrt(radius_mm**2 - contact**2))
+    ring = depth - (radius_mm - to_ring)
     centre = seen + ring * ray_slope
+    centre = centre - lean_mm(table.surface, centre, to_ring)
     start = BallPose((float(centre[0]), float(centre[1])), radius_mm, depth)
     inside = usable & _within(table, seen, INSIDE * contact)
     pixels = _shaded_pixels(image, background, table, inside)
     if not pixels.weight.any():
         raise InputError(tr("no lit pixel of the contact can be used"), name, Remedy.CHECK_EXPOSURE)
-    pose, misfit, sd = refine_centre(pixels, start, led_positions_mm)
+    pose, misfit, sd = refine_centre(pixels, start, led_positions_mm, table.surface)
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
     return BallPress(
         name, pose, contact, sd, misfit, found, _judge(found, contact, radius_mm, moved, misfit)
@@ -174,7 +200,7 @@ def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> NDArr
 def contact_mask(press: BallPress, table: ResamplingTable) -> NDArray[np.bool_]:
     """Return the nodes (rows, columns) well inside the contact, where the ball's shape is known."""
     rough = np.asarray(press.pose.centre_mm)
-    seen = press.seen_centre_mm(_ray_slope_at(table, rough))
+    seen = press.seen_centre_mm(_ray_slope_at(table, rough)) + press.lean_mm(table.surface)
     return table.valid & _within(table, seen, INSIDE * press.contact_radius_mm)
 
 

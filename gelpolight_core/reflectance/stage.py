@@ -91,8 +91,7 @@ def ball_scatter(
             (float(centre[0]), float(centre[1])), press.pose.radius_mm, press.pose.depth_mm
         )
         _, normals = ball_surface(points, np.zeros_like(points), seen)
-        at_top = np.concatenate([points, np.zeros_like(points[:, :1])], axis=1)
-        light, _ = light_directions(led_positions_mm, at_top)
+        light, _ = light_directions(led_positions_mm, table.surface.points(points))
         cosines = np.einsum("nkc,nc->nk", light, normals)
         values = image[rows, columns].astype(np.float64)
         strength = radiance.radiance[rows, columns].astype(np.float64)

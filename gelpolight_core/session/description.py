@@ -17,12 +17,14 @@ from gelpolight_core.session.session import (
     FORMAT,
     IN_PLACE,
     INDENTERS,
+    MEMBRANE,
     RADIUS_OF_FILES,
     VERSION,
     InPlace,
     Session,
     serial_fault,
 )
+from gelpolight_core.surface import FLAT
 from gelpolight_core.translation import tr
 
 FILE_NAME = "session.toml"
@@ -78,6 +80,12 @@ def _opened(session: Session) -> dict[str, Any]:
         "checkerboard": _board(session.checkerboard),
         "top_pose": _board(session.top_pose),
     }
+    surface = session.surface
+    if surface.shape != FLAT.shape:
+        where = (
+            {"file": surface.file} if surface.file else {"apex_height_mm": surface.apex_height_mm}
+        )
+        content[MEMBRANE] = {"shape": surface.shape, **where}
     if session.exposures_ms:
         content["response"] = dict(session.exposures_ms)
     return content

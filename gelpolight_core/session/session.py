@@ -21,6 +21,7 @@ from gelpolight_core.session.camera_settings import CameraSettings, parse_settin
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
 from gelpolight_core.session.table import Table
+from gelpolight_core.surface import FLAT, SHAPES, Surface, height_field
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
@@ -42,7 +43,7 @@ SENSOR_RANGES = {
     "working_diameter_mm": (0.5, 1000.0),
 }
 _SENSOR_DEFAULTS = {"window_thickness_mm": 0.0, "window_refractive_index": 1.49}
-IN_PLACE = "in_place"
+IN_PLACE, MEMBRANE = "in_place", "membrane"
 NOT_IN_A_NAME = '/\\:*?"<>|'
 """Characters that the name of a folder cannot have everywhere; files are named by the serial."""
 SCALE_RANGE = (1e-4, 10.0)
@@ -151,6 +152,8 @@ class Session(SessionImages):
         From ``[sensor]``: name or serial number of the elastomer; empty if not stated.
     in_place : InPlace or None
         From ``[in_place]``; None for a sensor that can be opened.
+    surface : Surface
+        From ``[membrane]``: the undeformed membrane, with its axis at the origin.
     indenters : mapping
         From ``[indenters]``: what is stated of each object that is pressed, by its name.
     """
@@ -168,6 +171,7 @@ class Session(SessionImages):
     camera_settings: CameraSettings | None = None
     elastomer: str = ""
     in_place: InPlace | None = None
+    surface: Surface = FLAT
     indenters: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
 
     @property
@@ -307,13 +311,42 @@ def _parse_opened(top: Table) -> dict[str, Any]:
     content = top.content
     checkerboard = _parse_board(top.table("checkerboard"))
     series = top.table("response") if "response" in content else Table({}, "response", top.path)
-    top.no_more(*COMMON, "checkerboard", "top_pose", "response")
+    top.no_more(*COMMON, "checkerboard", "top_pose", "response", MEMBRANE)
+    sensor = _parse_sensor(top.table("sensor"))
+    stated = top.table(MEMBRANE) if MEMBRANE in content else None
     return {
-        "sensor": _parse_sensor(top.table("sensor")),
+        "sensor": sensor,
+        "surface": FLAT if stated is None else parse_surface(stated, sensor.working_diameter_mm),
         "checkerboard": checkerboard,
         "top_pose": _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard,
         "exposures_ms": {name: series.number(name, 1e-4, 1e6) for name in series.file_names()},
     }
+
+
+def parse_surface(table: Table, diameter_mm: float) -> Surface:
+    """Return the undeformed membrane that ``[membrane]`` states.
+
+    Parameters
+    ----------
+    table : Table
+        With ``shape`` and ``apex_height_mm`` or, for a height field, ``file``: an npz file beside
+        session.toml with x_mm, y_mm (rising, from the axis) and height_mm (rows, columns).
+    diameter_mm : float
+        Of the boundary.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown, missing or out of range, or the file cannot be used.
+    """
+    table.no_more("shape", "apex_height_mm", "file")
+    shape = table.text("shape")
+    if shape not in SHAPES:
+        raise table.wrong("shape", tr("is none of {names}").format(names=", ".join(SHAPES)))
+    if "file" not in table.content:
+        height_mm = table.number("apex_height_mm", 0.0, 0.5 * diameter_mm, default=0.0)
+        return Surface(shape, height_mm, diameter_mm)
+    return height_field(table.path.parent, table.text("file"), diameter_mm)
 
 
 def _parse_in_place(top: Table) -> dict[str, Any]:

@@ -345,7 +345,9 @@ def _points(calibration: OpenSensor) -> NDArray[np.float64]:
     u = np.arange(0, camera.width + STRIDE, STRIDE, dtype=np.float64)
     v = np.arange(0, camera.height + STRIDE, STRIDE, dtype=np.float64)
     pixels = np.stack(np.meshgrid(u, v), axis=-1)
-    points, _ = camera_to_membrane(camera.directions(pixels), calibration.plane, calibration.stack)
+    points, _ = camera_to_membrane(
+        camera.directions(pixels), calibration.plane, calibration.stack, calibration.surface
+    )
     return np.where(np.isfinite(points), points, 1e6)
 
 

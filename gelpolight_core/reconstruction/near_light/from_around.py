@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from gelpolight_core.reconstruction.compiled import HALF, single, whole
 from gelpolight_core.reconstruction.height_map import COARSE
 from gelpolight_core.reconstruction.near_light.maps import LEAST_SHARE, SensorMaps
-from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage, Region
+from gelpolight_core.reconstruction.near_light.structures import (
+    HIDDEN,
+    JUDGED,
+    RatioImage,
+    Region,
+    Scale,
+)
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reflectance.gathered_light import (
     WIDE,
@@ -90,7 +96,7 @@ class FromAround:
         (top, left), (rows, columns) = region.at(1)
         at = np.s_[top : top + rows, left : left + columns]
         whole = self._pressed(at, ratio, surface)
-        clear = self._clearance(whole, at)
+        clear = self._clearance(whole, at, surface[0])
         if reflectance <= LEAST_SHARE:
             return np.zeros_like(ratio), clear
         membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
@@ -124,16 +130,16 @@ class FromAround:
                 first + scale.pitch_mm * np.arange(n, dtype=np.float32)
                 for first, n in zip((scale.y_mm, scale.x_mm), scale.kind.shape, strict=True)
             )
-            flat = np.stack([*np.meshgrid(x, y), np.zeros(scale.kind.shape)], -1)
-            up = np.zeros_like(flat)
-            up[..., 2] = -1.0
+            places = np.stack(np.meshgrid(x, y), axis=-1)
+            at_rest = self.maps.calibration.surface
+            flat, up = at_rest.points(places), at_rest.normals(places)
             light = -np.moveaxis(scale.flat, 0, -1) * self.maps.reflecting[..., None]
             parts = (flat, up, view_directions(self._ray_slope.astype(np.float64)), light)
             self._flat = Surface(*(part.astype(np.float32) for part in parts))
         depth, nx, ny = surface
         points, normals, view, seen = (part.copy() for part in self._flat)
         points[at][..., :2] += depth[..., None] * self._ray_slope[at]
-        points[at][..., 2] = -depth
+        points[at][..., 2] -= depth
         down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
         normals[at] = np.stack([nx, ny, down], axis=-1)
         known = (scale.kind[at] == 2)[..., None]
@@ -141,14 +147,16 @@ class FromAround:
         seen[at] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
         return Surface(points, normals, view, seen)
 
-    def _clearance(self, whole: Surface, at: tuple[slice, slice]) -> Map:
+    def _clearance(self, whole: Surface, at: tuple[slice, slice], pressed_mm: Map) -> Map:
         """Return the least slope between the surface and the rays to the lights."""
         scale = self.maps.scale(COARSE)
         depth = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
+        moved = np.zeros_like(depth)
+        moved[at] = pressed_mm
         rows, columns = np.indices(depth.shape, dtype=np.float32)
         per_pitch = single(1.0 / scale.pitch_mm)
         slope = np.moveaxis(self._ray_slope, -1, 0) * per_pitch
-        place = meeting(depth, np.stack([columns, rows]), -slope)
+        place = meeting(moved, np.stack([columns, rows]), -slope)
         seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR), np.float32)
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
@@ -271,9 +279,7 @@ def _detail(fine: Map, coarse: Map, around: Map) -> Map:
     return found
 
 
-def surface_normals(
-    depth_mm: Map, at: tuple[slice, slice], ray_slope: Map, pitch_mm: float
-) -> tuple[Map, Map]:
+def surface_normals(depth_mm: Map, at: tuple[slice, slice], scale: Scale) -> tuple[Map, Map]:
     """Return x and y of the normals of a depth along the rays (rows, columns).
 
     Parameters
@@ -282,14 +288,15 @@ def surface_normals(
         Of a region.
     at : 2 slices
         Its nodes.
-    ray_slope : (2, rows, columns) float32
-        Of the whole field.
-    pitch_mm : float
-        Distance between nodes.
+    scale : Scale
+        Coarsest, of the whole field.
     """
-    wx, wy = ray_slope[(slice(None), *at)]
-    x, y = depth_mm * wx, depth_mm * wy
-    (x_v, x_u), (y_v, y_u), (d_v, d_u) = (np.gradient(m, pitch_mm) for m in (x, y, depth_mm))
+    here = (slice(None), *at)
+    wx, wy = scale.rays[:2][here]
+    moved = depth_mm * wx, depth_mm * wy, depth_mm
+    (x_v, x_u), (y_v, y_u), (d_v, d_u) = (np.gradient(m, scale.pitch_mm) for m in moved)
+    if scale.rest is not None:
+        d_u, d_v = np.stack([d_u, d_v]) - scale.rest[1:][here]
     x_u += 1.0
     y_v += 1.0
     n = (-d_u * y_v + d_v * y_u, -x_u * d_v + x_v * d_u, -(x_u * y_v - x_v * y_u))

@@ -49,9 +49,9 @@ _B = BLOCK
 # Planes of a block's array: what is read, what is worked with, and what is written; of a glossy
 # membrane, the best normal so far, its misfit, the step from it, and where the steps from another
 # start ended.
-_WIDTHS = (3, 3, 3, 3, 1, 4, 4, 1, 3, 3, 9, 3, 2, 1, 1, 1, 3, 1, 3, 3, 1)
+_WIDTHS = (3, 3, 3, 3, 1, 4, 4, 1, 3, 3, 3, 9, 3, 2, 1, 1, 1, 3, 1, 3, 3, 1)
 _FIRST = (np.cumsum(_WIDTHS) - _WIDTHS).tolist()
-_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND, *_LATER = _FIRST
+_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND, _REST, *_LATER = _FIRST
 _SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE, _TRUST, _FLAG, _MOVED, *_GLOSSY = _LATER
 _BEST, _MISFIT, _STEP, _OTHER, _OTHER_MISFIT = _GLOSSY
 _PI = single(pi)
@@ -308,12 +308,23 @@ def _channels(w, j, dark, interreflection, shadows):  # type: ignore[no-untyped-
 
 
 @_part
-def _begin_block(w, rays, position, leds, dark, curves, table, gloss, reflected, shadows, warm):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _rest(w, j, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return height and slopes of the membrane at rest, and its normal."""
+    if rest is None:
+        return (ZERO, ZERO, ZERO), (ZERO, ZERO, -ONE)
+    height, slope_x, slope_y = _triple(w, _REST, j)
+    short = ONE / sqrt(slope_x * slope_x + slope_y * slope_y + ONE)
+    return (height, slope_x, slope_y), (slope_x * short, slope_y * short, -short)
+
+
+@_part
+def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    w, rays, position, leds, dark, curves, table, gloss, reflected, shadows, warm, rest
+):
     """Find lights, view and a first normal of a block's nodes.
 
     Started `warm`, the stored normals are used where all three lights count.
     """
-    flat = (ZERO, ZERO, -ONE)
     y, x_first, pitch = position
     for j in range(_B):
         d, at = w[_DEPTH * _B + j], single(j)
@@ -321,18 +332,19 @@ def _begin_block(w, rays, position, leds, dark, curves, table, gloss, reflected,
         x = x_first + pitch * at + d * wx
         short = ONE / sqrt(wx * wx + wy * wy + ONE)
         v = (wx * short, wy * short, -short)
-        l0, near0 = _light(leds[0], x, y + d * wy, d)
-        l1, near1 = _light(leds[1], x, y + d * wy, d)
-        l2, near2 = _light(leds[2], x, y + d * wy, d)
+        (height, _, _), flat = _rest(w, j, rest)
+        l0, near0 = _light(leds[0], x, y + d * wy, d - height)
+        l1, near1 = _light(leds[1], x, y + d * wy, d - height)
+        l2, near2 = _light(leds[2], x, y + d * wy, d - height)
         s0, s1, s2 = _triple(w, _SCALE, j)
         _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
         (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, reflected, shadows)
         f0 = _response(l0, flat, v, curves[0], table, gloss, 0)[0]
         f1 = _response(l1, flat, v, curves[1], table, gloss, 1)[0]
         f2 = _response(l2, flat, v, curves[2], table, gloss, 2)[0]
-        e0 = _least(-l0[2] * _most(d0, ZERO) / _most(f0, _DAMP), ONE)
-        e1 = _least(-l1[2] * _most(d1, ZERO) / _most(f1, _DAMP), ONE)
-        e2 = _least(-l2[2] * _most(d2, ZERO) / _most(f2, _DAMP), ONE)
+        e0 = _least(_inner(l0, flat) * _most(d0, ZERO) / _most(f0, _DAMP), ONE)
+        e1 = _least(_inner(l1, flat) * _most(d1, ZERO) / _most(f1, _DAMP), ONE)
+        e2 = _least(_inner(l2, flat) * _most(d2, ZERO) / _most(f2, _DAMP), ONE)
         b0, b1, b2 = _triple(w, _MARKS, j)
         nx, ny, nz = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, b0, b1, b2)
         px, py = w[_NORMAL * _B + j], w[(_NORMAL + 1) * _B + j]
@@ -480,7 +492,7 @@ def _unseen(w, light, n, j, range_of, counts):  # type: ignore[no-untyped-def]  
 
 
 @_part
-def _end_block(w, rays, dark, interreflection, coverage, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _end_block(w, rays, dark, interreflection, coverage, shadows, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Turn a block's normals into slopes along the rays, their weights and their flags."""
     for j in range(_B):
         d, at = w[_DEPTH * _B + j], single(j)
@@ -491,20 +503,17 @@ def _end_block(w, rays, dark, interreflection, coverage, shadows):  # type: igno
         )
         known = k0 + k1 + k2
         solved = known > single(1.5)
-        nx, ny, nz = n[0] if solved else ZERO, n[1] if solved else ZERO, n[2] if solved else -ONE
+        (_, rest_x, rest_y), flat = _rest(w, j, rest)
+        nx, ny, nz = _chosen(solved, solved, n, n, flat)
         along = nx * wx + ny * wy - nz
         hidden = (nz > -_STEEPEST - _DAMP) or (along < _LEAST_ALONG)
         trust = ONE if known > single(2.5) else _ONE_DARK
         trust = _UNSOLVED if hidden or not solved else trust
         along = ONE / _most(along, _LEAST_ALONG)
         # d_u = - n . (P0_u + d w_u) / (n . w): the surface point moves along its own ray.
-        slope_x = (
-            -(nx * (ONE + d * (rays[4] + at * rays[5])) + ny * d * (rays[6] + at * rays[7])) * along
-        )
-        slope_y = (
-            -(nx * d * (rays[8] + at * rays[9]) + ny * (ONE + d * (rays[10] + at * rays[11])))
-            * along
-        )
+        slope_x = nx * (ONE + d * (rays[4] + at * rays[5])) + ny * d * (rays[6] + at * rays[7])
+        slope_y = nx * d * (rays[8] + at * rays[9]) + ny * (ONE + d * (rays[10] + at * rays[11]))
+        slope_x, slope_y = -(slope_x + nz * rest_x) * along, -(slope_y + nz * rest_y) * along
         far = (
             _unseen(w, _LIGHT, n, j, coverage[0], k0)
             + _unseen(w, _LIGHT + 3, n, j, coverage[1], k1)
@@ -526,8 +535,8 @@ def _end_block(w, rays, dark, interreflection, coverage, shadows):  # type: igno
         w[(_SLOPE + 1) * _B + j] = slope_y if usable else ZERO
         w[_TRUST * _B + j] = trust if usable else (_UNSOLVED if kind > HALF else ONE)
         w[_FLAG * _B + j] = flag if usable else (_F_OUTSIDE + (_F_INVALID if kind > HALF else ZERO))
-        w[_NORMAL * _B + j] = nx if usable else ZERO
-        w[(_NORMAL + 1) * _B + j] = ny if usable else ZERO
+        w[_NORMAL * _B + j] = nx if usable else flat[0]
+        w[(_NORMAL + 1) * _B + j] = ny if usable else flat[1]
 
 
 @_part
@@ -568,7 +577,7 @@ def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # p
 
 
 @_part
-def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _load(w, image, depth, scale, rest, corner, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Copy a block of row `i` into the work array."""
     row, position = i + corner[0], begin + corner[1]
     # Plain indices: a view of a row is counted, and threads would wait for the counter.
@@ -598,6 +607,10 @@ def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # typ
         w[(_HIDDEN + 2) * _B + j] = single((bits >> 6) & 1)
         w[(_HIDDEN + 3) * _B + j] = single((bits >> 7) & 1)
         w[_KIND * _B + j] = single(kind[row, position + j])
+    if rest is not None:
+        for k in range(3):
+            for j in range(count):
+                w[(_REST + k) * _B + j] = rest[k, row, position + j]
     if warm:
         for j in range(count):
             w[_NORMAL * _B + j] = slopes.normal_x[i, begin + j]
@@ -634,17 +647,28 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     gloss, interreflection, coverage = membrane.gloss, membrane.interreflection, membrane.coverage
     most, settled, shadows, warm = steps.most, single(steps.settled), steps.shadows, steps.warm
     w = np.zeros(sum(_WIDTHS) * _B, np.float32)
-    begun, pitch = ONE if warm else ZERO, single(scale.pitch_mm)
+    begun, pitch, rest = ONE if warm else ZERO, single(scale.pitch_mm), scale.rest
     for i in range(first, last):
         y = single(scale.y_mm + scale.pitch_mm * (i + corner[0]))
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
             position = corner[1] + begin
-            _load(w, image, depth, scale, corner, slopes, warm, i, begin, count)
+            _load(w, image, depth, scale, rest, corner, slopes, warm, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
             _begin_block(
-                w, rays, at, leds, dark, curves, table, gloss, interreflection, shadows, begun
+                w,
+                rays,
+                at,
+                leds,
+                dark,
+                curves,
+                table,
+                gloss,
+                interreflection,
+                shadows,
+                begun,
+                rest,
             )
             if gloss is not None:
                 w[_MISFIT * _B : (_MISFIT + 1) * _B] = _WORST
@@ -658,7 +682,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
                         _step_block(w, dark, curves, table, gloss, interreflection, shadows)
                     _best_block(w, dark, curves, table, gloss, interreflection, shadows)
                     _compare_block(w)
-            _end_block(w, rays, dark, interreflection, coverage, shadows)
+            _end_block(w, rays, dark, interreflection, coverage, shadows, rest)
             _store(w, _SLOPE, slopes.slope_x, i, begin, count)
             _store(w, _SLOPE + 1, slopes.slope_y, i, begin, count)
             _store(w, _TRUST, slopes.weight, i, begin, count)
@@ -669,8 +693,8 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
 
 
 @_part
-def _left_over(w, j, dark, curves, table, gloss, interreflection):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a node's light that no normal explains, its whole light there, noise and slope.
+def _left_over(w, j, dark, curves, table, gloss, interreflection, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a node's light that no normal explains, its whole light there, noise and slope of depth.
 
     Three channels have one direction more than a normal: that in which no change of the normal
     changes them. All are NaN where a channel is dark, saturated or hidden.
@@ -699,7 +723,9 @@ def _left_over(w, j, dark, curves, table, gloss, interreflection):  # type: igno
     whole = _inner((f0 / s0, f1 / s1, f2 / s2), c)
     g0, g1, g2 = _triple(w, _NOISE, j)
     noise = sqrt(g0 * g0 * c[0] * c[0] + g1 * g1 * c[1] * c[1] + g2 * g2 * c[2] * c[2])
-    slope = sqrt(n[0] * n[0] + n[1] * n[1]) / -n[2]
+    (_, rest_x, rest_y), _ = _rest(w, j, rest)
+    slope_x, slope_y = rest_x + n[0] / n[2], rest_y + n[1] / n[2]
+    slope = sqrt(slope_x * slope_x + slope_y * slope_y)
     known = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
     gap = single(np.nan)
     return (left, whole, noise, slope) if known else (gap, gap, gap, gap)
@@ -725,22 +751,24 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
     gloss, interreflection = membrane.gloss, membrane.interreflection
     w = np.zeros(sum(_WIDTHS) * _B, np.float32)
-    pitch = single(scale.pitch_mm)
+    pitch, rest = single(scale.pitch_mm), scale.rest
     for k in range(first, last):
         i = k * step
         y = single(scale.y_mm + scale.pitch_mm * (i + corner[0]))
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
             position = corner[1] + begin
-            _load(w, image, depth, scale, corner, slopes, True, i, begin, count)
+            _load(w, image, depth, scale, rest, corner, slopes, True, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
-            _begin_block(w, rays, at, leds, dark, curves, table, gloss, interreflection, True, ONE)
+            _begin_block(
+                w, rays, at, leds, dark, curves, table, gloss, interreflection, True, ONE, rest
+            )
             for j in range(count):
                 nx, ny = slopes.normal_x[i, begin + j], slopes.normal_y[i, begin + j]
                 nz = -sqrt(_most(ONE - nx * nx - ny * ny, _TINY))
                 _put(w, _NORMAL, j, (nx, ny, nz))
-                found = _left_over(w, j, dark, curves, table, gloss, interreflection)
+                found = _left_over(w, j, dark, curves, table, gloss, interreflection, rest)
                 for part in range(4):
                     left[part, k, begin + j] = found[part]
 

@@ -18,10 +18,12 @@ from gelpolight_core.masks import DARK_COSINE, reflects_light, usable
 from gelpolight_core.reconstruction.height_map import COARSE, Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
 from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers, Scale
+from gelpolight_core.reconstruction.solver import flat_normals
 from gelpolight_core.reflectance.gathered_light import Slab, flat_light
-from gelpolight_core.reflectance.membrane import CURVE_NODES, UP, Membrane
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
+from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -75,6 +77,14 @@ class SensorMaps:
         return np.where(self.usable, 0, seen).astype(np.uint8)
 
     @cached_property
+    def normals_at_rest(self) -> Map:
+        """Normals (rows, columns, 3) of the undeformed membrane."""
+        surface, grid = self.calibration.surface, self.calibration.table.grid
+        if surface.flat:
+            return flat_normals(grid.shape)
+        return surface.normals(grid.points_mm()).astype(np.float32)
+
+    @cached_property
     def membrane(self) -> MembraneNumbers:
         """Membrane and lights."""
         return membrane_numbers(self.full, self.calibration.reflectance.coverage)
@@ -112,7 +122,8 @@ class SensorMaps:
             first + scale.pitch_mm * np.arange(n)
             for first, n in zip((scale.y_mm, scale.x_mm), scale.kind.shape, strict=True)
         )
-        direct = _flat_brightness(self.full, x, y, scale.rays[:2].astype(np.float64))
+        rays, surface = scale.rays[:2].astype(np.float64), self.calibration.surface
+        direct = _flat_brightness(self.full, x, y, rays, surface)
         return np.asarray(1.0 - direct / scale.flat, np.float32)
 
     @cached_property
@@ -139,10 +150,19 @@ class SensorMaps:
             # The flat membrane's brightness and the rays change little from node to node.
             coarse = self.scale(COARSE)
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
-            return Scale(*position, flat, kind, coarse.rays, factor / COARSE)
+            rest = rest_of(self.calibration.surface, x, y)
+            return Scale(*position, flat, kind, coarse.rays, factor / COARSE, rest)
         ray_slope = np.moveaxis(block_average(self.calibration.table.ray_slope, factor), -1, 0)
         returned = (self.slab, self.reflecting)
-        return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor, returned=returned)
+        return sensor_scale(
+            self.full,
+            (x, y),
+            ray_slope,
+            kind,
+            factor=factor,
+            returned=returned,
+            surface=self.calibration.surface,
+        )
 
 
 def sensor_scale(
@@ -153,6 +173,7 @@ def sensor_scale(
     *,
     factor: int,
     returned: tuple[Slab, Map] | None = None,
+    surface: Surface = FLAT,
 ) -> Scale:
     """Return a scale with ray maps of its own.
 
@@ -170,6 +191,8 @@ def sensor_scale(
         As in :class:`Scale`.
     returned : (Slab, (rows, columns)), optional
         The layers that reflect light from below, and the share of nodes that send it.
+    surface : Surface, optional
+        The undeformed membrane.
     """
     x, y = axes_mm
     pitch = float(x[1] - x[0])
@@ -179,8 +202,18 @@ def sensor_scale(
     for position, axis in ((2, 1), (4, 0)):
         for k in range(2):
             rays[position + k] = np.gradient(whole[k], pitch, axis=axis)
-    flat = _flat_brightness(full, x, y, whole, returned)
-    return Scale(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0)
+    flat = _flat_brightness(full, x, y, whole, surface, returned)
+    rest = rest_of(surface, x, y)
+    return Scale(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0, rest)
+
+
+def rest_of(surface: Surface, x_mm: Array, y_mm: Array) -> Map | None:
+    """Return `Scale.rest` of nodes at x and y; None for a flat membrane."""
+    if surface.flat:
+        return None
+    points = np.stack(np.meshgrid(x_mm, y_mm), axis=-1)
+    slopes = np.moveaxis(surface.slopes(points), -1, 0)
+    return np.stack([surface.height(points), *slopes]).astype(np.float32)
 
 
 def kinds(usable: Mask, inside: Mask, factor: int) -> NDArray[np.uint8]:
@@ -281,18 +314,19 @@ def _flat_brightness(
     x: Array,
     y: Array,
     ray_slope: Array,
+    surface: Surface,
     returned: tuple[Slab, Map] | None = None,
 ) -> Map:
     """Return `Scale.flat`, with the light that a slab reflects from the given nodes."""
-    shape, membrane = (y.size, x.size), full.membrane
-    view = view_directions(np.moveaxis(ray_slope, 0, -1))
-    points = np.stack([*np.meshgrid(x, y), np.zeros(shape)], axis=-1)
+    membrane, view = full.membrane, view_directions(np.moveaxis(ray_slope, 0, -1))
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    points, normals = surface.points(places), surface.normals(places)
     if returned is None or membrane.interreflection <= LEAST_SHARE:
-        flat = membrane.direct(full.led_positions_mm, points, np.array(UP), view)
+        flat = membrane.direct(full.led_positions_mm, points, normals, view)
     else:
         (slab, reflecting), pitch = returned, float(x[1] - x[0])
         direct, more = flat_light(
-            points, view, reflecting, full.led_positions_mm, membrane, pitch, slab
+            points, normals, view, reflecting, full.led_positions_mm, membrane, pitch, slab
         )
         flat = -direct - membrane.interreflection * more
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0), np.float32)

@@ -265,7 +265,7 @@ class RegionSolver:
             around = self._from_around.on(
                 region, compared.coarse.ratio, surface, max(own, 1.0) if steep else own
             )
-            begin = surface_normals(depth, at, scale.rays[:2], scale.pitch_mm)
+            begin = surface_normals(depth, at, scale)
             image = with_surroundings(compared.coarse, compared.coarse, *around)
             slopes = self.slopes((scale, (top, left)), image, depth, settings, terms, begin)
             known = Boundary() if steep else boundary
@@ -274,7 +274,7 @@ class RegionSolver:
             depth = held_back(depth, found, self._longest_mm).copy()
             surface = (depth, slopes.normal_x.copy(), slopes.normal_y.copy())
         around = self._from_around.on(region, compared.coarse.ratio, surface, own)
-        begin = surface_normals(depth, at, scale.rays[:2], scale.pitch_mm)
+        begin = surface_normals(depth, at, scale)
         return Start(depth, begin, boundary or Boundary(), around)
 
     def last_slopes(
@@ -346,6 +346,11 @@ class RegionSolver:
         if not terms.ray_true_slopes:
             down = -np.sqrt(1.0 - slopes.normal_x**2 - slopes.normal_y**2)
             slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down
+            if at[0].rest is not None:
+                (top, left), (rows, columns) = at[1], depth.shape
+                here = at[0].rest[:, top : top + rows, left : left + columns]
+                slopes.slope_x[:] += here[1]
+                slopes.slope_y[:] += here[2]
         return slopes
 
     def left_over(self, solved: SolvedRegion) -> ContactLight:

@@ -15,6 +15,7 @@ from functools import cached_property
 from threading import Lock
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -240,7 +241,7 @@ class NearLightSolver(OpenSolver):
     ) -> Solved:
         depth = np.zeros(self.maps.flags.shape, np.float32)
         flags = self.maps.flags.copy()
-        shown = flat_normals(depth.shape) if wanted.normals else None
+        shown = self.maps.normals_at_rest.copy() if wanted.normals else None
         noise, notes = None, list(self._condition_notes)
         if region is None:
             _nothing_pressed(record)
@@ -421,6 +422,10 @@ class NearLightSolver(OpenSolver):
             marks,
             position,
         )
+        if scale.rest is not None:
+            rest = scale.rest[0, corner[0] : corner[0] + shape[0], corner[1] : corner[1] + shape[1]]
+            # Depth along z at a place is not that along the ray that sees it.
+            placed += rest - cv2.remap(rest, position[0], position[1], cv2.INTER_LINEAR)
         at, whole = solved.region.at(COARSE)
         outside, factor = int(Flag.OUTSIDE), scale.factor
         kind = self.maps.kind

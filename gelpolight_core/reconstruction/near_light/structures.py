@@ -72,6 +72,8 @@ class Scale(NamedTuple):
         Ray slope by depth (x, y), and its derivatives along x (x, y) and along y (x, y).
     ray_step : float
         Nodes of `rays` to one node of this scale.
+    rest : (3, rows, columns) float32 or None
+        Height in mm of the undeformed membrane, and its slopes along x and y; None: flat.
     """
 
     factor: int
@@ -82,6 +84,7 @@ class Scale(NamedTuple):
     kind: NDArray[np.uint8]
     rays: Map
     ray_step: float
+    rest: Map | None = None
 
 
 class MembraneNumbers(NamedTuple):

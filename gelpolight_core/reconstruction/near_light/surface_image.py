@@ -22,7 +22,6 @@ from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.solver import thinned
 from gelpolight_core.reflectance.surroundings import view_directions
-from gelpolight_core.sensor_calibration import FullModel
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -52,7 +51,7 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
         for first, n in ((scale.x_mm, columns), (scale.y_mm, rows))
     )
     rays = np.moveaxis(scale.rays[:2], 0, -1)
-    depth, normals, direct = _lit(height_map, maps.full, x, y, rays, COARSE)
+    depth, normals, direct = _lit(height_map, maps, (x, y), rays, COARSE)
     coarse = np.asarray(np.moveaxis(direct, -1, 0) / scale.flat, np.float32)
     reflected, clear = np.zeros_like(coarse), np.full_like(coarse, 2.0 * CLEAR)
     # Without interreflection, one round finds the shadows.
@@ -66,7 +65,7 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
         )
     x, y = grid.x_mm[at[1]], grid.y_mm[at[0]]
     rays = np.nan_to_num(calibration.table.ray_slope[at])
-    _, _, fine = _lit(height_map, maps.full, x, y, rays, step)
+    _, _, fine = _lit(height_map, maps, (x, y), rays, step)
     column, row = np.meshgrid((x - scale.x_mm) / scale.pitch_mm, (y - scale.y_mm) / scale.pitch_mm)
     place = np.asarray(column, np.float32), np.asarray(row, np.float32)
     reflected_here, clear_here = (
@@ -81,25 +80,37 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
 
 
 def _lit(
-    height_map: HeightMap, full: FullModel, x_mm: Array, y_mm: Array, ray_slope: Map, step: int
+    height_map: HeightMap,
+    maps: SensorMaps,
+    nodes_mm: tuple[Array, Array],
+    ray_slope: Map,
+    step: int,
 ) -> tuple[Map, Map, Array]:
-    """Return depth, normals and direct light of the surface that the rays of flat nodes meet."""
-    pitch = height_map.pitch_mm
-    axes = (x_mm - height_map.x_mm[0]) / pitch, (y_mm - height_map.y_mm[0]) / pitch
-    home = np.asarray(np.stack(np.meshgrid(*axes)), np.float32)
+    """Return depth, normals and direct light of the surface that the rays of nodes meet."""
+    pitch, surface, full = height_map.pitch_mm, maps.calibration.surface, maps.full
+    first = np.array([height_map.x_mm[0], height_map.y_mm[0]])
+    points = surface.points(np.stack(np.meshgrid(*nodes_mm), axis=-1))
+    rays = np.dstack([ray_slope, -np.ones(points.shape[:2])])
+    # From the plane of the boundary on, the whole surface is a depth along each ray.
+    foot = points + points[..., 2:] * rays
+    home = np.asarray(np.moveaxis((foot[..., :2] - first) / pitch, -1, 0), np.float32)
     per_depth = np.asarray(np.moveaxis(ray_slope, -1, 0) / pitch, np.float32)
-    place = meeting(height_map.depth_mm, home, per_depth)
-    slopes = surface_slopes(height_map.depth_mm, pitch, step=step)
+    below = -height_map.height_mm
+    place = meeting(below, home, per_depth)
+    slopes = surface_slopes(below, pitch, step=step)
     depth, slope_x, slope_y = (
         np.asarray(cv2.remap(values, place[0], place[1], cv2.INTER_LINEAR), np.float32)
-        for values in (height_map.depth_mm, *slopes)
+        for values in (below, *slopes)
     )
     normals = normals_from_slopes(slope_x, slope_y)
-    flat = np.dstack([*np.meshgrid(x_mm, y_mm), np.zeros(depth.shape)])
-    points = flat + depth[..., None] * np.dstack([ray_slope, -np.ones(depth.shape)])
     view = view_directions(np.asarray(ray_slope, np.float64))
     return (
-        depth,
+        np.asarray(depth + points[..., 2], np.float32),
         normals,
-        full.membrane.direct(full.led_positions_mm, points, normals.astype(np.float64), view),
+        full.membrane.direct(
+            full.led_positions_mm,
+            foot + depth[..., None] * rays,
+            normals.astype(np.float64),
+            view,
+        ),
     )

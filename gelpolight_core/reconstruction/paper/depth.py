@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED, usable
 from gelpolight_core.reconstruction.buffers import Buffers
@@ -83,7 +84,13 @@ class PaperSolver(OpenSolver):
 
     @staticmethod
     def refuse_unfit(calibration: OpenSensor) -> None:
-        """Refuse lights nearly in one plane, and a membrane without light."""
+        """Refuse a curved membrane, lights nearly in one plane, and a membrane without light."""
+        if not calibration.surface.flat:
+            raise InputError(
+                tr("The paper's model is for flat membranes"),
+                calibration.serial,
+                Remedy.OTHER_MODEL,
+            )
         refuse_coplanar_lights(calibration, calibration.led_positions_mm)
         refuse_dark_membrane(calibration, calibration.radiance)
 

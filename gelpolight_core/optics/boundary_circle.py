@@ -1,0 +1,77 @@
+"""The axis of a curved membrane: through the middle of its boundary's circle in the background."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from gelpolight_core.finding import QualityTable, judge
+from gelpolight_core.masks import LEAST_LIGHT
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane
+from gelpolight_core.optics.resampling import paraxial_footprint_mm
+from gelpolight_core.surface import Surface
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+BORDER_PX = 3
+"""Points of the outline nearer to the image's border are cut off there."""
+LEAST_SECTORS, SECTORS = 8, 16
+"""Sectors in which the circle must be seen, of all: an arc of half a turn fixes its middle."""
+
+
+def centred(
+    surface: Surface, image: Map, camera: Camera, plane: TopPlane, stack: LayerStack
+) -> tuple[Surface, QualityTable]:
+    """Return a surface with its axis in the middle of the boundary's circle.
+
+    Parameters
+    ----------
+    surface : Surface
+        The membrane, with its axis anywhere.
+    image : (height, width, 3) float32
+        Raw background, linear light.
+    camera, plane, stack
+        Optics.
+
+    Returns
+    -------
+    surface : Surface
+        Where the circle is not seen, as it was.
+    quality : QualityTable
+        The diameter of the circle against the stated one.
+    """
+    lit = np.asarray(image.max(axis=2) > LEAST_LIGHT, np.uint8)
+    outlines, _ = cv2.findContours(lit, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    pixels = max(outlines, key=len)[:, 0].astype(np.float64) if outlines else np.zeros((0, 2))
+    last = np.array([camera.width - 1, camera.height - 1])
+    seen = ((pixels >= BORDER_PX) & (pixels <= last - BORDER_PX)).all(axis=1)
+    points, _ = camera_to_membrane(camera.directions(pixels[seen]), plane, stack)
+    turns = np.arctan2(*(points - points.mean(axis=0)).T) if len(points) else np.zeros(0)
+    sectors = np.unique(np.floor(SECTORS * (turns / (2.0 * np.pi) + 0.5)))
+    stated, found = surface.diameter_mm, np.nan
+    if len(sectors) >= LEAST_SECTORS:
+        pitch = paraxial_footprint_mm(camera, stack)
+        fit = least_squares(
+            lambda x: (np.hypot(*(points - x[:2]).T) - x[2]) / pitch,
+            [*points.mean(axis=0), 0.5 * stated],
+            loss="soft_l1",
+        )
+        surface = replace(surface, axis_mm=(float(fit.x[0]), float(fit.x[1])))
+        # The outline runs through the outermost lit pixels.
+        found = 2.0 * float(fit.x[2]) + pitch
+    figure = judge(
+        "boundary_diameter_percent",
+        tr("Diameter of the boundary's circle against the stated one"),
+        100.0 * abs(found / stated - 1.0),
+        "%",
+        warn=1.0,
+        fail=5.0,
+        remedy=tr("Check the working diameter, and that the whole membrane is lit"),
+    )
+    return surface, QualityTable((figure,) if np.isfinite(found) else ())

@@ -1,0 +1,172 @@
+"""The undeformed membrane: its height over the plane of its boundary.
+
+A flat membrane lies in that plane. A new shape is a function here and an entry of `SHAPES`.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
+
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+FIELD_KEYS, FIELD_NODES = ("x_mm", "y_mm", "height_mm"), 65
+"""Arrays of a file with a height field, and nodes to a side of one in a calibration."""
+STEP_MM = 1e-3
+"""Between the heights whose difference is a slope."""
+STEEPEST = 0.99
+"""Share of a sphere's radius up to which it is a height over the plane."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """A membrane at rest, as a height towards z (away from the camera) in the sensor frame.
+
+    Attributes
+    ----------
+    shape : str
+        One of `SHAPES`.
+    apex_height_mm : float
+        Height on the axis over the plane of the boundary.
+    diameter_mm : float
+        Of the boundary.
+    axis_mm : (x, y)
+        Where the axis meets the plane.
+    rise_mm : float
+        What is added on the axis, and falls as a paraboloid to 0 at the boundary: how far a mould
+        is off.
+    heights_mm : tuple of rows
+        Of a height field: a square about the axis as wide as the boundary.
+    file : str
+        Of a height field: the file beside session.toml that it comes from.
+    """
+
+    shape: str = "plane"
+    apex_height_mm: float = 0.0
+    diameter_mm: float = 0.0
+    axis_mm: tuple[float, float] = (0.0, 0.0)
+    rise_mm: float = 0.0
+    heights_mm: tuple[tuple[float, ...], ...] = ()
+    file: str = ""
+
+    @property
+    def flat(self) -> bool:
+        """Whether it is the plane itself."""
+        return self.shape == "plane" and self.rise_mm == 0.0
+
+    def check(self) -> None:
+        """Refuse impossible values.
+
+        Raises
+        ------
+        ValueError
+            With the first of them.
+        """
+        if self.shape not in SHAPES or (not self.flat and self.diameter_mm <= 0.0):
+            raise ValueError("the shape of the membrane is unknown")
+        if not abs(self.apex_height_mm + self.rise_mm) <= 0.5 * self.diameter_mm:
+            raise ValueError("the membrane is higher than half its diameter")
+
+    def height(self, points_mm: Array) -> Array:
+        """Return the height (...) in mm at points (..., 2) in mm."""
+        x, y = np.moveaxis(np.asarray(points_mm, np.float64) - self.axis_mm, -1, 0)
+        found = SHAPES[self.shape](self, x, y)
+        if self.rise_mm:
+            found = found + self.rise_mm * (1.0 - (x**2 + y**2) / (0.5 * self.diameter_mm) ** 2)
+        return np.asarray(found)
+
+    def slopes(self, points_mm: Array) -> Array:
+        """Return the slopes (..., 2) of the height along x and y."""
+        points = np.asarray(points_mm, np.float64)
+        if self.flat:
+            return np.zeros_like(points)
+        steps = STEP_MM * np.eye(2)
+        rises = [self.height(points + step) - self.height(points - step) for step in steps]
+        return np.asarray(np.stack(rises, axis=-1) / (2.0 * STEP_MM))
+
+    def points(self, points_mm: Array) -> Array:
+        """Return the places (..., 3) of the membrane over points (..., 2)."""
+        return np.concatenate([points_mm, self.height(points_mm)[..., None]], axis=-1)
+
+    def normals(self, points_mm: Array) -> Array:
+        """Return the unit normals (..., 3) towards the camera at points (..., 2)."""
+        slopes = self.slopes(points_mm)
+        normals = np.concatenate([slopes, -np.ones_like(slopes[..., :1])], axis=-1)
+        return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True))
+
+
+def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
+    """Return a height field from an npz file.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the file is.
+    name : str
+        Of the file; its arrays are x_mm and y_mm, rising, from the axis, and height_mm (rows,
+        columns), 0 at the boundary.
+    diameter_mm : float
+        Of the boundary.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, has other arrays, or does not cover the boundary.
+    """
+    path = folder / name
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
+        field = RectBivariateSpline(y, x, height)
+    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        wanted = tr("The file does not hold x_mm, y_mm and height_mm of a grid")
+        raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
+    rim = 0.5 * diameter_mm
+    if min(x[-1], y[-1], -x[0], -y[0]) < rim or not np.isfinite(height).all():
+        raise InputError(
+            tr("The grid does not cover the boundary, {d:g} mm wide").format(d=diameter_mm),
+            path,
+            Remedy.CORRECT_FILE,
+        )
+    even = np.linspace(-rim, rim, FIELD_NODES)
+    rows = tuple(tuple(row) for row in field(even, even).tolist())
+    apex_mm = float(field(0.0, 0.0)[0, 0])
+    return Surface("height_field", apex_mm, diameter_mm, heights_mm=rows, file=name)
+
+
+def _plane(_surface: Surface, x: Array, _y: Array) -> Array:
+    return np.zeros_like(x)
+
+
+def _spherical_cap(surface: Surface, x: Array, y: Array) -> Array:
+    if surface.apex_height_mm == 0.0:
+        return np.zeros_like(x)
+    rim = 0.5 * surface.diameter_mm
+    radius = (rim**2 + surface.apex_height_mm**2) / (2.0 * surface.apex_height_mm)
+    square = np.minimum(x**2 + y**2, (STEEPEST * radius) ** 2)
+    # The difference of two large numbers, written without one.
+    return np.asarray(surface.apex_height_mm - square / (radius + np.sqrt(radius**2 - square)))
+
+
+def _height_field(surface: Surface, x: Array, y: Array) -> Array:
+    heights = np.asarray(surface.heights_mm)
+    rim = 0.5 * surface.diameter_mm
+    rows, columns = (np.linspace(-rim, rim, n) for n in heights.shape)
+    return np.asarray(RectBivariateSpline(rows, columns, heights).ev(y, x))
+
+
+SHAPES: dict[str, Callable[[Surface, Array, Array], Array]] = {
+    "plane": _plane,
+    "spherical_cap": _spherical_cap,
+    "height_field": _height_field,
+}
+"""The height in mm of each shape at x and y from its axis."""
+FLAT = Surface()
