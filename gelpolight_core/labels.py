@@ -35,6 +35,8 @@ def label(key: str) -> str:
         "reference": tr("reference"),
         "reflectance": tr("reflectance"),
         "background": tr("background"),
+        "spherical_cap": tr("spherical cap"),
+        "height_field": tr("height field"),
         "two-lobe": tr("two-lobe"),
         "one-dimensional": tr("one-dimensional"),
         "red": tr("red"),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.live.image_checks import Rgb, end_of_scale
 from app.live.live_detection import Detection as Detection
 from app.live.overlay import Circle, Line, Marker, Mask, Overlay, Role
-from gelpolight_core.calibration.open_sensor import TOP_POSE
+from gelpolight_core.calibration.open_sensor import BACKGROUND, TOP_POSE
 from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError, Remedy
@@ -222,5 +222,5 @@ def ball_handle(found: Indentation, table: ResamplingTable) -> Circle | None:
 
 def table_of(results: Results) -> ResamplingTable | None:
     """Return the table from image to membrane; None if the top surface is not known."""
-    top = results.get(TOP_POSE)
-    return None if top is None else top.table
+    found = results.get(BACKGROUND) or results.get(TOP_POSE)
+    return None if found is None else found.table

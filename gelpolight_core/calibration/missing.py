@@ -6,6 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from gelpolight_core.calibration.in_place import IN_PLACE
+from gelpolight_core.calibration.open_sensor import RADIANCE
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import files_in, names_of
@@ -73,4 +74,6 @@ def refuse_missing(
             "Capture these images; or calibrate in place, from background and balls alone: replace "
             "[checkerboard] and [top_pose] in session.toml with [in_place] mm_per_px = ..."
         )
+    if set(missing) == {RADIANCE.folder}:
+        advice = tr("Capture them, or state in [membrane] of session.toml that it is curved")
     raise InputError(found, folder, advice)

@@ -259,6 +259,8 @@ class Recipe:
         Takes the data of the calibration and returns what is known of the sensor.
     closed : bool
         Whether it is for sensors that cannot be opened.
+    flat : bool
+        Whether it is for flat membranes only.
     depends_on : callable
         Takes the session and the fingerprints of the stages by their keys, and returns everything
         that the calibration depends on.
@@ -270,6 +272,7 @@ class Recipe:
     finish: Callable[[Session, Results, dict[str, QualityTable], Provenance], Any]
     facts: Callable[[Any], Facts]
     closed: bool = False
+    flat: bool = False
     depends_on: Callable[[Session, dict[str, str]], object] = field(
         default=lambda session, inputs: (list(inputs.values()), session.serial)
     )
@@ -291,7 +294,8 @@ class Recipe:
 
     def fits(self, session: Session) -> bool:
         """Return whether the recipe is for the kind of sensor of a session."""
-        return self.closed == (session.in_place is not None)
+        closed = session.in_place is not None
+        return self.closed == closed and (session.surface.flat or not self.flat)
 
     def of(self, session: Session) -> tuple[Stage[Any], ...]:
         """Return the stages that a session has."""

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from gelpolight_core.calibration.refinement import Joint
     from gelpolight_core.sensor_calibration import Calibration, OpenSensor, Provenance
     from gelpolight_core.session.session import Session
+    from gelpolight_core.surface import Surface
 
 
 def _run_joint(work: Work) -> Joint:
@@ -89,7 +90,15 @@ def _facts(c: OpenSensor) -> Facts:
         (tr("Window"), window if s.window_thickness_mm > 0.0 else tr("none")),
         (tr("LED height Z1"), f"{s.led_height_mm:g} mm"),
         (tr("Working diameter"), f"{s.working_diameter_mm:g} mm"),
+        *(() if c.surface.flat else ((tr("Membrane"), _shape(c.surface)),)),
     )
+
+
+def _shape(surface: Surface) -> str:
+    text = tr("{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm")
+    x, y = surface.axis_mm
+    height_mm = surface.apex_height_mm + surface.rise_mm
+    return text.format(shape=label(surface.shape), height=height_mm, x=x, y=y)
 
 
 def _finish(
@@ -123,7 +132,7 @@ FULL = Recipe(
     ),
 )
 """The full model."""
-PAPER = replace(FULL, key="paper", title=tr("paper"), stages=FULL.stages[:-1])
+PAPER = replace(FULL, key="paper", title=tr("paper"), stages=FULL.stages[:-1], flat=True)
 """The paper's model."""
 RECIPES = (FULL, PAPER, IN_PLACE)
 """The first one that fits a session is used unless another one is asked for."""
@@ -147,10 +156,14 @@ def recipe_of(session: Session, model: str | None = None) -> Recipe:
     for recipe in RECIPES:
         if recipe.fits(session) and model in (None, recipe.key):
             return recipe
+    if not session.surface.flat:
+        found = tr("The membrane of the session is curved")
+    elif session.in_place is None:
+        found = tr("The session has no table [in_place]")
+    else:
+        found = tr("The session is of a closed sensor")
     raise InputError(
-        tr("The session has no table [in_place]")
-        if session.in_place is None
-        else tr("The session is of a closed sensor"),
+        found,
         f"--model {model}",
         Remedy.REMOVE_OPTION,
     )

@@ -18,7 +18,7 @@ from gelpolight_core.calibration.depth_scale import (
 )
 from gelpolight_core.calibration.determined import judge_determined
 from gelpolight_core.calibration.joint import JointResult, Stated, refine_jointly
-from gelpolight_core.calibration.joint_problem import RISE_SHARE
+from gelpolight_core.calibration.joint_problem import RISE_SHARE, SHAPE_SD_MM
 from gelpolight_core.calibration.open_sensor import (
     BACKGROUND,
     LENS,
@@ -48,12 +48,15 @@ from gelpolight_core.sensor_calibration import (
 from gelpolight_core.session.session import SensorData, Session
 from gelpolight_core.set_up import LEAST_INDEX
 from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS, SHOWN_SD
+from gelpolight_core.surface import Surface
 from gelpolight_core.translation import joined, tr
 
 CHECKED_BALLS = 4
 GATHERED_SD = 0.005
 """Of the height, where light between parts of the membrane is gathered: what finite facets and
 near windows change, besides the reflectance."""
+SURE_SDS = 5.0
+"""Standard deviations of a mould's tolerance that no mould is off."""
 LEAST_CONTACT_PX = 24.0
 """Median radius of the contacts from which on they show the balls' radii: within 0.5 % at 22 pixels
 and more, but 8 % off at 18."""
@@ -249,6 +252,7 @@ def judge_joint(
                 fail=1.0,
                 remedy=tr("Press more balls at more positions"),
             ),
+            *_judge_shape(joint.surface),
             *judge_presses(joint),
             *findings,
             *_scale_figures(full),
@@ -262,6 +266,26 @@ def judge_joint(
             ),
             judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
         )
+    )
+
+
+def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
+    """Judge the height of a curved membrane against the stated one; empty for a flat one."""
+    if surface.flat:
+        return ()
+    tolerance_mm = float(SHAPE_SD_MM[0])
+    return (
+        judge(
+            "membrane_height_mm",
+            tr("Height of the membrane against the stated one ({height:.2f} mm fits)").format(
+                height=surface.apex_height_mm + surface.rise_mm
+            ),
+            abs(surface.rise_mm),
+            "mm",
+            warn=2.0 * tolerance_mm,
+            fail=SURE_SDS * tolerance_mm,
+            remedy=tr("The membrane has another shape: correct [membrane] in session.toml"),
+        ),
     )
 
 

@@ -22,7 +22,7 @@ class Mesh:
     Attributes
     ----------
     points_mm : (N, 3) float32
-        (x, y, -depth).
+        (x, y, height over the plane of the boundary).
     triangles : (M, 3) int32
         Corners, counter-clockwise seen from the camera: the normals point towards it (z < 0).
     depth_mm : (N,) float32
@@ -74,7 +74,8 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
     kept[triangles] = True
     numbers = np.cumsum(kept, dtype=np.int32) - np.int32(1)
     x_mm, y_mm = np.meshgrid(heightmap.x_mm[::stride], heightmap.y_mm[::stride])
-    points_mm = np.stack([x_mm, y_mm, -depth_mm], axis=-1, dtype=np.float32, casting="same_kind")
+    height_mm = heightmap.height_mm[::stride, ::stride]
+    points_mm = np.stack([x_mm, y_mm, height_mm], axis=-1, dtype=np.float32, casting="same_kind")
     normals = heightmap.normals
     if normals is not None:
         normals = normals[::stride, ::stride].reshape(-1, 3)[kept].astype(np.float32)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.finding import Finding, Heights, Verdict
+from gelpolight_core.io.codec import pack, unpack
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import check_version, refusing, written_text
 from gelpolight_core.io.texts import text_of_file
@@ -28,6 +29,7 @@ from gelpolight_core.reconstruction.height_map import (
     HeightMap,
     surface_slopes,
 )
+from gelpolight_core.surface import Surface
 from gelpolight_core.translation import english, tr
 
 GREY_LEVELS = 65_535
@@ -36,7 +38,9 @@ NPZ_MAPS = ("depth_mm", "normals", *SD_MAPS)
 NPZ_NUMBERS = ("pitch_mm", "lateral_per_mm", *SENSOR_NUMBERS)
 NPZ_ORIGIN = ("calibration_id", "model", "source")
 NPZ_TEXTS = (*NPZ_ORIGIN, "notes", "faults", "doubts", "flag_names")
-NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags")
+CURVED = ("height_mm", "membrane")
+"""Of a curved membrane: the surface itself, and the membrane at rest as JSON."""
+NPZ_NAMES = (*NPZ_MAPS, *NPZ_NUMBERS, *NPZ_TEXTS, "x_mm", "y_mm", "flags", *CURVED)
 HEAD = ("format", "version", "sha256")
 FORMAT, VERSION = "gelpolight-height-map", 1
 NORMAL_ROUNDING = 1e-3
@@ -97,6 +101,9 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     arrays["flags"] = heightmap.flags.astype(np.uint8, copy=False)
     arrays["flag_names"] = np.array(flag_names())
     arrays["notes"] = np.array(list(map(_note, heightmap.findings)), dtype=np.str_)
+    if not heightmap.at_rest.flat:
+        arrays["height_mm"] = heightmap.height_mm
+        arrays["membrane"] = np.array(json.dumps(pack(heightmap.at_rest, {}, "membrane")))
     doubts = [english(found.text) for found in heightmap.doubts]
     arrays["faults"] = np.array(doubts, dtype=np.str_)
     np.savez(file, **arrays, format=FORMAT, version=VERSION, sha256=_checksum(arrays))
@@ -142,6 +149,10 @@ def read_npz(path: Path) -> HeightMap:
         if not {*texts.pop("flag_names", ())} <= {*flag_names()}:
             raise ValueError("flag_names")
         values: dict[str, Any] = {"normals": None}
+        if "membrane" in stored:
+            at_rest = unpack(Surface, json.loads(stored["membrane"].item()), {}, "membrane")
+            at_rest.check()
+            values["at_rest"] = at_rest
         values |= {name: stored[name].astype(np.float32) for name in NPZ_MAPS if name in stored}
         values |= {name: float(stored[name]) for name in NPZ_NUMBERS if name in stored}
         heightmap = HeightMap(
@@ -205,7 +216,7 @@ def _refuse_other_slopes(heightmap: HeightMap, normals: NDArray[np.float64]) -> 
         raise ValueError("normals are not unit vectors")
     if not np.all(normals[:, 2] < 0.0):
         raise ValueError("normals point away from the camera")
-    slopes = np.stack(surface_slopes(heightmap.depth_mm, heightmap.pitch_mm), axis=-1)
+    slopes = np.stack(surface_slopes(-heightmap.height_mm, heightmap.pitch_mm), axis=-1)
     slopes = slopes[has_depth(heightmap)].astype(np.float64)
     finite = np.isfinite(slopes).all(axis=1)
     stated = normals[finite, :2] / normals[finite, 2:]

@@ -17,7 +17,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 def _heights_m(heightmap: HeightMap) -> NDArray[np.float64]:
-    return np.where(has_depth(heightmap), -1e-3 * heightmap.depth_mm.astype(np.float64), np.nan)
+    return np.where(has_depth(heightmap), 1e-3 * heightmap.height_mm.astype(np.float64), np.nan)
 
 
 def write_x3p(heightmap: HeightMap, file: BinaryIO) -> None:

@@ -192,9 +192,9 @@ MODELS: Mapping[str, IndenterModel] = {
 def model_on(model: IndenterModel, surface: Surface) -> IndenterModel:
     """Return the model of a shape that is pressed into a membrane along z.
 
-    A flat face stays a plane in space: in the contact, the depth is that on a flat membrane plus the
-    rise of the undeformed one. Outside, both obey the same linear equation, the rise with the value
-    at the nearest point of the contact.
+    A flat face stays a plane in space: in the contact, the depth is that on a flat membrane plus
+    the rise of the undeformed one. Outside, both obey the same linear equation, the rise with the
+    value at the nearest point of the contact.
     """
     if surface.flat:
         return model
@@ -236,6 +236,7 @@ def _nearest(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
         share = radius / np.maximum(np.hypot(x, y), radius)
         return values["x_mm"] + share * x, values["y_mm"] + share * y
     half = 0.5 * values["side_a_mm"], 0.5 * values["side_b_mm"]
-    inside = [np.clip(a, -h, h) for a, h in zip(_turned(x, y, values["yaw"]), half, strict=True)]
-    x, y = _turned(*inside, -values["yaw"])
+    along, across = _turned(x, y, values["yaw"])
+    along, across = np.clip(along, -half[0], half[0]), np.clip(across, -half[1], half[1])
+    x, y = _turned(along, across, -values["yaw"])
     return values["x_mm"] + x, values["y_mm"] + y

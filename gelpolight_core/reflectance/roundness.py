@@ -42,10 +42,15 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
     if len(presses) < LEAST_PRESSES or not away.any():
         return ()
     share = (away**2).sum(axis=1)
+    # A contact on a slope is seen from above, shorter along it.
+    out = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    slopes = table.surface.slopes(np.array([press.pose.centre_mm for press in presses]))
+    along, across = (slopes * out).sum(axis=1), slopes[:, 0] * out[:, 1] - slopes[:, 1] * out[:, 0]
     share /= share.max()
     stretch = np.array(
         [_stretch(p.indentation.contour, a) for p, a in zip(presses, away, strict=True)]
     )
+    stretch += 0.5 * np.log((1.0 + along**2) / (1.0 + across**2))
     at_the_edge = float(share @ stretch) / float(share @ share)
     rest = stretch - at_the_edge * share
     sd = float(np.sqrt(rest @ rest / (len(share) - 1) / (share @ share)))

@@ -7,8 +7,10 @@ import pytest
 
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView
 from gelpolight_core.calibration.joint_problem import CURVE_SIZE, Problem
+from gelpolight_core.surface import Surface
 
 STEP = 1e-4
+CAP = Surface("spherical_cap", 1.5, 20.0, (0.3, -0.2))
 # Light from around is given: none is gathered.
 NO_VIEW = CoarseView(
     np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 0, 3)), np.zeros((0, 0), np.float32), 1.0, 1
@@ -34,10 +36,11 @@ def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
                 np.zeros((0, 0, 3), np.float32),
                 random.uniform(0.2, 1.0, (40, 3)),
                 random.uniform(0.0, 0.1, (40, 3)),
+                CAP,
             )
         )
     lights = [[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]]
-    membrane = [1.05, 0.2, 0.4, 0.15, 0.7]
+    membrane = [1.05, 0.2, 0.4, 0.15, 0.7, 0.02, 0.01, -0.03]
     balls = [-2.05, 1.1, 0.9, 3.1, -1.45, 1.2]
     x = np.concatenate([np.ravel(lights), membrane, balls, np.full(CURVE_SIZE * curves, 0.03)])
     return Problem(presses, x + 0.01, np.ones(x.size, bool)), x

@@ -39,7 +39,7 @@ def test_an_even_matt_membrane_receives_what_its_mirror_image_shows(thickness_mm
     radius = 14.0
     seen = np.where((np.hypot(x, y) < radius)[..., None], 0.3, 0.0) * np.ones(3)
     slab = Slab(thickness_mm, 1.41)
-    found = returned_to_flat(seen, points, view, LEDS, Membrane(), SIDE, slab)
+    found = returned_to_flat(seen, points, view, view, LEDS, Membrane(), SIDE, slab)
     angle = np.linspace(1e-4, np.arctan(radius / (2.0 * thickness_mm)), 20001)
     rings = fresnel(angle, 1.41) * 2.0 * np.sin(angle) * np.cos(angle)
     share = float(np.trapezoid(rings, angle))

@@ -657,18 +657,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
             _begin_block(
-                w,
-                rays,
-                at,
-                leds,
-                dark,
-                curves,
-                table,
-                gloss,
-                interreflection,
-                shadows,
-                begun,
-                rest,
+                w, rays, at, leds, dark, curves, table, gloss, interreflection, shadows, begun, rest
             )
             if gloss is not None:
                 w[_MISFIT * _B : (_MISFIT + 1) * _B] = _WORST
@@ -694,7 +683,7 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
 
 @_part
 def _left_over(w, j, dark, curves, table, gloss, interreflection, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a node's light that no normal explains, its whole light there, noise and slope of depth.
+    """Return a node's light that no normal explains, its whole light, noise and slope of depth.
 
     Three channels have one direction more than a normal: that in which no change of the normal
     changes them. All are NaN where a channel is dark, saturated or hidden.

@@ -70,7 +70,6 @@ from gelpolight_core.reconstruction.solver import (
     OpenSolver,
     Solved,
     Wanted,
-    flat_normals,
     unseen_reason,
 )
 from gelpolight_core.reconstruction.terms import Terms
