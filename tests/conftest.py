@@ -174,14 +174,23 @@ def virtual_session(made_once: MadeOnce) -> Path:
     return _simulated(made_once, "virtual-session", balls=6, scale=0.5)
 
 
-def _simulated(made_once: MadeOnce, name: str, *, balls: int, scale: float) -> Path:
+@pytest.fixture(scope="session")
+def curved_session(made_once: MadeOnce) -> Path:
+    """Return the session of a virtual sensor with a curved membrane, at a quarter of its size."""
+    return _simulated(made_once, "curved-session", balls=6, scale=0.25, apex_height_mm=2.0)
+
+
+def _simulated(
+    made_once: MadeOnce, name: str, *, balls: int, scale: float, apex_height_mm: float = 0.0
+) -> Path:
     """Return a session with some of the design's balls; a calibration's cost grows with them."""
     from gelpolight_core.design.sensor_design import SensorDesign
     from gelpolight_core.simulation.session import simulate_session
 
     def make(folder: Path) -> Path:
         design = SensorDesign()
-        fewer = replace(design, balls=design.balls[:balls])
+        membrane = replace(design.membrane, apex_height_mm=apex_height_mm)
+        fewer = replace(design, balls=design.balls[:balls], membrane=membrane)
         simulate_session(fewer, folder / "session", scale=scale)
         return folder / "session"
 

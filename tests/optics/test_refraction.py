@@ -16,6 +16,7 @@ from gelpolight_core.optics.refraction import (
     camera_to_membrane,
     membrane_to_camera,
 )
+from gelpolight_core.surface import Surface
 
 
 def tilted_plane(tilt_x: float, tilt_y: float, distance_mm: float = 39.0) -> TopPlane:
@@ -106,3 +107,21 @@ def test_rays_that_never_reach_the_surface_are_not_numbers() -> None:
         np.array([1.0, 0.0, -0.1]), TopPlane((0.0, 0.0, 1.0), 39.0), stack
     )
     assert np.isnan(point).all()
+
+
+@given(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-0.02, 0.02), st.floats(-0.02, 0.02))
+def test_a_point_of_a_curved_membrane_is_seen_like_one_on_a_thicker_slab(
+    x: float, y: float, tilt_x: float, tilt_y: float
+) -> None:
+    cap, plane = Surface("spherical_cap", 2.0, 26.0, (-0.4, 0.3)), tilted_plane(tilt_x, tilt_y)
+    gel = {"elastomer_index": 1.41, "window_thickness_mm": 2.0}
+    stack = build_stack(plane.distance_mm, elastomer_thickness_mm=12.0, **gel)
+    place = np.array([x, y])
+    up = float(cap.height(place))
+    higher = TopPlane(plane.normal_camera, plane.distance_mm + up)
+    thicker = build_stack(higher.distance_mm, elastomer_thickness_mm=12.0 + up, **gel)
+    seen = membrane_to_camera(place, plane, stack, cap)
+    np.testing.assert_allclose(seen, membrane_to_camera(place, higher, thicker), atol=1e-11)
+    back, slope = camera_to_membrane(seen, plane, stack, cap)
+    np.testing.assert_allclose(back, place, atol=1e-9)
+    np.testing.assert_allclose(slope, camera_to_membrane(seen, higher, thicker)[1], atol=1e-11)

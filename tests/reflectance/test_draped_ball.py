@@ -9,11 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
+from gelpolight_core.design.parts import MembraneDesign
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.draped_ball import draped_ball
 from gelpolight_core.simulation.drape import contact_radius, free_profile
-from gelpolight_core.simulation.indenters import Ball
+from gelpolight_core.simulation.indenters import Ball, press
+from gelpolight_core.surface import Surface
 
 Array = NDArray[np.float64]
 
@@ -129,3 +132,38 @@ def test_the_ball_may_be_seen_exactly_at_its_lowest_point() -> None:
     assert surface[0].tolist() == pytest.approx([0.0, 0.0, -1.0])
     assert math.isclose(normals[0, 2], -1.0)
     assert on_ball[0]
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (-6.0, 2.5), (3.0, 7.0)])
+def test_a_ball_in_a_curved_membrane_drapes_like_the_simulators(
+    centre: tuple[float, float],
+) -> None:
+    pose = BallPose(centre, 3.0, 0.9)
+    at_rest = MembraneDesign(working_diameter_mm=26.0, apex_height_mm=2.0)
+    ball = Ball(pose.radius_mm, pose.depth_mm)
+    made = press(ball, x_mm=centre[0], y_mm=centre[1], decay_mm=0.7, rest=at_rest, pitch_mm=0.02)
+    points = field(pose, 2.5, 400, 4)
+    cap = Surface("spherical_cap", 2.0, 26.0)
+    surface, normals, _ = draped_ball(
+        points, np.zeros_like(points), pose, decay_mm=0.7, surface=cap
+    )
+    place = [(points[:, 1] - made.y0_mm) / 0.02, (points[:, 0] - made.x0_mm) / 0.02]
+    expected = map_coordinates(made.depth_mm, place, order=1)
+    # The drape is solved along z there, and along the membrane's normal here.
+    found = cap.height(points) - surface[:, 2]
+    assert np.abs(found - expected).max() < 0.03 * pose.depth_mm
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.01 * pose.depth_mm
+    moved = points + np.array([1e-4, 0.0])
+    ahead, _, _ = draped_ball(moved, np.zeros_like(points), pose, decay_mm=0.7, surface=cap)
+    slope = (ahead[:, 2] - surface[:, 2]) / 1e-4
+    smooth = np.abs(normals[:, 0] / -normals[:, 2] - slope) < 1e-3
+    assert smooth.mean() > 0.97
+
+
+def test_far_from_a_ball_a_curved_membrane_is_at_rest() -> None:
+    cap, points = Surface("spherical_cap", 2.0, 26.0), np.array([[9.0, -6.0], [-8.0, -8.0]])
+    pose, rays = BallPose((-2.0, 3.0), 3.0, 1.0), np.array([[-0.2, 0.1], [0.2, 0.2]])
+    seen, normals, on_ball = draped_ball(points, rays, pose, decay_mm=0.7, surface=cap)
+    np.testing.assert_allclose(seen, cap.points(points), atol=1e-9)
+    np.testing.assert_allclose(normals, cap.normals(points), atol=1e-9)
+    assert not on_ball.any()

@@ -1,0 +1,117 @@
+"""A sensor with a curved membrane, from its session to depths, by the virtual sensor."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from gelpolight_core._api import read_height_map, read_image, write_height_map
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.calibration.recipes import FULL, recipe_of
+from gelpolight_core.errors import InputError
+from gelpolight_core.finding import Verdict
+from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.session import read_session
+
+
+@pytest.fixture(scope="module")
+def curved_calibration(curved_session: Path) -> Calibration:
+    """Return its calibration; not to be changed."""
+    return calibrate(read_session(curved_session)).calibration
+
+
+def a_press(folder: Path) -> Path:
+    return sorted((folder / "presses").glob("cylinder*.png"))[0]
+
+
+@pytest.fixture(scope="module")
+def pressed(curved_session: Path, curved_calibration: Calibration) -> HeightMap:
+    path = a_press(curved_session)
+    return Reconstructor(curved_calibration).depth(read_image(path), name=path.name)
+
+
+def test_its_route_has_no_white_board_and_the_papers_model_is_refused(curved_session: Path) -> None:
+    session = read_session(curved_session)
+    assert not (curved_session / "whiteboard").exists()
+    assert recipe_of(session, "full") is FULL
+    assert "radiance" not in [stage.key for stage in FULL.of(session)]
+    with pytest.raises(InputError, match="curved"):
+        recipe_of(session, "paper")
+
+
+def test_its_height_is_confirmed_and_depths_are_the_truth(
+    curved_session: Path, curved_calibration: Calibration, pressed: HeightMap
+) -> None:
+    figures = {f.key: f for table in curved_calibration.quality.values() for f in table.figures}
+    assert figures["membrane_height_mm"].verdict is Verdict.PASS
+    assert figures["boundary_diameter_percent"].verdict is Verdict.PASS
+    truth = np.load(curved_session / "truth" / f"{a_press(curved_session).stem}.npz")
+    x, y = np.meshgrid(pressed.x_mm, pressed.y_mm)
+    place = [(y - truth["y0_mm"]) / truth["pitch_mm"], (x - truth["x0_mm"]) / truth["pitch_mm"]]
+    expected = map_coordinates(truth["depth_mm"], place, order=1, cval=0.0)
+    error = (pressed.depth_mm - expected)[np.hypot(x, y) < 11.0]
+    face = map_coordinates(truth["contact"].astype(float), place, order=1) > 0.99
+    # Nodes of 0.1 mm; a flat sensor of this size is off by up to 6 %.
+    assert np.median(pressed.depth_mm[face] / expected[face]) == pytest.approx(1.0, abs=0.04)
+    assert np.sqrt(np.mean(error**2)) < 0.015
+    # Where nothing is pressed, the surface is the cap.
+    corner = np.unravel_index(np.argmin(np.hypot(x + 6.0, y + 6.0)), x.shape)
+    cap = curved_calibration.open_sensor.surface
+    assert pressed.height_mm[corner] == pytest.approx(
+        float(cap.height(np.array([x[corner], y[corner]]))), abs=0.005
+    )
+    assert pressed.normals is not None
+    np.testing.assert_allclose(
+        pressed.normals[corner], cap.normals(np.array([x[corner], y[corner]])), atol=0.01
+    )
+
+
+def test_a_flat_face_is_measured_as_a_plane_in_space(
+    curved_session: Path, pressed: HeightMap
+) -> None:
+    found = measure_object(pressed, shape="cylinder")
+    with (curved_session / "presses" / "truth.csv").open() as file:
+        (stated,) = (row for row in csv.DictReader(file) if row["file"] == pressed.source)
+    assert found.diameter_mm == pytest.approx(float(stated["diameter_mm"]), rel=0.02)
+    assert found.height_mm == pytest.approx(float(stated["height_mm"]), rel=0.02)
+
+
+def test_files_keep_the_shape(
+    tmp_path: Path, curved_calibration: Calibration, pressed: HeightMap
+) -> None:
+    write_calibration(curved_calibration, tmp_path / "k.gplcal")
+    kept = read_calibration(tmp_path / "k.gplcal")
+    assert kept.open_sensor.surface == curved_calibration.open_sensor.surface
+    (path,) = write_height_map(pressed, tmp_path, formats=("npz",))
+    again = read_height_map(path)
+    assert again.at_rest == pressed.at_rest
+    np.testing.assert_array_equal(np.load(path)["height_mm"], pressed.height_mm)
+
+
+def test_a_cap_that_is_stated_flat_fails_with_its_height(
+    tmp_path: Path, curved_session: Path
+) -> None:
+    folder = tmp_path / "session"
+    shutil.copytree(curved_session, folder, ignore=shutil.ignore_patterns("truth", "presses"))
+    toml = folder / "session.toml"
+    text = toml.read_text()
+    toml.write_text(text.replace("apex_height_mm = 2.0", "apex_height_mm = 0.0"))
+    figures = calibrate(read_session(folder)).calibration.quality["joint"].figures
+    found = {figure.key: figure for figure in figures}["membrane_height_mm"]
+    assert found.verdict is Verdict.FAIL
+    assert found.value > 1.0
+    # As a flat sensor, it lacks the white board.
+    toml.write_text(re.sub(r"\[membrane\]\n(?:\w.*\n)*", "", text))
+    with pytest.raises(InputError, match="whiteboard") as refused:
+        calibrate(read_session(folder))
+    assert "[membrane]" in str(refused.value)

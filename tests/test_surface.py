@@ -1,0 +1,121 @@
+"""The shape of the undeformed membrane: against the equation of a sphere, and as it is stated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.description import write_description
+from gelpolight_core.session.session import read_session
+from gelpolight_core.surface import FLAT, Surface, height_field
+
+APEX_MM, WIDTH_MM = 2.0, 26.0
+RADIUS_MM = ((WIDTH_MM / 2.0) ** 2 + APEX_MM**2) / (2.0 * APEX_MM)
+AXIS = (0.3, -0.7)
+CAP = Surface("spherical_cap", APEX_MM, WIDTH_MM, AXIS)
+MIDDLE = np.array([*AXIS, APEX_MM - RADIUS_MM])
+
+inside = st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0))
+
+
+@given(inside)
+def test_a_cap_is_part_of_a_sphere_with_its_normals(place: tuple[float, float]) -> None:
+    point = CAP.points(np.array(place))
+    assert np.linalg.norm(point - MIDDLE) == pytest.approx(RADIUS_MM, abs=1e-9)
+    # Towards the camera, into the sphere.
+    inwards = (MIDDLE - point) / RADIUS_MM
+    np.testing.assert_allclose(CAP.normals(np.array(place)), inwards, atol=1e-7)
+
+
+def test_a_cap_ends_on_the_plane_of_its_boundary_and_a_mould_may_be_off() -> None:
+    rim = np.array([[13.0, 0.0], [0.0, -13.0]]) + AXIS
+    np.testing.assert_allclose(CAP.height(rim), 0.0, atol=1e-12)
+    higher = replace(CAP, rise_mm=0.05)
+    np.testing.assert_allclose(higher.height(rim), 0.0, atol=1e-12)
+    assert float(higher.height(np.array(AXIS))) == pytest.approx(APEX_MM + 0.05)
+    # To first order, a risen cap is a higher cap.
+    other, place = replace(CAP, apex_height_mm=APEX_MM + 0.05), np.array([5.0, 3.0])
+    assert float(higher.height(place)) == pytest.approx(float(other.height(place)), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"shape": "pyramid"},
+        {"apex_height_mm": 14.0},
+        {"diameter_mm": 0.0},
+        {"apex_height_mm": float("nan")},
+    ],
+)
+def test_a_shape_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match="membrane"):
+        replace(CAP, **wrong).check()
+
+
+def field_file(folder: Path, reach_mm: float) -> str:
+    axis = np.linspace(-reach_mm, reach_mm, 81)
+    points = np.stack(np.meshgrid(axis, axis), axis=-1)
+    height = replace(CAP, axis_mm=(0.0, 0.0)).height(points)
+    np.savez(folder / "membrane.npz", x_mm=axis, y_mm=axis, height_mm=height)
+    return "membrane.npz"
+
+
+def test_a_height_field_of_a_cap_is_the_cap(tmp_path: Path) -> None:
+    found = replace(height_field(tmp_path, field_file(tmp_path, 14.0), WIDTH_MM), axis_mm=AXIS)
+    places = np.random.default_rng(3).uniform(-8.0, 8.0, (50, 2))
+    np.testing.assert_allclose(found.height(places), CAP.height(places), atol=1e-5)
+    np.testing.assert_allclose(found.normals(places), CAP.normals(places), atol=1e-4)
+
+
+@pytest.mark.parametrize("content", [None, b"not an archive", 9.0])
+def test_a_height_field_that_cannot_be_used_is_refused(
+    tmp_path: Path, content: bytes | float | None
+) -> None:
+    if isinstance(content, bytes):
+        (tmp_path / "membrane.npz").write_bytes(content)
+    elif content is not None:
+        field_file(tmp_path, content)
+    with pytest.raises(InputError, match=r"membrane\.npz"):
+        height_field(tmp_path, "membrane.npz", WIDTH_MM)
+
+
+def described(folder: Path, membrane: str, small_session: Path) -> Path:
+    text = (small_session / "session.toml").read_text()
+    (folder / "session.toml").write_text(text + membrane)
+    return folder
+
+
+def test_a_session_keeps_the_membrane_that_it_states(tmp_path: Path, small_session: Path) -> None:
+    assert read_session(small_session).surface == FLAT
+    stated = '\n[membrane]\nshape = "spherical_cap"\napex_height_mm = 1.75\n'
+    session = read_session(described(tmp_path, stated, small_session))
+    assert session.surface == Surface("spherical_cap", 1.75, session.sensor.working_diameter_mm)
+    write_description(session)
+    assert read_session(tmp_path).surface == session.surface
+    by_file = f'\n[membrane]\nshape = "height_field"\nfile = "{field_file(tmp_path, 14.0)}"\n'
+    session = read_session(described(tmp_path, by_file, small_session))
+    write_description(session)
+    assert read_session(tmp_path).surface == session.surface
+
+
+@pytest.mark.parametrize(
+    ("membrane", "key"),
+    [
+        ('shape = "pyramid"', "shape"),
+        ('shape = "spherical_cap"\napex_height_mm = 40.0', "apex_height_mm"),
+        ('shape = "spherical_cap"\nheight = 1.0', "height"),
+        ("apex_height_mm = 1.0", "shape"),
+    ],
+)
+def test_a_wrong_entry_of_the_membrane_is_named(
+    tmp_path: Path, small_session: Path, membrane: str, key: str
+) -> None:
+    folder = described(tmp_path, f"\n[membrane]\n{membrane}\n", small_session)
+    with pytest.raises(InputError, match=rf"\[membrane\] {key}"):
+        read_session(folder)
