@@ -26,6 +26,7 @@ from gelpolight_core.session.session import (
     read_description,
 )
 from gelpolight_core.session.table import Table
+from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 
 USUAL_RADIUS_MM = 3.0
@@ -118,6 +119,18 @@ class SetupValues:
         26.0,
         tr("Working diameter"),
         tr("Diameter of the circle on the membrane in which the sensor measures"),
+    )
+    apex_height_mm: float = number(
+        0.0,
+        tr("Height of the membrane"),
+        0.0,
+        0.5 * SENSOR_RANGES["working_diameter_mm"][1],
+        MM,
+        3,
+        step=0.1,
+        none=tr("flat"),
+        tip=tr("Of a dome (spherical cap) on its axis, over the plane of its boundary"),
+        when=_opens,
     )
     lens_columns: int = _corners(9, tr("Lens views: inner corners"))
     lens_rows: int = _corners(6, tr("Lens views: inner corners vertically"), beside="x")
@@ -229,7 +242,8 @@ def values_of(session: Session) -> SetupValues:
         ball_mm=2.0 * (session.ball_default_radius_mm or USUAL_RADIUS_MM),
     )
     if stated is None:
-        return replace(known, **asdict(session.sensor))
+        apex_mm = session.surface.apex_height_mm
+        return replace(known, **asdict(session.sensor), apex_height_mm=apex_mm)
     pressed, (x, y) = stated.pressed_scale, stated.mm_per_px or (known.scale, known.scale)
     kinds = (p.key for p in PRESETS.values() if abs(x - p.mm_per_px) < 5e-6)
     sd, region = stated.mm_per_px_sd, stated.region_px
@@ -267,7 +281,7 @@ def session_of(session: Session, values: SetupValues) -> Session:
     values = replace(values, serial=values.serial.strip())
     if values.optics:
         data = {f.name: getattr(values, f.name) for f in fields(SensorData)}
-        return replace(session, sensor=SensorData(**data))
+        return replace(session, sensor=SensorData(**data), surface=_surface_of(session, values))
     stated = InPlace(region_px=_region(values.region))
     if values.scale_from == "stated":
         scale = values.scale, values.scale_y or values.scale
@@ -277,6 +291,15 @@ def session_of(session: Session, values: SetupValues) -> Session:
     else:
         stated = replace(stated, pressed_scale=PressedScale(punch_diameter_mm=values.punch))
     return replace(session, sensor=SensorData(values.serial), in_place=stated)
+
+
+def _surface_of(session: Session, values: SetupValues) -> Surface:
+    """Return the undeformed membrane; one from a file stays."""
+    if session.surface.file:
+        return session.surface
+    if values.apex_height_mm == 0.0:
+        return FLAT
+    return Surface("spherical_cap", values.apex_height_mm, values.working_diameter_mm)
 
 
 def _region(words: str) -> tuple[int, int, int, int] | None:

@@ -19,6 +19,7 @@ from gelpolight_core.measurement.map_processing import (
     masked,
     smooth_gaussian,
     smooth_median,
+    surface_itself,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
@@ -41,10 +42,12 @@ LEVELS = {
     "plane": tr("plane"),
     "rectangle": tr("plane of the rectangle"),
     "points": tr("three points"),
+    "surface": tr("none, the curved surface itself"),
 }
 ABOUT_LEVEL = tr(
     "Subtract a plane: of the untouched surface (pressed objects are left out), of the rectangle "
-    "on the map, or through three points on the map"
+    "on the map, or through three points on the map. Of a curved membrane, the surface itself can "
+    "be shown and measured, in place of its indentation"
 )
 FILTERS = {"none": tr("none"), "gaussian": tr("Gaussian"), "median": tr("median")}
 ABOUT_FILTER = tr("Smooth the height map. The uncertainty of a smoothed map is not known")
@@ -186,6 +189,8 @@ def _levelled(heightmap: HeightMap, processing: Processing) -> HeightMap:
             return level_by_plane(heightmap, mask=_inside(heightmap, processing.rectangle))
         case "points":
             return level_by_points(heightmap, processing.points_mm)
+        case "surface":
+            return surface_itself(heightmap)
     return heightmap
 
 

@@ -135,22 +135,22 @@ def round_values(low: float, high: float, most: int) -> Array:
     return np.asarray(step * np.arange(first, last + 1))
 
 
-def draw_axes(plotter: Plotter, box: Box, style: Style, ink: Ink) -> None:
-    """Draw axes with true values: the sensor's y, and depth without exaggeration.
+def draw_axes(plotter: Plotter, box: Box, style: Style, ink: Ink, depth_title: str) -> None:
+    """Draw axes with true values: the sensor's y, and depth, with its title, not exaggerated.
 
     Labels are upright, and one that would cover another one is left out.
     """
     _remove(plotter, "axes", "axes-labels")
     if not style.axes:
         return
-    ends, points, texts = axes_marks(box, style.exaggeration)
+    ends, points, texts = axes_marks(box, style.exaggeration, depth_title)
     lines = pv.line_segments_from_points(ends)
     plotter.add_mesh(lines, name="axes", color=ink.text, line_width=1, **PLAIN)
     centred = {"justification_horizontal": "center", "justification_vertical": "center"}
     _label(plotter, "axes-labels", points, texts, ink.font + 1, ink, bold=False, **centred)
 
 
-def axes_marks(box: Box, exaggeration: float) -> tuple[Array, Array, list[str]]:
+def axes_marks(box: Box, exaggeration: float, depth_title: str) -> tuple[Array, Array, list[str]]:
     """Return the lines of the axes with their ticks, and the places and texts of the labels."""
     left, right, near, far, low, high = box
     x, y = round_values(left, right, 6), round_values(near, far, 6)
@@ -161,7 +161,7 @@ def axes_marks(box: Box, exaggeration: float) -> tuple[Array, Array, list[str]]:
     axes = (
         ((left, near, 0.0), (right, near, 0.0), (0.0, -tick, 0.0), x, x, tr("x (mm)")),
         ((left, near, 0.0), (left, far, 0.0), (-tick, 0.0, 0.0), y, -y, tr("y (mm)")),
-        ((right, near, low), (right, near, high), (tick, 0.0, 0.0), z, depth, tr("depth (mm)")),
+        ((right, near, low), (right, near, high), (tick, 0.0, 0.0), z, depth, depth_title),
     )
     ends, points, texts = list[Array](), list[Array](), list[str]()
     for number, (first, last, out, places, values, title) in enumerate(axes):

@@ -122,11 +122,11 @@ class Scene:
         scale = surface.scale.in_unit()
         colours = (scale.title, scale.low, scale.high, scale.names, scale.table.tobytes())
         # By the extent, not the nodes: those of a live and a frozen frame differ.
-        shown = (surface.extent_mm, surface.range_mm, colours, style, self._ink)
+        shown = (surface.extent_mm, surface.range_mm, surface.axis, colours, style, self._ink)
         if shown == self._explained:
             return
         self._explained, self.box = shown, box_of(surface, style.exaggeration)
-        draw_axes(self._plotter, self.box, style, self._ink)
+        draw_axes(self._plotter, self.box, style, self._ink, surface.axis)
         draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
         draw_note(self._plotter, style, self._ink)
         draw_scale_bar(self._plotter, self.box, style, self._ink)

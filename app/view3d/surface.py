@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.translation import tr
 
 # A software renderer is fast enough for this many nodes per side. The texture carries the detail.
 LIVE_NODES = 128
@@ -70,6 +71,8 @@ class Surface:
         Meaning of the colours.
     range_mm : (low, high)
         Depths at the ends of the depth axis. Steady from frame to frame.
+    axis : str
+        Title of the depth axis.
     light : (x, y, z) or None
         Unit vector to the lamp, x right, y down, z out of the surface. None: the texture is
         already shaded.
@@ -82,6 +85,7 @@ class Surface:
     texture: NDArray[np.uint8]
     scale: ColourScale
     range_mm: tuple[float, float]
+    axis: str = tr("depth (mm)")
     light: tuple[float, float, float] | None = None
 
     def thinned(self, largest: int) -> Surface:
@@ -189,9 +193,14 @@ def surface_of(
     )
     pitch, left, top = heightmap.pitch_mm, float(heightmap.x_mm[0]), float(heightmap.y_mm[0])
     half = 0.5 * pitch
+    x_mm, y_mm = left + pitch * column, top + pitch * row
+    if not heightmap.at_rest.flat:
+        # The surface itself: its relief stands on the curved membrane.
+        rest_mm = heightmap.at_rest.height(np.stack([x_mm, y_mm], axis=-1))
+        sampled, range_mm = sampled - rest_mm, (range_mm[0] - float(rest_mm.max()), range_mm[1])
     return Surface(
-        x_mm=(left + pitch * column).astype(np.float32),
-        y_mm=(top + pitch * rows).astype(np.float32),
+        x_mm=x_mm.astype(np.float32),
+        y_mm=y_mm[:, 0].astype(np.float32),
         depth_mm=np.asarray(sampled, np.float32),
         extent_mm=(
             left - half,
@@ -202,5 +211,6 @@ def surface_of(
         texture=texture,
         scale=scale,
         range_mm=range_mm,
+        axis=tr("depth (mm)") if heightmap.at_rest.flat else tr("depth from the boundary (mm)"),
         light=light,
     )

@@ -273,7 +273,6 @@ def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
     """Judge the height of a curved membrane against the stated one; empty for a flat one."""
     if surface.flat:
         return ()
-    tolerance_mm = float(SHAPE_SD_MM[0])
     return (
         judge(
             "membrane_height_mm",
@@ -282,8 +281,8 @@ def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
             ),
             abs(surface.rise_mm),
             "mm",
-            warn=2.0 * tolerance_mm,
-            fail=SURE_SDS * tolerance_mm,
+            warn=2.0 * float(SHAPE_SD_MM[0]),
+            fail=SURE_SDS * float(SHAPE_SD_MM[0]),
             remedy=tr("The membrane has another shape: correct [membrane] in session.toml"),
         ),
     )

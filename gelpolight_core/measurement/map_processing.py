@@ -16,6 +16,7 @@ from gelpolight_core.finding import Finding
 from gelpolight_core.measurement.measured import depth_at
 from gelpolight_core.measurement.roughness import above_plane
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.surface import FLAT
 from gelpolight_core.translation import tr
 
 Mask = NDArray[np.bool_]
@@ -132,6 +133,20 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     level = _without(heightmap, plane, tr("Levelled by three points."))
     # The errors of the three depths tilt the whole map; they are not propagated.
     return _without_errors(level)
+
+
+def surface_itself(heightmap: HeightMap) -> HeightMap:
+    """Return the surface of a curved membrane as a depth below the plane of its boundary.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        With depths from the undeformed membrane; a flat one stays as it is.
+    """
+    if heightmap.at_rest.flat:
+        return heightmap
+    note = tr("The surface itself: depths from the plane of the membrane's boundary.")
+    return _processed(heightmap, note, depth_mm=-heightmap.height_mm, at_rest=FLAT)
 
 
 def smooth_gaussian(heightmap: HeightMap, *, sigma_mm: float) -> HeightMap:

@@ -17,9 +17,11 @@ from gelpolight_core.measurement.map_processing import (
     masked,
     smooth_gaussian,
     smooth_median,
+    surface_itself,
     usable,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.surface import Surface
 
 
 def tilted_press() -> HeightMap:
@@ -113,3 +115,22 @@ def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none() 
     np.testing.assert_allclose(left.depth_sd_mm, 0.005, rtol=1e-5)
     assert difference(one, press).depth_sd_mm is None
     assert level_by_points(one, ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0))).depth_sd_mm is None
+
+
+def test_a_flat_face_in_a_curved_membrane_is_a_plane_of_the_surface_itself() -> None:
+    cap = Surface("spherical_cap", 2.0, 26.0, (0.3, -0.4))
+    face_mm = 1.2
+
+    def depth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.maximum(cap.height(np.stack([x, y], axis=-1)) - face_mm, 0.0)
+
+    pressed = made(depth, at_rest=cap)
+    x, y = np.meshgrid(pressed.x_mm, pressed.y_mm)
+    face = np.hypot(x - 0.3, y + 0.4) < 4.0
+    assert np.ptp(pressed.depth_mm[face]) > 0.1
+    surface = surface_itself(pressed)
+    np.testing.assert_allclose(surface.depth_mm[face], -face_mm, atol=1e-6)
+    assert surface.at_rest.flat
+    assert surface.findings[-1].key == "processed"
+    flat = tilted_press()
+    assert surface_itself(flat) is flat

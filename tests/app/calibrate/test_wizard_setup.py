@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from technician import Technician
 
+from app.calibrate.setup_values import new_session, session_of, values_of
 from gelpolight_core.calibration.project import Project
+from gelpolight_core.calibration.recipes import recipe_of
 from gelpolight_core.session.session import read_session
+from gelpolight_core.surface import FLAT, Surface
 
 Made = Callable[[], Project]
 
@@ -59,3 +63,15 @@ def test_data_typed_for_a_new_sensor_stays_after_restart(
     page.begin()
     technician.click("question.open")
     assert page.form.serial.text() == "B-002"
+
+
+def test_the_height_of_a_dome_is_asked_and_0_is_a_flat_membrane() -> None:
+    values = replace(values_of(new_session()), working_diameter_mm=24.0)
+    assert values.apex_height_mm == 0.0
+    flat = session_of(new_session(), values)
+    assert flat.surface == FLAT
+    dome = session_of(flat, replace(values, apex_height_mm=1.5))
+    assert dome.surface == Surface("spherical_cap", 1.5, 24.0)
+    assert values_of(dome).apex_height_mm == 1.5
+    keys = [stage.key for stage in recipe_of(flat).of(flat)]
+    assert [stage.key for stage in recipe_of(dome).of(dome)] == [k for k in keys if k != "radiance"]

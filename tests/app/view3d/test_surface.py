@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.view3d.surface import ColourScale, surface_of
 from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.surface import Surface
 from tests.app.view3d.conftest import BUMP, SMALL, Made
 
 
@@ -29,3 +32,16 @@ def test_an_empty_working_area_has_no_surface(heightmap: HeightMap) -> None:
     scale = ColourScale("depth [mm]", np.zeros((256, 3), np.uint8), 0.0, 1.0)
     texture = np.zeros((8, 8, 3), np.uint8)
     assert surface_of(heightmap, texture, scale, range_mm=(0.0, 1.0)) is None
+
+
+def test_a_curved_membrane_is_shown_itself(heightmap: HeightMap) -> None:
+    cap = Surface("spherical_cap", 2.0, 18.0, (0.5, -0.25))
+    scale = ColourScale("depth [mm]", np.zeros((256, 3), np.uint8), 0.0, 1.0)
+    texture = np.zeros((8, 8, 3), np.uint8)
+    found = surface_of(replace(heightmap, at_rest=cap), texture, scale, range_mm=(0.0, 1.0))
+    assert found is not None
+    places = np.array([BUMP[:2], SMALL[:2], (0.0, 5.0)])
+    expected = np.array([BUMP[2], SMALL[2], 0.0]) - cap.height(places)
+    assert found.depth_at(places[:, 0], places[:, 1]) == pytest.approx(expected, abs=0.02)
+    assert found.range_mm[0] == pytest.approx(-2.0, abs=0.01)
+    assert found.range_mm[0] <= found.depth_mm.min()

@@ -126,7 +126,7 @@ def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(
     panel.set_style(Style(exaggeration=5.0))
     box = panel.view.scene.box  # type: ignore[union-attr]
     assert box[5] == pytest.approx(5.0)
-    _, points, texts = axes_marks(box, 5.0)
+    _, points, texts = axes_marks(box, 5.0, "depth (mm)")
     titles = [texts.index(f"{name} (mm)") for name in ("x", "y", "depth")]
     x, y, depth = (
         [(float(texts[n]), points[n, axis]) for n in range(first + 1, last)]
