@@ -222,5 +222,6 @@ def ball_handle(found: Indentation, table: ResamplingTable) -> Circle | None:
 
 def table_of(results: Results) -> ResamplingTable | None:
     """Return the table from image to membrane; None if the top surface is not known."""
-    found = results.get(BACKGROUND) or results.get(TOP_POSE)
-    return None if found is None else found.table
+    top = results.get(TOP_POSE)
+    # The background places the axis of a curved membrane.
+    return None if top is None else (results.get(BACKGROUND) or top).table

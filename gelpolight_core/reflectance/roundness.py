@@ -37,14 +37,15 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
     tuple of Finding
         Empty with too few presses.
     """
-    middle = table.grid.to_index(np.zeros(2))
-    away = np.array([press.indentation.contour.mean(axis=0) - middle for press in presses])
+    grid = table.grid
+    seen = np.array([press.indentation.contour.mean(axis=0) for press in presses]).reshape(-1, 2)
+    away = seen - grid.to_index(np.zeros(2))
     if len(presses) < LEAST_PRESSES or not away.any():
         return ()
     share = (away**2).sum(axis=1)
     # A contact on a slope is seen from above, shorter along it.
     out = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-    slopes = table.surface.slopes(np.array([press.pose.centre_mm for press in presses]))
+    slopes = table.surface.slopes(grid.pitch_mm * seen + [grid.x_mm[0], grid.y_mm[0]])
     along, across = (slopes * out).sum(axis=1), slopes[:, 0] * out[:, 1] - slopes[:, 1] * out[:, 0]
     share /= share.max()
     stretch = np.array(
