@@ -37,7 +37,7 @@ MOST = {
     "app/workspace": 537,
     "gelpolight_core/.": 1936,
     "gelpolight_core/batch": 622,
-    "gelpolight_core/calibration": 4109,
+    "gelpolight_core/calibration": 4110,
     "gelpolight_core/design": 315,
     "gelpolight_core/design_check": 316,
     "gelpolight_core/export": 716,

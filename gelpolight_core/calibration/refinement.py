@@ -273,12 +273,13 @@ def _judge_shape(surface: Surface) -> tuple[Finding, ...]:
     """Judge the height of a curved membrane against the stated one; empty for a flat one."""
     if surface.flat:
         return ()
+    text = tr("Height of the membrane against the stated one ({height:.2f} mm fits)")
+    if surface.apex_height_mm == 0.0:
+        text = tr("The membrane is not flat, as it is stated ({height:.2f} mm high fits)")
     return (
         judge(
             "membrane_height_mm",
-            tr("Height of the membrane against the stated one ({height:.2f} mm fits)").format(
-                height=surface.apex_height_mm + surface.rise_mm
-            ),
+            text.format(height=surface.apex_height_mm + surface.rise_mm),
             abs(surface.rise_mm),
             "mm",
             warn=2.0 * float(SHAPE_SD_MM[0]),
