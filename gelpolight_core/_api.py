@@ -245,8 +245,8 @@ def write_height_map(
         ``npz`` holds depth, flags, normals and standard deviations; ``tif``, ``gsf``, ``gwy``,
         ``png`` and ``csv`` the depth; ``x3p`` and ``sdf`` the surface; ``xyz`` and ``pcd`` points;
         ``vtp``, ``ply``, ``stl`` and ``glb`` a mesh. Surface, points and meshes are in the
-        sensor frame, z = -depth, in mm (``x3p``, ``sdf``, ``pcd`` and ``glb``: in metres), without
-        the nodes outside the working area.
+        sensor frame (z = -depth on a flat membrane), in mm (``x3p``, ``sdf``, ``pcd`` and
+        ``glb``: in metres), without the nodes outside the working area.
     stride : int, optional
         Meshes use every `stride`-th row and column.
 

@@ -18,10 +18,13 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
+HEIGHT_FIELD = "height_field"
 FIELD_KEYS, FIELD_NODES = ("x_mm", "y_mm", "height_mm"), 65
 """Arrays of a file with a height field, and nodes to a side of one in a calibration."""
 STEP_MM = 1e-3
 """Between the heights whose difference is a slope."""
+STEPS, MET_MM = 60, 1e-10
+"""Most steps to a place on the membrane, and the move at which they end."""
 STEEPEST = 0.99
 """Share of a sphere's radius up to which it is a height over the plane."""
 
@@ -96,11 +99,45 @@ class Surface:
         """Return the places (..., 3) of the membrane over points (..., 2)."""
         return np.concatenate([points_mm, self.height(points_mm)[..., None]], axis=-1)
 
+    def met_by(self, foot_mm: Array, ray_slope: Array) -> Array:
+        """Return where rays meet it, (..., 2).
+
+        Parameters
+        ----------
+        foot_mm : (..., 2)
+            Where they meet the plane of the boundary.
+        ray_slope : (..., 2)
+            How much they move sideways per mm towards the camera.
+        """
+        if self.flat:
+            return foot_mm
+        # Each step shrinks the error by the product of the two slopes.
+        return _settled(lambda p: foot_mm - self.height(p)[..., None] * ray_slope, foot_mm)
+
+    def nearest(self, point_mm: Array) -> Array:
+        """Return the place (2,) where it is nearest to a point (3,)."""
+
+        def along_the_tangent_plane(place: Array) -> Array:
+            away, normal = point_mm - self.points(place), self.normals(place)
+            return np.asarray(place + (away - (away @ normal) * normal)[:2])
+
+        # Each step shrinks the error by the distance times the curvature.
+        return _settled(along_the_tangent_plane, point_mm[:2])
+
     def normals(self, points_mm: Array) -> Array:
         """Return the unit normals (..., 3) towards the camera at points (..., 2)."""
         slopes = self.slopes(points_mm)
         normals = np.concatenate([slopes, -np.ones_like(slopes[..., :1])], axis=-1)
         return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True))
+
+
+def _settled(step: Callable[[Array], Array], points_mm: Array) -> Array:
+    """Repeat a step from points (..., 2) until they stay where they are."""
+    for _ in range(STEPS):
+        before, points_mm = points_mm, step(points_mm)
+        if not np.any(np.abs(points_mm - before) > MET_MM):
+            break
+    return points_mm
 
 
 def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
@@ -139,7 +176,7 @@ def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
     even = np.linspace(-rim, rim, FIELD_NODES)
     rows = tuple(tuple(row) for row in field(even, even).tolist())
     apex_mm = float(field(0.0, 0.0)[0, 0])
-    return Surface("height_field", apex_mm, diameter_mm, heights_mm=rows, file=name)
+    return Surface(HEIGHT_FIELD, apex_mm, diameter_mm, heights_mm=rows, file=name)
 
 
 def _plane(_surface: Surface, x: Array, _y: Array) -> Array:
@@ -166,7 +203,7 @@ def _height_field(surface: Surface, x: Array, y: Array) -> Array:
 SHAPES: dict[str, Callable[[Surface, Array, Array], Array]] = {
     "plane": _plane,
     "spherical_cap": _spherical_cap,
-    "height_field": _height_field,
+    HEIGHT_FIELD: _height_field,
 }
 """The height in mm of each shape at x and y from its axis."""
 FLAT = Surface()

@@ -33,6 +33,21 @@ def test_a_cap_is_part_of_a_sphere_with_its_normals(place: tuple[float, float]) 
     np.testing.assert_allclose(CAP.normals(np.array(place)), inwards, atol=1e-7)
 
 
+@given(inside, st.floats(-2.0, 4.0))
+def test_rays_and_normals_meet_even_a_high_dome(place: tuple[float, float], above: float) -> None:
+    dome = Surface("spherical_cap", 5.0, WIDTH_MM, AXIS)
+    foot, rays = np.array([place]), -np.array([place]) / 38.0
+    met = dome.points(dome.met_by(foot, rays))[0]
+    np.testing.assert_allclose(met[:2], foot[0] - met[2] * rays[0], atol=1e-8)
+    # The nearest point of a sphere is on the line from its middle.
+    radius = ((WIDTH_MM / 2.0) ** 2 + 25.0) / 10.0
+    middle = np.array([*AXIS, 5.0 - radius])
+    point = dome.points(np.array(place))
+    out = (point - middle) / radius
+    found = dome.nearest(point + above * out)
+    np.testing.assert_allclose(found, place, atol=1e-5)
+
+
 def test_a_cap_ends_on_the_plane_of_its_boundary_and_a_mould_may_be_off() -> None:
     rim = np.array([[13.0, 0.0], [0.0, -13.0]]) + AXIS
     np.testing.assert_allclose(CAP.height(rim), 0.0, atol=1e-12)
@@ -111,6 +126,9 @@ def test_a_session_keeps_the_membrane_that_it_states(tmp_path: Path, small_sessi
         ('shape = "spherical_cap"\napex_height_mm = 40.0', "apex_height_mm"),
         ('shape = "spherical_cap"\nheight = 1.0', "height"),
         ("apex_height_mm = 1.0", "shape"),
+        ('shape = "spherical_cap"', "apex_height_mm"),
+        ('shape = "height_field"', "file"),
+        ('shape = "height_field"\nfile = "../membrane.npz"', "file"),
     ],
 )
 def test_a_wrong_entry_of_the_membrane_is_named(

@@ -34,7 +34,7 @@ from app.sources.bench import Scene
 from app.widgets.inputs import DoubleSpinBox
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
-from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS, TOP_POSE
+from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipe import Results, Stage
 from gelpolight_core.finding import Finding, Verdict, refused, worst_of
@@ -340,15 +340,12 @@ class BallsStep(ImageStep):
 
 def setting_of(results: Results) -> BallSetting | None:
     """Return the results that the detection of a ball needs; None if one is missing."""
-    lens, top, lights = results.get(LENS), results.get(TOP_POSE), results.get(LIGHTS)
-    bare = results.get(BACKGROUND)
-    if lens is None or top is None or lights is None or bare is None:
-        return None
-    if bare.light.shape[:2] != top.table.grid.shape:  # of an earlier top surface
+    lens, lights, bare = results.get(LENS), results.get(LIGHTS), results.get(BACKGROUND)
+    if lens is None or lights is None or bare is None:
         return None
     crosstalk, camera = lights.crosstalk.matrix, lens.camera
     return BallSetting(
-        top.table,
+        bare.table,
         lights.leds.led_positions_mm,
         crosstalk,
         unmix(bare.light, crosstalk),

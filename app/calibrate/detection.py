@@ -222,6 +222,7 @@ def ball_handle(found: Indentation, table: ResamplingTable) -> Circle | None:
 
 def table_of(results: Results) -> ResamplingTable | None:
     """Return the table from image to membrane; None if the top surface is not known."""
-    top = results.get(TOP_POSE)
-    # The background places the axis of a curved membrane.
-    return None if top is None else (results.get(BACKGROUND) or top).table
+    top, bare = results.get(TOP_POSE), results.get(BACKGROUND)
+    if top is None or bare is None or top.table.surface.flat:
+        return None if top is None else top.table
+    return bare.table  # the background shows the axis of a curved membrane

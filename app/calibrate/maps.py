@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from app.calibrate.detection import read_raw
+from app.calibrate.detection import read_raw, table_of
 from app.view2d import shading
 from app.view2d.display import SURROUND, Display, colour_table
 from app.view2d.map_view import Extent, MapView, extent_of
@@ -23,7 +23,6 @@ from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.widgets.units import per_mm, unit_word
 from gelpolight_core.calibration.ball_stage import BALLS
-from gelpolight_core.calibration.open_sensor import TOP_POSE
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -278,10 +277,10 @@ def most_oblique_press(project: Project) -> tuple[Panel, ...]:
     InputError
         If its image cannot be read.
     """
-    balls, top = project.results.get(BALLS), project.results.get(TOP_POSE)
-    if balls is None or top is None or not balls.presses:
+    balls, table = project.results.get(BALLS), table_of(project.results)
+    if balls is None or table is None or not balls.presses:
         return ()
     found = {ball.file: ball.press for ball in balls.seen if ball.press is not None}
     name = max(found, key=lambda n: sum(c * c for c in found[n].pose.centre_mm))
     raw = read_raw(project.session.folder / BALLS.folder / name)
-    return refraction_panels(raw, found[name], top.table)
+    return refraction_panels(raw, found[name], table)

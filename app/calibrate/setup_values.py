@@ -294,12 +294,12 @@ def session_of(session: Session, values: SetupValues) -> Session:
 
 
 def _surface_of(session: Session, values: SetupValues) -> Surface:
-    """Return the undeformed membrane; one from a file stays."""
-    if session.surface.file:
-        return session.surface
-    if values.apex_height_mm == 0.0:
-        return FLAT
-    return Surface("spherical_cap", values.apex_height_mm, values.working_diameter_mm)
+    """Return the undeformed membrane: of the shape that the session has, else a spherical cap."""
+    before, apex_mm, width_mm = session.surface, values.apex_height_mm, values.working_diameter_mm
+    if before.file or apex_mm == 0.0:
+        return before if before.file else FLAT
+    shape = "spherical_cap" if before.flat else before.shape
+    return Surface(shape, apex_mm, width_mm)
 
 
 def _region(words: str) -> tuple[int, int, int, int] | None:

@@ -85,7 +85,7 @@ class Surface:
     texture: NDArray[np.uint8]
     scale: ColourScale
     range_mm: tuple[float, float]
-    axis: str = tr("depth (mm)")
+    axis: str
     light: tuple[float, float, float] | None = None
 
     def thinned(self, largest: int) -> Surface:
@@ -195,7 +195,7 @@ def surface_of(
     half = 0.5 * pitch
     x_mm, y_mm = left + pitch * column, top + pitch * row
     if not heightmap.at_rest.flat:
-        # The surface itself: its relief stands on the curved membrane.
+        # The surface itself is drawn, not its indentation.
         rest_mm = heightmap.at_rest.height(np.stack([x_mm, y_mm], axis=-1))
         sampled, range_mm = sampled - rest_mm, (range_mm[0] - float(rest_mm.max()), range_mm[1])
     return Surface(

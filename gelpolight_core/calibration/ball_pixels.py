@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED
-from gelpolight_core.optics.refraction import LIFTS
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average, middles
 from gelpolight_core.reflectance.gathered_light import ratio_reflected
@@ -114,10 +113,8 @@ class BallPixels:
 
     def on(self, surface: Surface) -> BallPixels:
         """Return the same rays with another membrane at rest."""
-        at, above = self.points_mm, self.surface.height(self.points_mm)
-        for _ in range(LIFTS):
-            lift = above - surface.height(at)
-            at = self.points_mm + lift[:, None] * self.ray_slope
+        height_mm = self.surface.height(self.points_mm)[:, None]
+        at = surface.met_by(self.points_mm + height_mm * self.ray_slope, self.ray_slope)
         return replace(self, points_mm=at, surface=surface)
 
 

@@ -79,16 +79,15 @@ def ball_height_error(
     assert calibration.full is not None
     solver = NearLightSolver(calibration, workers=usable_cores())
     points, errors = calibration.table.grid.points_mm(), []
-    height_mm = calibration.surface.height(points)
     for rgb, ball in zip(images, balls, strict=True):
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
         depth = solver.depth(rgb, Wanted(normals=False)).depth_mm
         away = np.linalg.norm(points - ball.centre_mm, axis=-1)
         top = (away < TOP_MM) & (solver.maps.kind == 2)
         if top.any():
-            lowest_mm = calibration.surface.height(np.array(ball.centre_mm)) - ball.depth_mm
-            sagitta_mm = ball.radius_mm - np.sqrt(ball.radius_mm**2 - away[top] ** 2)
-            true = height_mm[top] - lowest_mm - sagitta_mm
+            middle_mm = ball.middle_mm(calibration.surface)[2]
+            lower_mm = middle_mm - np.sqrt(ball.radius_mm**2 - away[top] ** 2)
+            true = calibration.surface.height(points[top]) - lower_mm
             errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else 0.0
 

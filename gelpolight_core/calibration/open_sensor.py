@@ -380,7 +380,8 @@ def _run_background(work: Work) -> Background:
     _refuse_unlit(image)
     # As encoded by the camera, like the live hint.
     raw, board = replace(work.session, response=None), RADIANCE.folder
-    whiteboard = raw.averaged(board).rgb if raw.found(board) else None
+    has_board = RADIANCE.used(work.session)
+    whiteboard = raw.averaged(board).rgb if has_board and raw.found(board) else None
     encoded = raw.averaged(BACKGROUND.folder).rgb
     seen = check_bare_membrane(encoded, table=table, whiteboard=whiteboard)
     bad = no_bad_pixels(*image.rgb.shape[:2])
@@ -389,14 +390,12 @@ def _run_background(work: Work) -> Background:
         bad = find_bad_pixels([image.rgb, lit], noise=0.0)
     figures = (*seen.quality.figures, _judge_bad_pixels(bad))
     whole = bad.left_out(image.rgb)
-    radiance = work.results.get(RADIANCE)
-    if radiance is None:
-        table, found = _table_about_axis(work, whole)
-        figures = (*figures, *found.figures)
+    if has_board:
+        return Background(table.apply(whole), bad, QualityTable(figures), table, work[RADIANCE])
+    table, found = _table_about_axis(work, whole)
     light = table.apply(whole)
-    if radiance is None:
-        radiance = radiance_by_positions(light, table, work[LIGHTS].leds.led_positions_mm)
-    return Background(light, bad, QualityTable(figures), table, radiance)
+    radiance = radiance_by_positions(light, table, work[LIGHTS].leds.led_positions_mm)
+    return Background(light, bad, QualityTable((*figures, *found.figures)), table, radiance)
 
 
 def _table_about_axis(

@@ -294,8 +294,17 @@ class Recipe:
 
     def fits(self, session: Session) -> bool:
         """Return whether the recipe is for the kind of sensor of a session."""
-        closed = session.in_place is not None
-        return self.closed == closed and (session.surface.flat or not self.flat)
+        return not self.misfit(session)
+
+    def misfit(self, session: Session) -> str:
+        """Return why the recipe is not for the sensor of a session; empty if it is."""
+        if self.closed and session.in_place is None:
+            return tr("The session has no table [in_place]")
+        if not self.closed and session.in_place is not None:
+            return tr("The session is of a closed sensor")
+        if self.flat and not session.surface.flat:
+            return tr("The membrane of the session is curved")
+        return ""
 
     def of(self, session: Session) -> tuple[Stage[Any], ...]:
         """Return the stages that a session has."""

@@ -154,19 +154,12 @@ def recipe_of(session: Session, model: str | None = None) -> Recipe:
         If the model does not fit the session.
     """
     for recipe in RECIPES:
-        if recipe.fits(session) and model in (None, recipe.key):
+        why = recipe.misfit(session)
+        if model == recipe.key and why:
+            raise InputError(why, f"--model {model}", Remedy.REMOVE_OPTION)
+        if model in (None, recipe.key) and not why:
             return recipe
-    if not session.surface.flat:
-        found = tr("The membrane of the session is curved")
-    elif session.in_place is None:
-        found = tr("The session has no table [in_place]")
-    else:
-        found = tr("The session is of a closed sensor")
-    raise InputError(
-        found,
-        f"--model {model}",
-        Remedy.REMOVE_OPTION,
-    )
+    raise ValueError(f"model = {model!r}")
 
 
 def recipe_named(model: str) -> Recipe:

@@ -144,7 +144,8 @@ def refine(session: Session, results: Results) -> Joint:
         bare = table.apply(untouched.bad.left_out(session.averaged(BACKGROUND.folder).rgb))
         full = replace(full, background=unmix(bare, crosstalk))
     lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
-    stated = judge_stated(joint.stated, session.sensor, stack)
+    field_mm = float(np.ptp(view.points_mm[:, 0]))
+    stated = judge_stated(joint.stated, session.sensor, stack, field_mm)
     found = Joint(joint, replace(full, background=lit), known, stated)
     scale_sd, determined = _uncertainty(session, results, found)
     full = replace(found.full, scale_sd=scale_sd)
@@ -317,7 +318,7 @@ def judge_presses(joint: JointResult) -> tuple[Finding, ...]:
 
 
 def judge_stated(
-    stated: Sequence[Stated], sensor: SensorData, stack: LayerStack
+    stated: Sequence[Stated], sensor: SensorData, stack: LayerStack, field_mm: float
 ) -> tuple[Finding, ...]:
     """Judge what is stated of a sensor by its ball presses; without a result, there is no finding.
 
@@ -327,6 +328,8 @@ def judge_stated(
         What contradicts the presses, the most likely first.
     sensor, stack
         As stated, and the layers that follow from it.
+    field_mm : float
+        Width of the visible field.
     """
     if not stated:
         return ()
@@ -354,7 +357,7 @@ def judge_stated(
             gel=(1.0 - one.value) * apparent_mm * gel,
             window=(1.0 - one.value) * apparent_mm * window,
             light=2.0 ** (1.0 - one.value),
-            cap=(one.value - 1.0) * RISE_SHARE * sensor.working_diameter_mm,
+            cap=(one.value - 1.0) * RISE_SHARE * sensor.working_diameter_mm**2 / field_mm,
         )
         for one in stated
         # As likely as the first.

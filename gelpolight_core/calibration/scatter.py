@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
-from gelpolight_core.calibration.open_sensor import LIGHTS, RADIANCE
+from gelpolight_core.calibration.open_sensor import BACKGROUND, LIGHTS
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.reflectance.stage import ball_scatter
 from gelpolight_core.session.images import read_image
@@ -52,7 +52,7 @@ def gather_scatter(run: Run) -> ReflectanceScatter:
     InputError
         If a ball image can no longer be read.
     """
-    made, radiance = run.results[REFLECTANCE], run.results[RADIANCE]
+    made, radiance = run.results[REFLECTANCE], run.results[BACKGROUND].radiance
     table, presses, factors = run.calibration.table, made.table.presses, made.factors.factors
     leds = run.results[LIGHTS].leds.led_positions_mm
     found = []

@@ -356,13 +356,13 @@ def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
 
 
 def write_xyz(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write x, y and height of every point in mm, one point a line. The height is minus the depth.
+    """Write x, y and height of every point of the surface in mm, one point a line.
 
     Places without depth are left out.
     """
     there = has_depth(heightmap)
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
-    points = np.column_stack([x[there], y[there], -heightmap.depth_mm[there]])
+    points = np.column_stack([x[there], y[there], heightmap.height_mm[there]])
     np.savetxt(file, points, fmt="%.6g")
 
 

@@ -86,7 +86,7 @@ def write_gwy(heightmap: HeightMap, file: BinaryIO) -> None:
     names = ("xreal", "yreal", "xoff", "yoff")
     extent = dict(zip(names, extent_m(heightmap), strict=True))
     extent["si_unit_xy"] = GwySIUnit(unitstr="m")
-    depth_m = np.where(known, -_heights_m(heightmap), 0.0)
+    depth_m = np.where(known, 1e-3 * heightmap.depth_mm.astype(np.float64), 0.0)
     channel = GwyContainer(
         {
             "/0/data": GwyDataField(depth_m, **extent, si_unit_z=GwySIUnit(unitstr="m")),

@@ -12,7 +12,7 @@ from scipy import ndimage
 from scipy.fft import irfft2, next_fast_len, rfft2
 
 from gelpolight_core.least_squares import fit_least_squares, forward_differences
-from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel, model_on
+from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
 from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
@@ -192,7 +192,7 @@ def fit_indenter(
     most_rounds : int, optional
         Rounds of reweighting; one is enough to see whether a shape fits at all.
     """
-    model = model_on(model, window.at_rest)
+    model = model.on(window.at_rest)
     fit, others = _fit(model, window, start, edge, most_rounds)
     if others is None:
         return fit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.measurement.indenter import MODELS, model_on
+from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measure import MARGIN_MM
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
@@ -50,8 +50,8 @@ def fitted_depth(
         assert measurement.diameter_mm is not None
         values["diameter_mm"] = measurement.diameter_mm
     x, y = np.asarray(x_mm, np.float64), np.asarray(y_mm, np.float64)
-    model = model_on(MODELS[measurement.shape], at_rest)
-    return model.depth(values, x, y) + measurement.baseline_mm
+    depth_mm = MODELS[measurement.shape].on(at_rest).depth(values, x, y)
+    return depth_mm + measurement.baseline_mm
 
 
 def fit_residual(heightmap: HeightMap, measurement: Measurement) -> NDArray[np.float32]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,8 @@ class IndenterModel:
         The contact region's outline, (x, y) in mm.
     corners : callable (values) -> (N, 2)
         Its corners, (x, y) in mm. Their exact shape is not known.
+    depth_on : callable (surface, values, x_mm, y_mm) -> depth_mm
+        The same as `depth`, pressed along z into a curved membrane.
     """
 
     shape: str
@@ -55,6 +58,11 @@ class IndenterModel:
     start: Callable[[PressedRegion], dict[str, float]]
     outline: Callable[[Values], Array]
     corners: Callable[[Values], Array]
+    depth_on: Callable[[Surface, Values, Array, Array], Array]
+
+    def on(self, surface: Surface) -> IndenterModel:
+        """Return the model on a membrane; on a flat one, it is itself."""
+        return self if surface.flat else replace(self, depth=partial(self.depth_on, surface))
 
 
 def _cylinder(values: Values, x_mm: Array, y_mm: Array) -> Array:
@@ -163,60 +171,23 @@ def _ball_outline(values: Values) -> Array:
     )
 
 
-_PLACE = ("x_mm", "y_mm", "height_mm", "drape_decay_mm")
-_EDGE = ("edge_radius_mm", "blur_mm2")
+def _face_on(
+    flat: Callable[[Values, Array, Array], Array],
+    nearest: Callable[[Values, Array, Array], tuple[Array, Array]],
+    surface: Surface,
+    values: Values,
+    x_mm: Array,
+    y_mm: Array,
+) -> Array:
+    """Return the depth of a flat face in a curved membrane, of which it stays a plane in space.
 
-MODELS: Mapping[str, IndenterModel] = {
-    "cylinder": IndenterModel(
-        "cylinder",
-        (*_PLACE, "diameter_mm", *_EDGE),
-        _cylinder,
-        _start_cylinder,
-        lambda values: _circle(values, values["diameter_mm"] / 2.0),
-        _no_corners,
-    ),
-    "cuboid": IndenterModel(
-        "cuboid",
-        (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE, "corner_rounding"),
-        _cuboid,
-        _start_cuboid,
-        _rectangle,
-        lambda values: _rectangle(values)[:-1],
-    ),
-    "ball": IndenterModel(
-        "ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline, _no_corners
-    ),
-}
-
-
-def model_on(model: IndenterModel, surface: Surface) -> IndenterModel:
-    """Return the model of a shape that is pressed into a membrane along z.
-
-    A flat face stays a plane in space: in the contact, the depth is that on a flat membrane plus
-    the rise of the undeformed one. Outside, both obey the same linear equation, the rise with the
-    value at the nearest point of the contact.
+    In the contact, it is that on a flat membrane plus the rise of the undeformed one. Outside, both
+    obey the same linear equation, the rise with its value at the nearest point of the contact.
     """
-    if surface.flat:
-        return model
-
-    def depth(values: Values, x_mm: Array, y_mm: Array) -> Array:
-        if model.shape == "ball":
-            return _ball_on(surface, values, x_mm, y_mm)
-        contact = _contact(values)
-        nearest = np.stack(_nearest(contact, x_mm, y_mm), axis=-1)
-        rise = surface.height(nearest) - surface.height(np.array([values["x_mm"], values["y_mm"]]))
-        return model.depth(values, x_mm, y_mm) + rise * model.depth(contact, x_mm, y_mm)
-
-    return replace(model, depth=depth)
-
-
-def _ball_on(surface: Surface, values: Values, x_mm: Array, y_mm: Array) -> Array:
-    centre = float(values["x_mm"]), float(values["y_mm"])
-    pose = BallPose(centre, float(values["diameter_mm"]) / 2.0, float(values["height_mm"]))
-    points = np.stack([x_mm, y_mm], axis=-1)
-    upright = points.reshape(-1, 2), np.zeros((x_mm.size, 2))
-    seen, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
-    return np.asarray(surface.height(points) - seen[:, 2].reshape(x_mm.shape))
+    contact = _contact(values)
+    rim = np.stack(nearest(contact, x_mm, y_mm), axis=-1)
+    rise = surface.height(rim) - surface.height(np.array([values["x_mm"], values["y_mm"]]))
+    return flat(values, x_mm, y_mm) + rise * flat(contact, x_mm, y_mm)
 
 
 def _contact(values: Values) -> dict[str, float]:
@@ -228,15 +199,52 @@ def _contact(values: Values) -> dict[str, float]:
     return {**values, **smaller, "height_mm": 1.0, "edge_radius_mm": 0.0}
 
 
-def _nearest(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
-    """Return the points of the face of a cylinder or cuboid that are nearest to points."""
-    x, y = x_mm - values["x_mm"], y_mm - values["y_mm"]
-    if "diameter_mm" in values:
-        radius = values["diameter_mm"] / 2.0
-        share = radius / np.maximum(np.hypot(x, y), radius)
-        return values["x_mm"] + share * x, values["y_mm"] + share * y
+def _nearest_in_circle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
+    x, y, radius = x_mm - values["x_mm"], y_mm - values["y_mm"], values["diameter_mm"] / 2.0
+    share = radius / np.maximum(np.hypot(x, y), radius)
+    return values["x_mm"] + share * x, values["y_mm"] + share * y
+
+
+def _nearest_in_rectangle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
     half = 0.5 * values["side_a_mm"], 0.5 * values["side_b_mm"]
-    along, across = _turned(x, y, values["yaw"])
+    along, across = _turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
     along, across = np.clip(along, -half[0], half[0]), np.clip(across, -half[1], half[1])
     x, y = _turned(along, across, -values["yaw"])
     return values["x_mm"] + x, values["y_mm"] + y
+
+
+def _ball_on(surface: Surface, values: Values, x_mm: Array, y_mm: Array) -> Array:
+    centre = float(values["x_mm"]), float(values["y_mm"])
+    pose = BallPose(centre, float(values["diameter_mm"]) / 2.0, float(values["height_mm"]))
+    points = np.stack([x_mm, y_mm], axis=-1)
+    upright = points.reshape(-1, 2), np.zeros((x_mm.size, 2))
+    seen, _, _ = draped_ball(*upright, pose, decay_mm=values["drape_decay_mm"], surface=surface)
+    return np.asarray(surface.height(points) - seen[:, 2].reshape(x_mm.shape))
+
+
+_PLACE = ("x_mm", "y_mm", "height_mm", "drape_decay_mm")
+_EDGE = ("edge_radius_mm", "blur_mm2")
+
+MODELS: Mapping[str, IndenterModel] = {
+    "cylinder": IndenterModel(
+        "cylinder",
+        (*_PLACE, "diameter_mm", *_EDGE),
+        _cylinder,
+        _start_cylinder,
+        lambda values: _circle(values, values["diameter_mm"] / 2.0),
+        _no_corners,
+        partial(_face_on, _cylinder, _nearest_in_circle),
+    ),
+    "cuboid": IndenterModel(
+        "cuboid",
+        (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE, "corner_rounding"),
+        _cuboid,
+        _start_cuboid,
+        _rectangle,
+        lambda values: _rectangle(values)[:-1],
+        partial(_face_on, _cuboid, _nearest_in_rectangle),
+    ),
+    "ball": IndenterModel(
+        "ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline, _no_corners, _ball_on
+    ),
+}

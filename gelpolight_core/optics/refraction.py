@@ -19,9 +19,6 @@ from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
-LIFTS = 12
-"""Steps from the plane of the boundary to a curved membrane: each shrinks the error by the product
-of its slope and the ray's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,10 +187,7 @@ def camera_to_membrane(
     radius, tangent_gel = radius_on_membrane(sideways / forward, stack)
     unit = in_sensor[..., :2] / np.maximum(sideways, 1e-300)[..., None]
     foot, ray_slope = unit * radius[..., None], -unit * tangent_gel[..., None]
-    points = foot
-    for _ in range(0 if surface.flat else LIFTS):
-        points = foot - surface.height(points)[..., None] * ray_slope
-    return points, ray_slope
+    return surface.met_by(foot, ray_slope), ray_slope
 
 
 def membrane_to_camera(

@@ -13,8 +13,8 @@ from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
 ROUNDS = 6
-NEAREST, NEAR_MM = 8, 1.0
-"""Steps to the nearest point of a curved membrane, and from how far its curvature is taken."""
+NEAR_MM = 1.0
+"""From how far the curvature of a membrane is taken."""
 AT_REST = 8.0
 """Decay lengths from a ball at which a curved membrane is at rest."""
 
@@ -39,11 +39,7 @@ class Frame(NamedTuple):
     @classmethod
     def below(cls, middle_mm: Array, surface: Surface) -> Frame:
         """Return the frame below a ball's middle (3,)."""
-        place = middle_mm[:2]
-        for _ in range(NEAREST):
-            # The normal through the middle: what is beside it shrinks by height times curvature.
-            slope = surface.slopes(place)
-            place = middle_mm[:2] + slope * (middle_mm[2] - surface.height(place))
+        place = surface.nearest(middle_mm)
         normal = -surface.normals(place)
         along = np.array([normal[2], 0.0, -normal[0]]) / np.hypot(normal[0], normal[2])
         axes = np.stack([along, np.cross(normal, along), normal])

@@ -8,7 +8,7 @@ from typing import Any
 from gelpolight_core.calibration import in_place
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.file import contents_of
-from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, RADIANCE, TOP_POSE
+from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS, RADIANCE, TOP_POSE
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.recipes import JOINT, recipe_named, stage_title
@@ -90,7 +90,7 @@ def _lights(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
 
 
 def _radiance(c: OpenSensor, run: Run | None) -> dict[str, Parts]:
-    found = None if run is None else run.results[RADIANCE]
+    found = None if run is None else run.results[BACKGROUND].radiance
     return {"radiance": ((drawings.radiance(c, found),), ())}
 
 

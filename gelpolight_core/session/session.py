@@ -14,14 +14,14 @@ from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
-from gelpolight_core.io.reading import NAME_LIMIT, read_toml
+from gelpolight_core.io.reading import NAME_LIMIT, is_file_name, read_toml
 from gelpolight_core.reference import LENGTH_KEYS, RANGE_MM, TEXT_KEYS
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
 from gelpolight_core.session.table import Table
-from gelpolight_core.surface import FLAT, SHAPES, Surface, height_field
+from gelpolight_core.surface import FLAT, HEIGHT_FIELD, SHAPES, Surface, height_field
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
@@ -343,10 +343,15 @@ def parse_surface(table: Table, diameter_mm: float) -> Surface:
     shape = table.text("shape")
     if shape not in SHAPES:
         raise table.wrong("shape", tr("is none of {names}").format(names=", ".join(SHAPES)))
-    if "file" not in table.content:
-        height_mm = table.number("apex_height_mm", 0.0, 0.5 * diameter_mm, default=0.0)
+    if shape == FLAT.shape:
+        return FLAT
+    if shape != HEIGHT_FIELD:
+        height_mm = table.number("apex_height_mm", 0.0, 0.5 * diameter_mm)
         return Surface(shape, height_mm, diameter_mm)
-    return height_field(table.path.parent, table.text("file"), diameter_mm)
+    name = table.text("file")
+    if not is_file_name(name):
+        raise table.wrong("file", tr("is not the name of a file beside session.toml"))
+    return height_field(table.path.parent, name, diameter_mm)
 
 
 def _parse_in_place(top: Table) -> dict[str, Any]:

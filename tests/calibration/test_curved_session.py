@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,21 +14,30 @@ from scipy.ndimage import map_coordinates
 
 from gelpolight_core._api import read_height_map, read_image, write_height_map
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.calibration.open_sensor import BACKGROUND, RADIANCE
+from gelpolight_core.calibration.project import Run, calibrate
 from gelpolight_core.calibration.recipes import FULL, recipe_of
+from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.report.build import run_report
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture(scope="module")
-def curved_calibration(curved_session: Path) -> Calibration:
+def curved_run(curved_session: Path) -> Run:
+    """Return its calibration with all results; not to be changed."""
+    return calibrate(read_session(curved_session))
+
+
+@pytest.fixture(scope="module")
+def curved_calibration(curved_run: Run) -> Calibration:
     """Return its calibration; not to be changed."""
-    return calibrate(read_session(curved_session)).calibration
+    return curved_run.calibration
 
 
 def a_press(folder: Path) -> Path:
@@ -47,6 +57,8 @@ def test_its_route_has_no_white_board_and_the_papers_model_is_refused(curved_ses
     assert "radiance" not in [stage.key for stage in FULL.of(session)]
     with pytest.raises(InputError, match="curved"):
         recipe_of(session, "paper")
+    with pytest.raises(InputError, match="in_place"):
+        recipe_of(session, "in-place")
 
 
 def test_its_height_is_confirmed_and_depths_are_the_truth(
@@ -115,3 +127,23 @@ def test_a_cap_that_is_stated_flat_fails_with_its_height(
     with pytest.raises(InputError, match="whiteboard") as refused:
         calibrate(read_session(folder))
     assert "[membrane]" in str(refused.value)
+
+
+def test_a_white_board_of_a_flat_membrane_before_does_not_count(
+    tmp_path: Path, curved_session: Path, curved_run: Run
+) -> None:
+    folder = tmp_path / "session"
+    shutil.copytree(curved_session, folder, ignore=shutil.ignore_patterns("truth", "presses"))
+    session, results = read_session(folder), curved_run.results
+    other = results.having(RADIANCE, replace(results[BACKGROUND].radiance, usable=np.zeros((1, 1))))
+    shutil.copytree(folder / "background", folder / "whiteboard")
+    again = FULL.run(BACKGROUND, session, other)[BACKGROUND]
+    assert again.table.surface.shape == "spherical_cap"
+    assert again.radiance.usable.shape == again.table.valid.shape
+    np.testing.assert_array_equal(again.light, results[BACKGROUND].light)
+
+
+def test_its_report_and_the_scatter_of_its_curves_are_made(curved_run: Run) -> None:
+    titles = [section.title for section in run_report(curved_run).sections]
+    assert "Light intensity" not in titles
+    assert len(gather_scatter(curved_run).names) == 6

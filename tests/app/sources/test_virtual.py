@@ -67,11 +67,8 @@ def test_a_stage_shows_the_images_of_a_simulated_session(source: VirtualSource) 
     assert np.array_equal(settled(source).rgb, sensor.frame(Whiteboard()))
 
 
-def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
-    bench = Bench(SensorDesign().scaled(0.5))
-    source = VirtualSource(bench)
-    bench.lay("ball")
-    bench.adjust(noise=0.0, rate_hz=60.0)
+def coarse_and_settled(source: VirtualSource) -> tuple[Frame, Frame]:
+    """Return the first image of a source, which is coarse, and its settled one."""
     source.open()
     limit = time.monotonic() + WAIT_S
     first = None
@@ -80,6 +77,15 @@ def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
     last = settled(source)
     source.close()
     assert first is not None and not first.settled
+    return first, last
+
+
+def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
+    bench = Bench(SensorDesign().scaled(0.5))
+    source = VirtualSource(bench)
+    bench.lay("ball")
+    bench.adjust(noise=0.0, rate_hz=60.0)
+    first, last = coarse_and_settled(source)
     assert first.rgb.shape == last.rgb.shape == (480, 640, 3)
     # The press is already at its position: the two differ only at edges and in fine pattern.
     difference = np.abs(first.rgb.astype(int) - last.rgb)
@@ -95,14 +101,7 @@ def test_a_coarse_image_of_a_curved_sensor_shows_the_object_upright_where_it_is(
     bench.lay("cylinder")
     bench.arrange(x_mm=6.0, y_mm=-4.0)
     bench.adjust(noise=0.0, rate_hz=60.0)
-    source.open()
-    limit = time.monotonic() + WAIT_S
-    first = None
-    while first is None and time.monotonic() < limit:
-        first = source.frame(0.2)
-    last = settled(source)
-    source.close()
-    assert first is not None and not first.settled
+    first, last = coarse_and_settled(source)
     # If the face were tilted with the membrane, 5 % of the image would differ so much.
     difference = np.abs(first.rgb.astype(int) - last.rgb).max(axis=2)
     assert np.mean(difference > 5) < 0.01
