@@ -23,7 +23,8 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
     """Judge whether contacts are stretched, the more the nearer they are to the edge.
 
     A wrong index or thickness of a layer does: the error of the refracted ray grows with the
-    square of the distance from the axis. The limit is the noise of the contacts.
+    square of the distance from the axis. The limit is the noise of the contacts. On the slope of a
+    curved membrane, the drape makes contacts oval by as much: it is left out.
 
     Parameters
     ----------
@@ -35,23 +36,17 @@ def judge_roundness(presses: Sequence[BallPress], table: ResamplingTable) -> tup
     Returns
     -------
     tuple of Finding
-        Empty with too few presses.
+        Empty with too few presses, or on a curved membrane.
     """
-    grid = table.grid
-    seen = np.array([press.indentation.contour.mean(axis=0) for press in presses]).reshape(-1, 2)
-    away = seen - grid.to_index(np.zeros(2))
-    if len(presses) < LEAST_PRESSES or not away.any():
+    middle = table.grid.to_index(np.zeros(2))
+    away = np.array([press.indentation.contour.mean(axis=0) - middle for press in presses])
+    if len(presses) < LEAST_PRESSES or not away.any() or not table.surface.flat:
         return ()
     share = (away**2).sum(axis=1)
-    # A contact on a slope is seen from above, shorter along it.
-    out = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-    slopes = table.surface.slopes(grid.pitch_mm * seen + [grid.x_mm[0], grid.y_mm[0]])
-    along, across = (slopes * out).sum(axis=1), slopes[:, 0] * out[:, 1] - slopes[:, 1] * out[:, 0]
     share /= share.max()
     stretch = np.array(
         [_stretch(p.indentation.contour, a) for p, a in zip(presses, away, strict=True)]
     )
-    stretch += 0.5 * np.log((1.0 + along**2) / (1.0 + across**2))
     at_the_edge = float(share @ stretch) / float(share @ share)
     rest = stretch - at_the_edge * share
     sd = float(np.sqrt(rest @ rest / (len(share) - 1) / (share @ share)))

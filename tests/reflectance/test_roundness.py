@@ -15,8 +15,8 @@ from gelpolight_core.surface import FLAT, Surface
 PLACES = [(0, 0), (60, 10), (-90, 70), (120, -60), (-20, -150), (150, 40)]
 
 
-def judged(*, stretch: float, surface: Surface = FLAT) -> Finding:
-    """Judge noisy contacts that are stretched at the edge, on the slope of a membrane."""
+def judged(*, stretch: float) -> Finding:
+    """Judge noisy contacts that are stretched at the edge."""
     random, turns = np.random.default_rng(1), np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     presses, x = [], np.arange(401.0) - 200.0
     for place in np.array(PLACES, float):
@@ -24,24 +24,17 @@ def judged(*, stretch: float, surface: Surface = FLAT) -> Finding:
         circle = 25.0 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
         circle += random.normal(0.0, 0.2, circle.shape)
         along = place / max(away, 1e-9)
-        steep = surface.slopes(place)
-        upwards = steep / max(np.hypot(*steep), 1e-9)
-        circle -= np.outer(circle @ upwards, upwards) * (1.0 - 1.0 / np.sqrt(1.0 + steep @ steep))
         contour = circle + stretch * (away / 155.0) ** 2 * np.outer(circle @ along, along)
         presses.append(SimpleNamespace(indentation=SimpleNamespace(contour=contour + place + 200)))
-    table = SimpleNamespace(grid=MembraneGrid(x, x, 1.0), surface=surface)
+    table = SimpleNamespace(grid=MembraneGrid(x, x, 1.0), surface=FLAT)
+    dome = SimpleNamespace(grid=table.grid, surface=Surface("spherical_cap", 40.0, 400.0))
+    assert judge_roundness(presses, dome) == ()  # type: ignore[arg-type]
     (figure,) = judge_roundness(presses, table)  # type: ignore[arg-type]
     return figure
 
 
 def test_round_contacts_pass() -> None:
     assert judged(stretch=0.0).verdict is Verdict.PASS
-
-
-def test_round_contacts_on_the_slope_of_a_dome_pass_and_stretched_ones_are_found() -> None:
-    dome = Surface("spherical_cap", 40.0, 400.0, (20.0, -10.0))
-    assert judged(stretch=0.0, surface=dome).verdict is Verdict.PASS
-    assert judged(stretch=0.03, surface=dome).verdict is Verdict.WARN
 
 
 @pytest.mark.parametrize("stretch", [0.03, -0.03])
