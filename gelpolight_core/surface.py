@@ -7,12 +7,17 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import (
+    CloughTocher2DInterpolator,
+    RectBivariateSpline,
+    RegularGridInterpolator,
+)
+from scipy.spatial import QhullError
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.translation import tr
@@ -23,6 +28,8 @@ FIELD_KEYS, FIELD_NODES = ("x_mm", "y_mm", "height_mm"), 65
 """Arrays of a file with a height field, and nodes to a side of one in a calibration."""
 STEP_MM = 1e-3
 """Between the heights whose difference is a slope."""
+FACING = 0.1
+"""Least share along the axis of the normal of a face of the membrane in a mesh."""
 STEPS, MET_MM = 60, 1e-10
 """Most steps to a place on the membrane, and the move at which they end."""
 STEEPEST = 0.99
@@ -77,6 +84,18 @@ class Surface:
             raise ValueError("the shape of the membrane is unknown")
         if not abs(self.apex_height_mm + self.rise_mm) <= 0.5 * self.diameter_mm:
             raise ValueError("the membrane is higher than half its diameter")
+
+    def in_units(self, unit_mm: float, origin_mm: tuple[float, float]) -> Surface:
+        """Return the surface with all lengths in another unit, seen from another origin."""
+        x, y = ((a - b) / unit_mm for a, b in zip(self.axis_mm, origin_mm, strict=True))
+        return replace(
+            self,
+            apex_height_mm=self.apex_height_mm / unit_mm,
+            diameter_mm=self.diameter_mm / unit_mm,
+            axis_mm=(x, y),
+            rise_mm=self.rise_mm / unit_mm,
+            heights_mm=tuple(tuple(h / unit_mm for h in row) for row in self.heights_mm),
+        )
 
     def height(self, points_mm: Array) -> Array:
         """Return the height (...) in mm at points (..., 2) in mm."""
@@ -141,42 +160,72 @@ def _settled(step: Callable[[Array], Array], points_mm: Array) -> Array:
 
 
 def height_field(folder: Path, name: str, diameter_mm: float) -> Surface:
-    """Return a height field from an npz file.
+    """Return a height field from a file.
 
     Parameters
     ----------
     folder : Path
         Where the file is.
     name : str
-        Of the file; its arrays are x_mm and y_mm, rising, from the axis, and height_mm (rows,
-        columns), 0 at the boundary.
+        Of the file, with heights from the plane of the boundary, in mm, and the axis at x = y = 0.
+        An STL mesh of the membrane, or an npz file with the arrays x_mm and y_mm, rising, and
+        height_mm (rows, columns).
     diameter_mm : float
         Of the boundary.
 
     Raises
     ------
     InputError
-        If the file is missing, has other arrays, or does not cover the boundary.
+        If the file is missing, holds something else, or does not cover the boundary.
     """
-    path = folder / name
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
-        field = RectBivariateSpline(y, x, height)
-    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        wanted = tr("The file does not hold x_mm, y_mm and height_mm of a grid")
-        raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
-    rim = 0.5 * diameter_mm
-    if min(x[-1], y[-1], -x[0], -y[0]) < rim or not np.isfinite(height).all():
+    path, rim = folder / name, 0.5 * diameter_mm
+    read = _from_mesh if path.suffix.lower() == ".stl" else _from_grid
+    x, y = np.meshgrid(*2 * (np.linspace(-rim, rim, FIELD_NODES),))
+    # Towards the corners it goes on as the parabola through three places on the same radius.
+    end = rim * (1.0 - 2.0 / (FIELD_NODES - 1))
+    share = end / np.maximum(np.hypot(x, y), end)
+    field = read(path)
+    first, second, third = (field(x * at, y * at) for at in (share, 2 * share - 1, 3 * share - 2))
+    heights = 3.0 * (first - second) + third
+    if not np.isfinite(heights).all():
         raise InputError(
-            tr("The grid does not cover the boundary, {d:g} mm wide").format(d=diameter_mm),
+            tr("The file does not cover the boundary, {d:g} mm wide").format(d=diameter_mm),
             path,
             Remedy.CORRECT_FILE,
         )
-    even = np.linspace(-rim, rim, FIELD_NODES)
-    rows = tuple(tuple(row) for row in field(even, even).tolist())
-    apex_mm = float(field(0.0, 0.0)[0, 0])
+    rows = tuple(tuple(row) for row in heights.tolist())
+    apex_mm = float(heights[FIELD_NODES // 2, FIELD_NODES // 2])
     return Surface(HEIGHT_FIELD, apex_mm, diameter_mm, heights_mm=rows, file=name)
+
+
+def _from_grid(path: Path) -> Callable[[Array, Array], Array]:
+    """Return the height at x and y in an npz file; NaN where it does not cover them."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            x, y, height = (np.asarray(file[key], np.float64) for key in FIELD_KEYS)
+        field = RegularGridInterpolator((x, y), height.T, "cubic", bounds_error=False)
+    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        wanted = tr("The file does not hold x_mm, y_mm and height_mm of a grid")
+        raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
+    return lambda x, y: np.asarray(field((x, y)))
+
+
+def _from_mesh(path: Path) -> Callable[[Array, Array], Array]:
+    """Return the height at x and y over a mesh; NaN where it does not cover them."""
+    from trimesh import load_mesh
+
+    try:
+        with path.open("rb") as file:
+            mesh = load_mesh(file, file_type="stl")
+        # Of a solid, only the side that the objects touch.
+        up = mesh.face_normals[:, 2]
+        outer = mesh.triangles[up > FACING if (up > FACING).any() else up < -FACING]
+        points = np.unique(outer.reshape(-1, 3), axis=0)
+        field = CloughTocher2DInterpolator(points[:, :2], points[:, 2])
+    except (OSError, ValueError, IndexError, QhullError) as error:
+        wanted = tr("The file does not hold a mesh of the membrane in STL")
+        raise InputError(wanted, path, Remedy.CORRECT_FILE) from error
+    return lambda x, y: np.asarray(field(x, y))
 
 
 def _plane(_surface: Surface, x: Array, _y: Array) -> Array:

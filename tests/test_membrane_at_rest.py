@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial import Delaunay
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.description import write_description
@@ -86,6 +88,43 @@ def test_a_height_field_of_a_cap_is_the_cap(tmp_path: Path) -> None:
     places = np.random.default_rng(3).uniform(-8.0, 8.0, (50, 2))
     np.testing.assert_allclose(found.height(places), CAP.height(places), atol=1e-5)
     np.testing.assert_allclose(found.normals(places), CAP.normals(places), atol=1e-4)
+
+
+def cap_mesh(rings: int) -> trimesh.Trimesh:
+    """Return the cap as a mesh out to its boundary."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 4 * rings, endpoint=False)
+    out = np.linspace(0.0, 0.5 * WIDTH_MM, rings)[1:, None, None]
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    places = np.concatenate([np.zeros((1, 2)), (out * ring).reshape(-1, 2)])
+    heights = replace(CAP, axis_mm=(0.0, 0.0)).height(places)
+    points = np.column_stack([places, heights])
+    return trimesh.Trimesh(points, Delaunay(places).simplices, process=False)
+
+
+def test_a_mesh_of_a_cap_is_the_cap_also_as_a_solid_and_turned_over(tmp_path: Path) -> None:
+    mesh = cap_mesh(40)
+    base = mesh.copy()
+    base.vertices[:, 2] = 0.0
+    base.invert()
+    turned = mesh.copy()
+    turned.invert()
+    away = np.linspace(0.0, 0.49 * WIDTH_MM, 40)
+    places = np.array(AXIS) + np.stack([away * np.cos(away), away * np.sin(away)], axis=-1)
+    for name, shown in (("a.stl", mesh), ("b.STL", mesh + base), ("c.stl", turned)):
+        shown.export(tmp_path / name, file_type="stl")
+        found = replace(height_field(tmp_path, name, WIDTH_MM), axis_mm=AXIS)
+        # Facets of 0.3 mm: a chord of the sphere is a quarter of a micron off its arc.
+        np.testing.assert_allclose(found.height(places), CAP.height(places), atol=2e-3)
+        np.testing.assert_allclose(found.slopes(places), CAP.slopes(places), atol=1e-2)
+    with pytest.raises(InputError, match="cover"):
+        height_field(tmp_path, "a.stl", 1.1 * WIDTH_MM)
+
+
+@pytest.mark.parametrize("content", [b"", b"rubbish", b"solid a\nendsolid a\n", bytes(84)])
+def test_a_mesh_that_cannot_be_used_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "membrane.stl").write_bytes(content)
+    with pytest.raises(InputError, match=r"membrane\.stl"):
+        height_field(tmp_path, "membrane.stl", WIDTH_MM)
 
 
 @pytest.mark.parametrize("content", [None, b"not an archive", 9.0])

@@ -10,7 +10,7 @@ from gelpolight_core.calibration.manifest import REMARK_LENGTH
 from gelpolight_core.calibration.missing import needs_only_open_sensor
 from gelpolight_core.calibration.project import Project
 from gelpolight_core.errors import InputError, Remedy
-from gelpolight_core.fields import choice, number, text
+from gelpolight_core.fields import When, choice, number, text
 from gelpolight_core.in_place.preset import presets, stated_sizes
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.session import (
@@ -26,7 +26,7 @@ from gelpolight_core.session.session import (
     read_description,
 )
 from gelpolight_core.session.table import Table
-from gelpolight_core.surface import FLAT, Surface
+from gelpolight_core.surface import FLAT, HEIGHT_FIELD, Surface, height_field
 from gelpolight_core.translation import tr
 
 USUAL_RADIUS_MM = 3.0
@@ -36,15 +36,15 @@ USUAL = PRESETS["gelsight-mini"]
 MM = tr(" mm")
 
 
-def _optical(name: str, default: float, label: str, tip: str) -> Any:
+def _opens(values: SetupValues) -> bool:
+    return values.optics
+
+
+def _optical(name: str, default: float, label: str, tip: str, when: When = _opens) -> Any:
     """Return the field of a length or an index of a sensor that is described by its optics."""
     unit, decimals, step = (MM, 3, 0.1) if name.endswith("_mm") else ("", 4, 0.01)
     span = SENSOR_RANGES[name]
-    return number(default, label, *span, unit, decimals, step=step, tip=tip, when=_opens)
-
-
-def _opens(values: SetupValues) -> bool:
-    return values.optics
+    return number(default, label, *span, unit, decimals, step=step, tip=tip, when=when)
 
 
 def _length(default: float, label: str, low: float, high: float, **more: Any) -> Any:
@@ -119,6 +119,7 @@ class SetupValues:
         26.0,
         tr("Working diameter"),
         tr("Diameter of the circle on the membrane in which the sensor measures"),
+        when=lambda v: v.optics or v.domed,
     )
     apex_height_mm: float = number(
         0.0,
@@ -130,7 +131,13 @@ class SetupValues:
         step=0.1,
         none=tr("flat"),
         tip=tr("Of a dome (spherical cap) on its axis, over the plane of its boundary"),
-        when=_opens,
+        when=lambda v: not v.membrane_file,
+    )
+    membrane_file: str = text(
+        "",
+        tr("Heights of the membrane"),
+        tr("File beside session.toml with its shape. Empty: a dome, or flat"),
+        when=lambda v: bool(v.membrane_file),
     )
     lens_columns: int = _corners(9, tr("Lens views: inner corners"))
     lens_rows: int = _corners(6, tr("Lens views: inner corners vertically"), beside="x")
@@ -210,6 +217,11 @@ class SetupValues:
         return "" if self.optics else self.scale_from
 
     @property
+    def domed(self) -> bool:
+        """Whether the membrane is not flat."""
+        return bool(self.membrane_file) or self.apex_height_mm > 0.0
+
+    @property
     def boards(self) -> tuple[BoardSpec, BoardSpec]:
         """The boards of the lens views and of the top surface."""
         lens = BoardSpec((self.lens_columns, self.lens_rows), self.lens_square_mm)
@@ -240,10 +252,11 @@ def values_of(session: Session) -> SetupValues:
         top_rows=top.inner_corners[1],
         top_square_mm=top.square_mm,
         ball_mm=2.0 * (session.ball_default_radius_mm or USUAL_RADIUS_MM),
+        apex_height_mm=session.surface.apex_height_mm,
+        membrane_file=session.surface.file,
     )
     if stated is None:
-        apex_mm = session.surface.apex_height_mm
-        return replace(known, **asdict(session.sensor), apex_height_mm=apex_mm)
+        return replace(known, **asdict(session.sensor))
     pressed, (x, y) = stated.pressed_scale, stated.mm_per_px or (known.scale, known.scale)
     kinds = (p.key for p in PRESETS.values() if abs(x - p.mm_per_px) < 5e-6)
     sd, region = stated.mm_per_px_sd, stated.region_px
@@ -251,6 +264,7 @@ def values_of(session: Session) -> SetupValues:
     return replace(
         known,
         optics=False,
+        working_diameter_mm=session.surface.diameter_mm or known.working_diameter_mm,
         preset=OTHER if stated.mm_per_px is None else next(kinds, OTHER),
         scale_from=source if stated.mm_per_px is None else "stated",
         scale=x,
@@ -268,7 +282,7 @@ def session_of(session: Session, values: SetupValues) -> Session:
     Raises
     ------
     InputError
-        If the region is not one.
+        If the region is not one, or the file of the membrane cannot be used.
     """
     lens, top = values.boards
     session = replace(
@@ -290,16 +304,17 @@ def session_of(session: Session, values: SetupValues) -> Session:
         stated = replace(stated, pressed_scale=PressedScale(pin_spacing_mm=values.pins))
     else:
         stated = replace(stated, pressed_scale=PressedScale(punch_diameter_mm=values.punch))
-    return replace(session, sensor=SensorData(values.serial), in_place=stated)
+    surface = _surface_of(session, values)
+    return replace(session, sensor=SensorData(values.serial), in_place=stated, surface=surface)
 
 
 def _surface_of(session: Session, values: SetupValues) -> Surface:
     """Return the undeformed membrane: of the shape that the session has, else a spherical cap."""
-    before, apex_mm, width_mm = session.surface, values.apex_height_mm, values.working_diameter_mm
-    if before.file or apex_mm == 0.0:
-        return before if before.file else FLAT
-    shape = "spherical_cap" if before.flat else before.shape
-    return Surface(shape, apex_mm, width_mm)
+    name, width_mm, shape = values.membrane_file, values.working_diameter_mm, session.surface.shape
+    if name or not values.domed:
+        return height_field(session.folder, Path(name).name, width_mm) if name else FLAT
+    shape = "spherical_cap" if shape in (FLAT.shape, HEIGHT_FIELD) else shape
+    return Surface(shape, values.apex_height_mm, width_mm)
 
 
 def _region(words: str) -> tuple[int, int, int, int] | None:

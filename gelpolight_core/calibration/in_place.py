@@ -6,7 +6,15 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Table, Work
+from gelpolight_core.calibration.recipe import (
+    Facts,
+    Recipe,
+    Results,
+    Stage,
+    Table,
+    Work,
+    shape_facts,
+)
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.translation import tr
 
@@ -103,7 +111,8 @@ def _stated(session: Session) -> object:
     circles, stated = sorted(session.decisions.balls.items()), session.in_place
     assert stated is not None
     scale = stated.stated_scale, stated.mm_per_px_sd, stated.pressed_scale
-    return (radii, circles, scale, *(() if stated.region_px is None else (stated.region_px,)))
+    region = () if stated.region_px is None else (stated.region_px,)
+    return (radii, circles, scale, *region, *(() if session.surface.flat else (session.surface,)))
 
 
 def _ball_facts(c: ClosedSensor) -> Facts:
@@ -183,6 +192,7 @@ def _facts(c: ClosedSensor) -> Facts:
         (tr("Image"), f"{c.camera.width} \N{MULTIPLICATION SIGN} {c.camera.height} px"),
         (tr("Scale"), scale),
         (tr("Error of a depth"), error),
+        *shape_facts(grid.surface),
         (tr("Not known"), tr("optics, refraction, temperature")),
     )
 

@@ -159,6 +159,7 @@ def find_slopes(
         sd_mm = scale.relative_sd * scale.mm_per_px[0]
         stated = replace(stated, mm_per_px=scale.mm_per_px, mm_per_px_sd=sd_mm)
     grid, sd = stated_grid(stated, background.size), stated.mm_per_px_sd
+    grid = replace(grid, surface=session.surface)
     if scale is not None:
         grid = replace(grid, lens=scale.lens)
     scale_sd = STATED_SCALE_SD if sd is None else sd / grid.mm_per_px

@@ -15,16 +15,29 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.image.file import names_of
+from gelpolight_core.labels import label
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
     from gelpolight_core.sensor_calibration import Provenance
     from gelpolight_core.session.session import Session
+    from gelpolight_core.surface import Surface
 
 Progress = Callable[[float], None]
 Facts = tuple[tuple[str, str], ...]
 """Labels and values."""
+
+
+def shape_facts(surface: Surface) -> Facts:
+    """Return the facts about an undeformed membrane; none if it is flat."""
+    if surface.flat:
+        return ()
+    text = tr("{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm")
+    x, y = surface.axis_mm
+    height_mm = surface.apex_height_mm + surface.rise_mm
+    shown = text.format(shape=label(surface.shape), height=height_mm, x=x, y=y)
+    return ((tr("Membrane"), shown),)
 
 
 class Result(Protocol):

@@ -19,7 +19,7 @@ from gelpolight_core.calibration.open_sensor import (
     led_facts,
     linear,
 )
-from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Work
+from gelpolight_core.calibration.recipe import Facts, Recipe, Results, Stage, Work, shape_facts
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import QualityTable
 from gelpolight_core.labels import label
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from gelpolight_core.calibration.refinement import Joint
     from gelpolight_core.sensor_calibration import Calibration, OpenSensor, Provenance
     from gelpolight_core.session.session import Session
-    from gelpolight_core.surface import Surface
 
 
 def _run_joint(work: Work) -> Joint:
@@ -90,15 +89,8 @@ def _facts(c: OpenSensor) -> Facts:
         (tr("Window"), window if s.window_thickness_mm > 0.0 else tr("none")),
         (tr("LED height Z1"), f"{s.led_height_mm:g} mm"),
         (tr("Working diameter"), f"{s.working_diameter_mm:g} mm"),
-        *(() if c.surface.flat else ((tr("Membrane"), _shape(c.surface)),)),
+        *shape_facts(c.surface),
     )
-
-
-def _shape(surface: Surface) -> str:
-    text = tr("{shape}, {height:.3f} mm high, axis at ({x:.3f}, {y:.3f}) mm")
-    x, y = surface.axis_mm
-    height_mm = surface.apex_height_mm + surface.rise_mm
-    return text.format(shape=label(surface.shape), height=height_mm, x=x, y=y)
 
 
 def _finish(

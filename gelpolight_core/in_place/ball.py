@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reflectance.contour import Circle
+from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -19,6 +20,10 @@ MOST_CONTACT = 0.95
 CENTRE_SHARE = 0.85
 """Share of the contact radius within which slopes determine the centre."""
 CENTRE_ROUNDS = 4
+STEEPEST_ROOT = 0.2
+"""Least distance of the ball's surface from its equator, in radii: its slope ends there."""
+AROUND = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+"""Directions over which slopes towards the centre are averaged."""
 SLOPE_SCALE = 0.15
 """Slopes that differ by more have decreasing weight."""
 DECAYS = (0.08, 0.15, 0.25, 0.4, 0.6, 0.9)
@@ -32,17 +37,41 @@ class Ball:
     Attributes
     ----------
     x, y : float
-        Its centre.
+        Middle of the contact.
     contact : float
         Radius of the contact.
     radius : float
         Of the ball.
+    rest : Surface
+        The undeformed membrane.
     """
 
     x: float
     y: float
     contact: float
     radius: float
+    rest: Surface = FLAT
+
+    def slopes(self, x: Array, y: Array) -> Array:
+        """Return the depth's slopes (..., 2) on the ball at positions (...) from the contact.
+
+        The contact is a circle around the membrane's normal at its middle, on which the ball's
+        centre lies. On a flat membrane they are -(x, y) / sqrt(R^2 - rho^2).
+        """
+        middle = np.array([self.x, self.y])
+        places = np.stack([x, y], axis=-1)
+        lean = self.rest.slopes(middle)
+        away = np.sqrt((self.radius**2 - self.contact**2) / (1.0 + lean @ lean))
+        from_ball = places + away * lean
+        left = self.radius**2 - (from_ball**2).sum(axis=-1, keepdims=True)
+        root = np.sqrt(np.maximum(left, (STEEPEST_ROOT * self.radius) ** 2))
+        return np.asarray(self.rest.slopes(places + middle) - from_ball / root)
+
+    def inward(self, radius: Array) -> Array:
+        """Return the depth's mean slopes (N,) towards the centre at distances (N,) from it."""
+        out = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=-1)
+        slopes = self.slopes(*np.moveaxis(radius[:, None, None] * out, -1, 0))
+        return np.asarray(-(slopes * out).sum(axis=-1).mean(axis=-1))
 
     @property
     def circle(self) -> Circle:
@@ -62,26 +91,18 @@ def distances(shape: tuple[int, int], ball: Ball) -> tuple[Map, Map, Map]:
     return x, y, np.hypot(x, y)
 
 
-def ball_slopes(x: Array, y: Array, radius: float) -> Array:
-    """Return the depth's slopes (N, 2) on a ball at positions (N,) from its centre.
-
-    d = sqrt(R^2 - rho^2) + constant, so that the slope is -(x, y) / sqrt(R^2 - rho^2).
-    """
-    root = np.sqrt(np.maximum(radius**2 - x**2 - y**2, (0.2 * radius) ** 2))
-    return np.stack([-x / root, -y / root], axis=-1)
-
-
 def placed_by_slopes(slope_x: Map, slope_y: Map, ball: Ball) -> Ball:
     """Return the ball with the centre that follows from the slopes inside the contact."""
     x, y = ball.x, ball.y
     reach = CENTRE_SHARE * ball.contact
     for _ in range(CENTRE_ROUNDS):
-        from_x, from_y, rho = distances(slope_x.shape, replace(ball, x=x, y=y))
+        placed = replace(ball, x=x, y=y)
+        from_x, from_y, rho = distances(slope_x.shape, placed)
         inside = rho < reach
         if np.count_nonzero(inside) < 12:
             break
         dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
-        wanted = ball_slopes(dx, dy, ball.radius)
+        wanted = placed.slopes(dx, dy)
         left = np.stack([slope_x[inside], slope_y[inside]], axis=-1) - wanted
         # Moving the centre by c changes the slopes by about c / root.
         gain = 1.0 / np.sqrt(np.maximum(ball.radius**2 - dx**2 - dy**2, 1.0))[:, None]
@@ -134,8 +155,8 @@ def _profiles(ball: Ball, radius: Array, smoothing: float) -> tuple[Array, Array
     contacts = np.arange(0.6 * ball.contact, most, 0.5)
     step = 0.5
     fine = np.arange(0.0, radius[-1] + 4.0 * smoothing, step)
-    on_ball = fine / np.sqrt(np.maximum(ball.radius**2 - fine**2, (0.1 * ball.radius) ** 2))
-    edge = (contacts / np.sqrt(ball.radius**2 - contacts**2))[:, None, None]
+    on_ball = ball.inward(fine)
+    edge = ball.inward(contacts)[:, None, None]
     beyond = (fine - contacts[:, None])[:, None] / (
         np.array(DECAYS)[:, None] * contacts[:, None, None]
     )

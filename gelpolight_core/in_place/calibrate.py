@@ -281,7 +281,7 @@ def _begin(
         except InputError as fault:
             wide = seen_radius(image)
             return fault if wide <= radius else _wider(press, wide * grid.pitch_mm)
-        ball = Ball(edge.x, edge.y, edge.radius, radius).limited()
+        ball = Ball(edge.x, edge.y, edge.radius, radius, grid.rest).limited()
         # Only a ball's radius limits the edge that is found.
         wide = max(edge.radius, seen_radius(image)) if edge.radius > radius else edge.radius
         seen = colour_change(image, base, 1.0 + lights[press.name][0].gain)
@@ -410,5 +410,4 @@ def _seen_colours(presses: Sequence[_Press]) -> Map:
 
 
 def _steepest(ball: Ball) -> float:
-    reach = INSIDE * ball.contact
-    return float(reach / np.sqrt(ball.radius**2 - reach**2))
+    return float(ball.inward(np.array([INSIDE * ball.contact]))[0])

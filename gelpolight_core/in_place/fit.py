@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from gelpolight_core.in_place.ball import Ball, ball_slopes, distances
+from gelpolight_core.in_place.ball import Ball, distances
 from gelpolight_core.reconstruction.in_place.change import ColourChange
 from gelpolight_core.reconstruction.in_place.terms import design_rows, penalty, position_axes
 
@@ -103,9 +103,7 @@ def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
     some = some[:: max(some.size // FLAT_NODES, 1)]
     terms = _terms(seen.change, np.flatnonzero(inside))
     around = _terms(seen.change, some)
-    slopes = ball_slopes(
-        from_x[inside].astype(np.float64), from_y[inside].astype(np.float64), ball.radius
-    )
+    slopes = ball.slopes(*(a[inside].astype(np.float64) for a in (from_x, from_y)))
     own = (terms.T @ terms).astype(np.float64)
     rest = (around.T @ around).astype(np.float64)
     # The weight of the flat membrane is that of the contact times FLAT_WEIGHT squared.

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.in_place.ball import Ball, ball_slopes, distances
+from gelpolight_core.in_place.ball import Ball, distances
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reconstruction.height_map import surface_slopes
 from gelpolight_core.reconstruction.in_place.change import ColourChange
@@ -79,10 +79,12 @@ def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldO
     far = depth[(rho > FAR * ball.contact) & seen.usable]
     rim = np.concatenate([rho[0], rho[-1], rho[:, 0], rho[:, -1]])
     height = (found * wanted).sum() / (wanted**2).sum()
+    places = np.stack([dx + ball.x, dy + ball.y], axis=-1)
+    at_rest, surface = ball.rest.slopes(places), depth[inside] - ball.rest.height(places)
     return HeldOutPress(
-        float(np.degrees(_angles(found, wanted)).mean()),
+        float(np.degrees(_angles(found - at_rest, wanted - at_rest)).mean()),
         float(height) if rim.min() > ball.contact else np.nan,
-        _sphere_radius(dx, dy, depth[inside].astype(np.float64)) / ball.radius,
+        _sphere_radius(dx, dy, surface.astype(np.float64)) / ball.radius,
         np.hypot(wanted[:, 0], wanted[:, 1]),
         np.sqrt(0.5 * ((found - wanted) ** 2).sum(axis=1)),
         float(np.sqrt(np.mean(far**2))) if far.size else np.nan,
@@ -96,7 +98,7 @@ def _inside(seen: ColourChange, ball: Ball) -> tuple[Map, NDArray[np.bool_], Arr
     from_x, from_y, rho = distances((rows, columns), ball)
     inside = (rho < INSIDE * ball.contact) & seen.usable
     dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
-    return rho, inside, dx, dy, ball_slopes(dx, dy, ball.radius)
+    return rho, inside, dx, dy, ball.slopes(dx, dy)
 
 
 def _angles(a: Array, b: Array) -> Array:

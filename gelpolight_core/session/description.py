@@ -24,7 +24,7 @@ from gelpolight_core.session.session import (
     Session,
     serial_fault,
 )
-from gelpolight_core.surface import FLAT
+from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 
 FILE_NAME = "session.toml"
@@ -51,6 +51,8 @@ def write_description(session: Session) -> None:
     content["balls"] = {key: value for key, value in stated.items() if value is not None}
     if camera := _camera(session):
         content["camera"] = camera
+    if session.surface.shape != FLAT.shape:
+        content[MEMBRANE] = _membrane(session.surface, closed=session.in_place is not None)
     if session.indenters:
         content[INDENTERS] = {name: dict(stated) for name, stated in session.indenters.items()}
 
@@ -80,12 +82,6 @@ def _opened(session: Session) -> dict[str, Any]:
         "checkerboard": _board(session.checkerboard),
         "top_pose": _board(session.top_pose),
     }
-    surface = session.surface
-    if surface.shape != FLAT.shape:
-        where = (
-            {"file": surface.file} if surface.file else {"apex_height_mm": surface.apex_height_mm}
-        )
-        content[MEMBRANE] = {"shape": surface.shape, **where}
     if session.exposures_ms:
         content["response"] = dict(session.exposures_ms)
     return content
@@ -103,6 +99,12 @@ def _closed(session: Session, in_place: InPlace) -> dict[str, Any]:
         "sensor": {"serial": session.serial},
         IN_PLACE: {key: value for key, value in stated.items() if value is not None},
     }
+
+
+def _membrane(surface: Surface, *, closed: bool) -> dict[str, Any]:
+    wide = {"diameter_mm": surface.diameter_mm} if closed else {}
+    where = {"file": surface.file} if surface.file else {"apex_height_mm": surface.apex_height_mm}
+    return {"shape": surface.shape, **where, **wide}
 
 
 def _camera(session: Session) -> dict[str, Any]:

@@ -28,9 +28,10 @@ FORMAT = "gelpolight-session"
 VERSION = 1
 ELASTOMER = "elastomer"
 INDENTERS = "indenters"
+IN_PLACE, MEMBRANE = "in_place", "membrane"
 DEFAULT_RADIUS, RADIUS_OF_FILES = RADIUS_KEYS = ("default_radius_mm", "radius_mm")
 """Of ``[balls]``: the radius of most balls, and the table with those of single files."""
-COMMON = ("format", "version", "sensor", "balls", "camera", INDENTERS)
+COMMON = ("format", "version", "sensor", "balls", "camera", INDENTERS, MEMBRANE)
 """Tables and keys of every session.toml."""
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 DENSEST_INDEX = 2.5
@@ -43,7 +44,6 @@ SENSOR_RANGES = {
     "working_diameter_mm": (0.5, 1000.0),
 }
 _SENSOR_DEFAULTS = {"window_thickness_mm": 0.0, "window_refractive_index": 1.49}
-IN_PLACE, MEMBRANE = "in_place", "membrane"
 NOT_IN_A_NAME = '/\\:*?"<>|'
 """Characters that the name of a folder cannot have everywhere; files are named by the serial."""
 SCALE_RANGE = (1e-4, 10.0)
@@ -153,7 +153,8 @@ class Session(SessionImages):
     in_place : InPlace or None
         From ``[in_place]``; None for a sensor that can be opened.
     surface : Surface
-        From ``[membrane]``: the undeformed membrane, with its axis at the origin.
+        From ``[membrane]``: the undeformed membrane, with its axis at the origin, which is in the
+        middle of the image for a closed sensor.
     indenters : mapping
         From ``[indenters]``: what is stated of each object that is pressed, by its name.
     """
@@ -311,40 +312,44 @@ def _parse_opened(top: Table) -> dict[str, Any]:
     content = top.content
     checkerboard = _parse_board(top.table("checkerboard"))
     series = top.table("response") if "response" in content else Table({}, "response", top.path)
-    top.no_more(*COMMON, "checkerboard", "top_pose", "response", MEMBRANE)
+    top.no_more(*COMMON, "checkerboard", "top_pose", "response")
     sensor = _parse_sensor(top.table("sensor"))
-    stated = top.table(MEMBRANE) if MEMBRANE in content else None
     return {
         "sensor": sensor,
-        "surface": FLAT if stated is None else parse_surface(stated, sensor.working_diameter_mm),
+        "surface": _parse_surface(top, sensor.working_diameter_mm),
         "checkerboard": checkerboard,
         "top_pose": _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard,
         "exposures_ms": {name: series.number(name, 1e-4, 1e6) for name in series.file_names()},
     }
 
 
-def parse_surface(table: Table, diameter_mm: float) -> Surface:
+def _parse_surface(top: Table, diameter_mm: float | None = None) -> Surface:
     """Return the undeformed membrane that ``[membrane]`` states.
 
     Parameters
     ----------
-    table : Table
-        With ``shape`` and ``apex_height_mm`` or, for a height field, ``file``: an npz file beside
-        session.toml with x_mm, y_mm (rising, from the axis) and height_mm (rows, columns).
-    diameter_mm : float
-        Of the boundary.
+    top : Table
+        Whose ``[membrane]`` has ``shape`` and ``apex_height_mm`` or, for a height field, ``file``:
+        a file beside session.toml that :func:`height_field` reads.
+    diameter_mm : float, optional
+        Of the boundary; by default ``[membrane]`` states it as ``diameter_mm``.
 
     Raises
     ------
     InputError
         If a key is unknown, missing or out of range, or the file cannot be used.
     """
-    table.no_more("shape", "apex_height_mm", "file")
+    if MEMBRANE not in top.content:
+        return FLAT
+    table = top.table(MEMBRANE)
+    table.no_more("shape", "apex_height_mm", "file", *(() if diameter_mm else ("diameter_mm",)))
     shape = table.text("shape")
     if shape not in SHAPES:
         raise table.wrong("shape", tr("is none of {names}").format(names=", ".join(SHAPES)))
     if shape == FLAT.shape:
         return FLAT
+    if diameter_mm is None:
+        diameter_mm = table.number("diameter_mm", *SENSOR_RANGES["working_diameter_mm"])
     if shape != HEIGHT_FIELD:
         height_mm = table.number("apex_height_mm", 0.0, 0.5 * diameter_mm)
         return Surface(shape, height_mm, diameter_mm)
@@ -377,7 +382,8 @@ def _parse_in_place(top: Table) -> dict[str, Any]:
             top.path,
             Remedy.STATE_IN_SESSION,
         )
-    return {"sensor": SensorData(_parse_serial(sensor)), "in_place": found}
+    data = SensorData(_parse_serial(sensor))
+    return {"sensor": data, "in_place": found, "surface": _parse_surface(top)}
 
 
 def _parse_scale(table: Table) -> tuple[float, float] | None:

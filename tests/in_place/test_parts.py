@@ -25,6 +25,7 @@ from gelpolight_core.reconstruction.in_place.model import (
 )
 from gelpolight_core.reconstruction.in_place.terms import TERMS, design_rows, position_axes
 from gelpolight_core.reflectance.contour import Circle
+from gelpolight_core.surface import Surface
 
 
 def pressed_ball(
@@ -43,6 +44,32 @@ def pressed_ball(
     size = np.where(inside, rho / root, edge * away)
     turn = np.maximum(rho, 1e-9)
     return depth, (-size * dx / turn).astype(np.float32), (-size * dy / turn).astype(np.float32)
+
+
+def test_slopes_of_a_ball_in_a_dome_are_those_of_two_spheres() -> None:
+    cap = Surface("spherical_cap", 160.0, 2000.0, axis_mm=(30.0, -20.0))
+    dome_radius = (1000.0**2 + 160.0**2) / 320.0
+    dome = np.array([30.0, -20.0, 160.0 - dome_radius])
+    radius, contact, centre = 150.0, 60.0, np.array([480.0, 290.0, 225.0])
+    towards = (dome - centre) / np.linalg.norm(dome - centre)
+    # The contact is a circle around the line that joins both centres.
+    x, y, _ = centre + np.sqrt(radius**2 - contact**2) * towards
+    places = np.random.default_rng(4).uniform(-40.0, 40.0, (50, 2))
+
+    def depth(dx: float, dy: float) -> np.ndarray:
+        at = places + np.array([x + dx, y + dy])
+        root = np.sqrt(dome_radius**2 - ((at - dome[:2]) ** 2).sum(axis=1))
+        return (
+            dome[2] + root - centre[2] + np.sqrt(radius**2 - ((at - centre[:2]) ** 2).sum(axis=1))
+        )
+
+    wanted = np.stack([depth(0.01, 0.0) - depth(-0.01, 0.0), depth(0.0, 0.01) - depth(0.0, -0.01)])
+    wanted = wanted.T / 0.02
+    found = Ball(x, y, contact, radius, cap).slopes(*places.T)
+    on_flat = Ball(x, y, contact, radius).slopes(*places.T)
+    # The lean is that of the dome beside the contact, not of the dome in front of it.
+    assert np.abs(found - wanted).max() < 0.005
+    assert np.abs(on_flat - wanted).max() > 0.02
 
 
 def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit() -> None:

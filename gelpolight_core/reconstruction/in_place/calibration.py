@@ -129,6 +129,7 @@ class ClosedSensor:
             raise ValueError("an array does not fit the size of the images")
         if not (0 < size.width and 0 < size.height and m.grid.mm_per_px > 0.0 < m.steepest):
             raise ValueError("the size of the images or the scale is not possible")
+        m.grid.surface.check()
         if nodes.size < 2 or not (np.diff(nodes) > 0.0).all():
             raise ValueError("the errors are not given over rising slopes")
         least = (m.errors.slope_sd, m.background, m.errors.depth_share, m.errors.depth_floor_mm)

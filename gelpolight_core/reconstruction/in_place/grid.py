@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.optics.resampling import LEAST_NODES, MembraneGrid, ResamplingTable
 from gelpolight_core.reflectance.contour import Circle
+from gelpolight_core.surface import FLAT, Surface
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -56,6 +57,8 @@ class WorkingGrid:
         Terms k1, k2, ... of a wide lens: a pixel at the distance r from the middle of the image
         shows what a lens without distortion would show at r (1 + k1 r2 + k2 r4 + ...); r is 1 at
         the corner. The scale is that in the middle.
+    surface : Surface
+        The undeformed membrane; its axis is in the middle of the image.
     """
 
     image: ImageSize
@@ -63,6 +66,7 @@ class WorkingGrid:
     aspect: float = 1.0
     region_px: tuple[int, int, int, int] | None = None
     lens: tuple[float, ...] = ()
+    surface: Surface = FLAT
 
     def __post_init__(self) -> None:
         """Refuse a region that is not inside the image or cannot hold a press.
@@ -132,6 +136,11 @@ class WorkingGrid:
     def y_mm(self) -> Array:
         """Places of the rows."""
         return self._positions(1)
+
+    @property
+    def rest(self) -> Surface:
+        """The undeformed membrane, in nodes."""
+        return self.surface.in_units(self.pitch_mm, (float(self.x_mm[0]), float(self.y_mm[0])))
 
     def _pixels(self, axis: int) -> Array:
         pixels = self.step_px[axis] * np.arange(self.shape[1 - axis]) + self._first_px[axis]
@@ -225,7 +234,8 @@ class WorkingGrid:
         u, v = (np.ascontiguousarray(at[:, axis].reshape(self.shape)) for axis in (0, 1))
         inside = np.asarray((np.abs(at - self.middle_px) <= self.middle_px + 0.5).all(axis=1))
         ray_slope = np.zeros((*self.shape, 2), np.float32)
-        return ResamplingTable(grid, u, v, inside.reshape(self.shape), ray_slope)
+        shown = inside.reshape(self.shape)
+        return ResamplingTable(grid, u, v, shown, ray_slope, surface=self.surface)
 
 
 @functools.lru_cache(4)

@@ -135,7 +135,7 @@ class InPlaceSolver:
             record.left_out(tr("standard deviations"), tr("not requested"))
         normals = None
         if wanted.normals:
-            normals = normals_from_slopes(*surface_slopes(depth, model.grid.pitch_mm))
+            normals = self._normals(*surface_slopes(depth, model.grid.pitch_mm))
         return Solved(
             depth,
             normals,
@@ -149,6 +149,17 @@ class InPlaceSolver:
             depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
             lateral_scale_sd=model.scale_sd,
         )
+
+    def _normals(self, slope_x: Map, slope_y: Map) -> Map:
+        """Return the normals of the membrane with these slopes of its depth."""
+        surface = self._model.grid.surface
+        if not surface.flat:
+            at_rest = surface.slopes(self.calibration.table.grid.points_mm())
+            slope_x, slope_y = (
+                np.asarray(slope - at_rest[..., k], np.float32)
+                for k, slope in enumerate((slope_x, slope_y))
+            )
+        return normals_from_slopes(slope_x, slope_y)
 
     def predict(self, height_map: HeightMap, *, step: int = 1) -> Map:
         """Return 1 plus the change of colour of a surface; see :class:`Solver`."""

@@ -73,5 +73,10 @@ def test_the_height_of_a_dome_is_asked_and_0_is_a_flat_membrane() -> None:
     dome = session_of(flat, replace(values, apex_height_mm=1.5))
     assert dome.surface == Surface("spherical_cap", 1.5, 24.0)
     assert values_of(dome).apex_height_mm == 1.5
+    closed = session_of(new_session(optics=False), replace(values, optics=False))
+    assert closed.surface == FLAT
+    closed = session_of(closed, replace(values_of(closed), apex_height_mm=0.5))
+    assert closed.surface == Surface("spherical_cap", 0.5, 26.0)
+    assert session_of(closed, values_of(closed)) == closed
     keys = [stage.key for stage in recipe_of(flat).of(flat)]
     assert [stage.key for stage in recipe_of(dome).of(dome)] == [k for k in keys if k != "radiance"]
