@@ -292,10 +292,11 @@ class Bench:
         x, y = float(ray.x_mm), float(ray.y_mm)
         if scene.item in PRESSED:
             membrane, slope_x, slope_y = self.design.membrane, ray.slope_x, ray.slope_y
-            low, high = 0.0, membrane.apex_height_mm
+            low, high, axis = 0.0, membrane.apex_height_mm, membrane.axis_mm
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + high)
-                at = membrane.height_mm(np.hypot(x + middle * slope_x, y + middle * slope_y))
+                away = np.hypot(x + middle * slope_x - axis[0], y + middle * slope_y - axis[1])
+                at = membrane.height_mm(away)
                 low, high = (middle, high) if at > middle else (low, middle)
             x, y = float(x + low * slope_x), float(y + low * slope_y)
         return (x, y) if math.isfinite(x) and math.isfinite(y) else None

@@ -162,6 +162,8 @@ class MembraneDesign:
     ----------
     working_diameter_mm : float
         Diameter of the coated and visible circle.
+    axis_mm : (x, y)
+        Centre of that circle.
     apex_height_mm : float
         Height of the undeformed membrane on its axis, a spherical cap over that circle, away from
         the camera; 0: flat. At most a third of the diameter.
@@ -186,6 +188,7 @@ class MembraneDesign:
     """
 
     working_diameter_mm: float = _within(26.0, 0.5, 500.0)
+    axis_mm: tuple[float, float] = _within((0.0, 0.0), -50.0, 50.0)
     apex_height_mm: float = _within(0.0, 0.0, 500.0)
     diffuse_reflectance: float = _within(0.8, 0.0, 1.0)
     specular_weight: float = _within(0.3, 0.0, 1.0)

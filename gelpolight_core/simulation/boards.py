@@ -213,6 +213,7 @@ def board_on_top(
     layers: LayerDesign,
     *,
     working_diameter_mm: float,
+    axis_mm: tuple[float, float] = (0.0, 0.0),
     yaw_deg: float = 14.0,
     shift_mm: tuple[float, float] = (0.35, -0.25),
     inner_corners: tuple[int, int] = (9, 6),
@@ -224,7 +225,7 @@ def board_on_top(
     turn = np.array(
         [[math.cos(yaw), math.sin(yaw), 0.0], [-math.sin(yaw), math.cos(yaw), 0.0], [0, 0, 1.0]]
     )
-    centre = np.array([*shift_mm, layers.top_distance_mm]) @ frame
+    centre = np.array([*np.add(axis_mm, shift_mm), layers.top_distance_mm]) @ frame
     back = -(turn[:2, :2] @ np.array(shift_mm))
     return BoardPose(
         inner_corners,

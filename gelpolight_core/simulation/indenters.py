@@ -226,10 +226,11 @@ def press(
         depth, contact = _round_drape(indenter, np.hypot(dx, dy), decay_mm)
     else:
         cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
+        x0, y0 = x_mm - rest.axis_mm[0], y_mm - rest.axis_mm[1]
 
         def obstacle(along: Array, across: Array) -> Array:
-            x, y = x_mm + along * cos - across * sin, y_mm + along * sin + across * cos
-            height = rest.height_mm(np.hypot(x, y)) - rest.height_mm(np.hypot(x_mm, y_mm))
+            x, y = x0 + along * cos - across * sin, y0 + along * sin + across * cos
+            height = rest.height_mm(np.hypot(x, y)) - rest.height_mm(np.hypot(x0, y0))
             return indenter.obstacle(along, across) + height
 
         along, across = dx * cos + dy * sin, dy * cos - dx * sin

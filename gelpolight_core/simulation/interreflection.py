@@ -92,7 +92,7 @@ def indirect_light(
     )
 
     def light_at(points_mm: Array, numbers: NDArray[np.int64], paths: int) -> Array:
-        slopes = slopes_to(layers, points_mm)
+        slopes = slopes_to(layers, points_mm + np.array([*design.membrane.axis_mm, 0.0]))
         nodes = np.column_stack([points_mm[:, :2], slopes])
         out = np.zeros((len(nodes), len(lamps)))
         for start in range(0, len(nodes), _NODES_AT_ONCE):

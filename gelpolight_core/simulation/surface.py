@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,29 +72,32 @@ class PressedSurface:
         return self.y0_mm + self.pitch_mm * np.arange(self.depth_mm.shape[0], dtype=np.float64)
 
     def on(self, membrane: MembraneDesign) -> PressedSurface:
-        """Return the whole surface of a curved membrane that is pressed in like this one.
+        """Return the whole surface of a membrane that is pressed in like this one.
 
-        Its depth is measured from the plane of the apex, so that it is nowhere negative. A flat
-        membrane is zero outside the grid already.
+        Its places are seen from the membrane's axis, and its depth is measured from the plane of
+        the apex, so that it is nowhere negative. A flat membrane is zero outside the grid already.
         """
+        here = replace(
+            self, x0_mm=self.x0_mm - membrane.axis_mm[0], y0_mm=self.y0_mm - membrane.axis_mm[1]
+        )
         if membrane.apex_height_mm == 0.0:
-            return self
+            return here
         # Level only beyond the cells that the slope at the boundary is read from.
-        end = 0.5 * membrane.working_diameter_mm + 3.0 * self.pitch_mm
-        ends = ((self.y_mm[0], self.y_mm[-1]), (self.x_mm[0], self.x_mm[-1]))
+        end = 0.5 * membrane.working_diameter_mm + 3.0 * here.pitch_mm
+        ends = ((here.y_mm[0], here.y_mm[-1]), (here.x_mm[0], here.x_mm[-1]))
         room = [
-            [max(0, math.ceil(gap / self.pitch_mm)) for gap in (end + first, end - last)]
+            [max(0, math.ceil(gap / here.pitch_mm)) for gap in (end + first, end - last)]
             for first, last in ends
         ]
-        y0, x0 = (first - r[0] * self.pitch_mm for (first, _), r in zip(ends, room, strict=True))
-        depth, contact = np.pad(self.depth_mm, room), np.pad(self.contact, room)
+        y0, x0 = (first - r[0] * here.pitch_mm for (first, _), r in zip(ends, room, strict=True))
+        depth, contact = np.pad(here.depth_mm, room), np.pad(here.contact, room)
         y, x = (
-            start + self.pitch_mm * np.arange(n)
+            start + here.pitch_mm * np.arange(n)
             for start, n in zip((y0, x0), depth.shape, strict=True)
         )
         radius = np.minimum(np.hypot(x[None], y[:, None]), end)
         rest = membrane.apex_height_mm - membrane.height_mm(radius)
-        return PressedSurface(depth + rest, contact, x0, y0, self.pitch_mm, rest)
+        return PressedSurface(depth + rest, contact, x0, y0, here.pitch_mm, rest)
 
 
 def _tiles(depth_mm: Array) -> tuple[Array, Array]:

@@ -72,6 +72,7 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
         ],
         "membrane": {
             "apex_height_mm": membrane.apex_height_mm,
+            "axis_mm": list(membrane.axis_mm),
             "kind": "blend" if membrane.specular_weight > 0.0 else "diffuse",
             "diffuse": membrane.diffuse_reflectance,
             "spec_weight": membrane.specular_weight,

@@ -122,10 +122,9 @@ class VirtualSensor:
         self.lamps = lamps_of(design) if lamps is None else lamps
         self.material = Material.of_membrane(design.membrane)
         apex, layers = design.membrane.apex_height_mm, design.layers
-        # Rays, lamps and depths are those from the plane of the apex, so that no depth is negative.
-        self._table = lamp_table(
-            tuple(replace(lamp, height_mm=lamp.height_mm + apex) for lamp in self.lamps)
-        )
+        # Rays, lamps and depths are those from the plane of the apex, so that no depth is negative,
+        # and from the membrane's axis.
+        self._table = lamp_table(self.lamps) - [*design.membrane.axis_mm, apex, 0.0, 0.0, 0.0]
         self._lit = replace(
             design,
             layers=replace(
@@ -134,11 +133,11 @@ class VirtualSensor:
                 elastomer_thickness_mm=layers.elastomer_thickness_mm + apex,
             ),
         )
-        self._bare = FLAT
-        if apex > 0.0:
-            self._bare = replace(FLAT, pitch_mm=image_pitch_mm(design)).on(design.membrane)
+        self._bare = replace(FLAT, pitch_mm=image_pitch_mm(design)).on(design.membrane)
         self._count = 0
-        self.rays = trace_pixels(design.camera, self._lit.layers, interrupt=interrupt)
+        rays = trace_pixels(design.camera, self._lit.layers, interrupt=interrupt)
+        x, y = design.membrane.axis_mm
+        self.rays = replace(rays, x_mm=rays.x_mm - x, y_mm=rays.y_mm - y)
         self._even = even_factor(design.membrane)
         self.factors = reflectance_factor(
             design.membrane, np.random.default_rng([seed, zlib.crc32(b"membrane")])
@@ -228,8 +227,11 @@ class VirtualSensor:
     @property
     def top_pose(self) -> BoardPose:
         """Pose of the small checkerboard on the top surface."""
+        membrane = self.design.membrane
         return board_on_top(
-            self.design.layers, working_diameter_mm=self.design.membrane.working_diameter_mm
+            self.design.layers,
+            working_diameter_mm=membrane.working_diameter_mm,
+            axis_mm=membrane.axis_mm,
         )
 
     def _membrane_light(self, surface: PressedSurface, interrupt: Interrupt) -> IndirectLight:
@@ -330,6 +332,7 @@ class VirtualSensor:
         slope_x, slope_y = ray[..., 0] / ray[..., 2], ray[..., 1] / ray[..., 2]
         total = layers.top_distance_mm + lamp.height_mm
         hit = np.hypot(slope_x * total - lamp.x_mm, slope_y * total - lamp.y_mm)
-        on_mirror = np.hypot(slope_x, slope_y) * layers.top_distance_mm <= rim
+        away, (x, y) = layers.top_distance_mm, self.design.membrane.axis_mm
+        on_mirror = np.hypot(slope_x * away - x, slope_y * away - y) <= rim
         share = ((hit <= 0.5 * lamp.diameter_mm) & on_mirror).astype(np.float64)
         return np.asarray(share.reshape(i1 - i0, n, j1 - j0, n).mean(axis=(1, 3)))

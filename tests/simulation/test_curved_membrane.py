@@ -30,9 +30,11 @@ from gelpolight_core.simulation.session import pressed_membrane, simulate_sessio
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
 
 APEX_MM, RIM_MM = 2.0, 13.0
+AXIS_MM = (0.6, -0.9)
 SPHERE_MM = (RIM_MM**2 + APEX_MM**2) / (2.0 * APEX_MM)
 PLAIN = MembraneDesign(
     working_diameter_mm=2.0 * RIM_MM,
+    axis_mm=AXIS_MM,
     apex_height_mm=APEX_MM,
     specular_weight=0.0,
     variation=0.0,
@@ -53,7 +55,8 @@ PLACES = [(0.4, -0.3), (-6.0, 2.5), (3.0, 8.0), (7.5, -4.0), (-2.0, -9.0), (8.0,
 
 def height(x_mm: float, y_mm: float) -> float:
     """Return the height of the cap over the plane of its boundary."""
-    return math.sqrt(SPHERE_MM**2 - x_mm**2 - y_mm**2) - (SPHERE_MM - APEX_MM)
+    away = math.dist((x_mm, y_mm), AXIS_MM)
+    return math.sqrt(SPHERE_MM**2 - away**2) - (SPHERE_MM - APEX_MM)
 
 
 def seen(point: tuple[float, float, float]) -> tuple[np.ndarray, float]:
@@ -111,7 +114,8 @@ def test_the_cap_at_rest_is_as_bright_as_snell_inverse_square_and_cosine_say(
     ratios = []
     for x, y in PLACES:
         point = (x, y, height(x, y))
-        normal = (-x / SPHERE_MM, -y / SPHERE_MM, -(point[2] + SPHERE_MM - APEX_MM) / SPHERE_MM)
+        centre = (*AXIS_MM, APEX_MM - SPHERE_MM)
+        normal = tuple((c - p) / SPHERE_MM for c, p in zip(centre, point, strict=True))
         ratios.append(shown(image, point) / lit(point, normal))
     # The same reflectance and exposure everywhere, in all channels.
     expected = sensor.exposure * PLAIN.diffuse_reflectance
@@ -122,7 +126,8 @@ def test_the_image_ends_at_the_boundary_of_the_cap(sensor: VirtualSensor) -> Non
     image = sensor.brightness(BareMembrane()).sum(axis=2)
     for angle in np.radians([160.0, 205.0, 340.0]):
         radii = np.arange(12.5, 13.5, 0.005)
-        pixels = [seen((r * math.cos(angle), r * math.sin(angle), 0.0))[0] for r in radii[::20]]
+        way = np.array([math.cos(angle), math.sin(angle)])
+        pixels = [seen((*(AXIS_MM + r * way), 0.0))[0] for r in radii[::20]]
         u, v = (np.interp(radii, radii[::20], places) for places in np.transpose(pixels))
         along = map_coordinates(image, [v, u], order=1)
         # Half of the light is seen at the boundary: one pixel is 0.05 mm.
@@ -138,7 +143,7 @@ def test_a_flat_end_is_a_plane_in_space_at_the_stated_depth_under_its_centre(
     state = pressed_membrane(DESIGN, shape, x_mm=x0, y_mm=y0, yaw_deg=20.0)
     surface = state.surface
     x, y = np.meshgrid(surface.x_mm, surface.y_mm)
-    rest = np.sqrt(SPHERE_MM**2 - x**2 - y**2) - (SPHERE_MM - APEX_MM)
+    rest = np.vectorize(height)(x, y)
     face = np.hypot(x - x0, y - y0) < 2.3
     assert surface.contact[face].all()
     # The rounded edge is 0.05 mm wide; the cubic interpolation feels it at 0.2 mm by some nm.
@@ -156,7 +161,7 @@ def test_a_ball_in_the_cap_lies_at_the_stated_depth_under_its_centre() -> None:
     x0, y0, radius, depth = -5.0, 3.0, 4.0, 0.9
     surface = press(Ball(radius, depth), x_mm=x0, y_mm=y0, rest=PLAIN)
     x, y = np.meshgrid(surface.x_mm - x0, surface.y_mm - y0)
-    rest = np.sqrt(SPHERE_MM**2 - (x + x0) ** 2 - (y + y0) ** 2) - (SPHERE_MM - APEX_MM)
+    rest = np.vectorize(height)(x + x0, y + y0)
     z = rest - surface.depth_mm
     middle = height(x0, y0) - depth + radius
     touched = surface.contact & (np.hypot(x, y) < 1.8)
@@ -176,7 +181,7 @@ def test_a_cap_lights_itself_by_the_geometric_series(monkeypatch: pytest.MonkeyP
     apex, rim, reflectance = 1.2, 2.0, 0.9
     sphere = (rim**2 + apex**2) / (2.0 * apex)
     # From a point of its sphere, a lamp lights the cap evenly: 1/r^2 and both cosines cancel.
-    lamp = PointLamp(0.0, 0.0, 2.0 * sphere - apex, diameter_mm=0.0)
+    lamp = PointLamp(*AXIS_MM, 2.0 * sphere - apex, diameter_mm=0.0)
     membrane = replace(
         PLAIN, working_diameter_mm=2.0 * rim, apex_height_mm=apex, diffuse_reflectance=reflectance
     )
