@@ -7,7 +7,8 @@ Outside the contact the membrane is a tense sheet on an elastic foundation,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,30 @@ Array = NDArray[np.float64]
 
 FAR_CORNER = 9.0
 """Distance in decay lengths beyond which a corner has no effect: exp(-9) is 1e-4 of the height."""
+MOST_STEPS, SETTLED = 30, 1e-6
+"""Newton steps to the angle at which the membrane leaves a fillet, and the step that ends them."""
 SMALL_BLUR_MM = 0.005
 """Below this blur, its effect is computed for this blur and scaled with the variance, in which it
 is linear. A finer filter would only take more time."""
+
+
+class Rise(NamedTuple):
+    """How much the undeformed membrane rises from the place under a face's centre, mm.
+
+    Attributes
+    ----------
+    here, wall : array or float
+        At each point, and at the wall's nearest place to it.
+    lean : array or float
+        Its slope there, outwards.
+    """
+
+    here: Array | float = 0.0
+    wall: Array | float = 0.0
+    lean: Array | float = 0.0
+
+
+LEVEL = Rise()
 
 
 def cylinder_depth(
@@ -33,6 +55,7 @@ def cylinder_depth(
     decay_mm: float,
     edge_radius_mm: float = 0.0,
     blur_mm: float = 0.0,
+    rise: Rise = LEVEL,
 ) -> Array:
     """Return the membrane's depth around a flat cylinder.
 
@@ -48,6 +71,8 @@ def cylinder_depth(
         Fillet between the cylinder's face and its wall.
     blur_mm : float, optional
         Sigma with which the map smooths the edge.
+    rise : Rise, optional
+        Of the undeformed membrane; by default it is flat.
     """
     edge = min(edge_radius_mm, cylinder_radius_mm)
     contact_mm, contact_depth = _edge_contact(
@@ -60,7 +85,14 @@ def cylinder_depth(
         depth[free] = contact_depth * _radial_drape(r[free], contact_mm, decay_mm)
         return depth
 
-    depth = sharp(radius_mm)
+    if rise is LEVEL:
+        depth = sharp(radius_mm)
+    else:
+        steep = _radial_steepness(contact_mm, decay_mm)
+        place, there = _contact_on(rise, height_mm, edge, steep)
+        drape = _radial_drape(radius_mm, cylinder_radius_mm + place, decay_mm)
+        held = _filleted(radius_mm - cylinder_radius_mm, height_mm, edge) + rise.here
+        depth = np.where(radius_mm > cylinder_radius_mm + place, there * drape, held)
     if blur_mm > 0.0:
         depth = _blurred(
             depth,
@@ -83,6 +115,7 @@ def cuboid_depth(
     edge_radius_mm: float = 0.0,
     blur_mm: float = 0.0,
     corner_rounding: float | None = None,
+    rise: Rise = LEVEL,
 ) -> Array:
     """Return the membrane's depth around a flat cuboid whose sides lie along the axes.
 
@@ -93,7 +126,7 @@ def cuboid_depth(
     side_mm : (float, float)
         Sides along x and y.
     height_mm, decay_mm, edge_radius_mm, blur_mm : float
-        As in :func:`cylinder_depth`.
+        As in :func:`cylinder_depth`, and so is `rise`.
     corner_rounding : float, optional
         Strength of the corners' rounding, as for
         :func:`~gelpolight_core.measurement.corner.corner_drape`; by default that of corners whose
@@ -113,12 +146,15 @@ def cuboid_depth(
     qx, qy = ax - half[0] + edge, ay - half[1] + edge
     beyond = np.hypot(np.maximum(qx, 0.0), np.maximum(qy, 0.0)) - edge
     beyond = np.where((qx <= 0.0) & (qy <= 0.0), np.maximum(qx, qy) - edge, beyond)
-    depth = _filleted(beyond, height_mm, edge)
-    free = beyond > inset
-    depth[free] = contact_depth * _rectangle_drape(
+    place, there = np.full(beyond.shape, inset), np.full(beyond.shape, contact_depth)
+    if rise is not LEVEL:
+        place, there = _contact_on(rise, height_mm, edge, 1.0 / decay_mm)
+    depth = _filleted(beyond, height_mm, edge) + rise.here
+    free = beyond > place
+    depth[free] = there[free] * _rectangle_drape(
         ax[free] / decay_mm,
         ay[free] / decay_mm,
-        ((half[0] + inset) / decay_mm, (half[1] + inset) / decay_mm),
+        [(h + place[free]) / decay_mm for h in half],
         edge / decay_mm,
         fillet_rounding(edge / decay_mm) if corner_rounding is None else corner_rounding,
     )
@@ -188,9 +224,9 @@ def _radial_steepness(radius_mm: float, decay_mm: float) -> float:
     return float(k1e(q) / k0e(q)) / decay_mm
 
 
-def _radial_drape(radius_mm: Array, contact_mm: float, decay_mm: float) -> Array:
+def _radial_drape(radius_mm: Array, contact_mm: Array | float, decay_mm: float) -> Array:
     """Return K0(r / decay) / K0(a / decay) without underflow."""
-    contact = max(contact_mm / decay_mm, 1e-12)
+    contact = np.maximum(contact_mm / decay_mm, 1e-12)
     q = np.maximum(radius_mm / decay_mm, contact)
     return np.asarray(k0e(q) / k0e(contact) * np.exp(contact - q))
 
@@ -217,6 +253,27 @@ def _edge_contact(
     )
 
 
+def _contact_on(rise: Rise, height_mm: float, edge_mm: float, steep: float) -> tuple[Array, Array]:
+    """Return the same (from the wall) at each place of the wall in a curved membrane.
+
+    Where the membrane leans away more than its depth holds it, it leaves the face before the
+    fillet. That the steepness changes along the fillet matters to second order only.
+    """
+    height, lean = height_mm + np.asarray(rise.wall), np.asarray(rise.lean)
+    angle = np.arctan(np.maximum(height * steep + lean, 0.0))
+    for _ in range(MOST_STEPS):
+        sin, cos = np.sin(angle), np.cos(angle)
+        pull = (height - edge_mm * (lean * (1.0 - sin) + 1.0 - cos)) * steep + lean
+        step = (sin - cos * pull) / (cos + sin * pull + cos * edge_mm * (sin - lean * cos) * steep)
+        angle = np.clip(angle - step, 0.0, 0.5 * np.pi)
+        if not np.any(np.abs(step) > SETTLED):
+            break
+    place = -edge_mm * (1.0 - np.sin(angle))
+    before = -1.0 / steep - height / np.where(lean < 0.0, lean, -np.inf)
+    place = np.where((lean < 0.0) & (angle == 0.0), np.minimum(place, before), place)
+    return place, height + lean * place - edge_mm * (1.0 - np.cos(angle))
+
+
 def _root(excess: Callable[[float], float], low: float) -> float:
     """Return the angle up to a right one at which a function changes its sign (Illinois method)."""
     other, angle = low, math.pi / 2.0
@@ -238,16 +295,16 @@ def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:
 
 
 def _rectangle_drape(
-    x: Array, y: Array, half: tuple[float, float], edge: float, rounding: float
+    x: Array, y: Array, half: Sequence[Array], edge: float, rounding: float
 ) -> Array:
-    """Return the drape outside a rectangle for x, y >= 0; lengths in decay lengths."""
+    """Return the drape outside rectangles for x, y >= 0; lengths in decay lengths."""
     dx, dy = x - half[0], y - half[1]
     drape = corner_drape(dx, dy, edge=edge, rounding=rounding)
     # Reduction by the corners at the far ends of the two edges; none beside the edge itself.
     above = (dy > 0.0) & (x + half[0] < FAR_CORNER)
     beside = (dx > 0.0) & (y + half[1] < FAR_CORNER)
-    far_x = corner_drape(-x[above] - half[0], dy[above]) - np.exp(-dy[above])
-    far_y = corner_drape(dx[beside], -y[beside] - half[1]) - np.exp(-dx[beside])
+    far_x = corner_drape(-x[above] - half[0][above], dy[above]) - np.exp(-dy[above])
+    far_y = corner_drape(dx[beside], -y[beside] - half[1][beside]) - np.exp(-dx[beside])
     drape[above] += far_x
     drape[beside] += far_y
     return np.maximum(drape, 0.0)

@@ -29,8 +29,8 @@ MODEL_ERROR = 0.001
 """Error of the closed forms of the drape (near corners), as a share of the height. A finer scale of
 the residual would only exclude the edges, which determine the size."""
 RISE_ERROR = 0.005
-"""The same on a curved membrane, as a share of its rise across the face: where the membrane leaves
-a fillet changes along the edge."""
+"""The same on a curved membrane, as a share of its rise from corner to corner: the drape beside a
+corner is that of the nearest place."""
 EDGES_MM = (0.0, 0.1, 0.2, 0.35, 0.6, 1.0)
 """Fillets that are compared with the fitted one; larger ones are not fitted."""
 THINNED = 8
@@ -271,8 +271,11 @@ def _fit(
         scale = np.sqrt(weight * robust * clear / inflation) / sigma
         vector, jacobian, converged = _solve(problem, vector, scale)
         left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
-        rise = window.at_rest.height(model.outline(dict(zip(names, vector, strict=True))))
-        least = math.hypot(MODEL_ERROR * start["height_mm"], RISE_ERROR * float(np.ptp(rise)))
+        least = math.hypot(
+            MODEL_ERROR * start["height_mm"],
+            RISE_ERROR
+            * _rise(window.at_rest, model.corners(dict(zip(names, vector, strict=True)))),
+        )
         sigma = max(_robust_scale(left * np.sqrt(weight)), least)
         ratio = np.abs(left) * np.sqrt(weight) / (HUBER * sigma)
         robust = 1.0 / np.maximum(ratio, 1.0)
@@ -454,6 +457,11 @@ def _covariance(jacobian: Array, used: float, actual: float, priors: int) -> Arr
     data = jacobian[: len(jacobian) - priors]
     known = jacobian[len(jacobian) - priors :]
     return np.asarray(np.linalg.pinv(data.T @ data * (used / actual) + known.T @ known))
+
+
+def _rise(surface: Surface, places_mm: Array) -> float:
+    """Return how much a membrane rises from the lowest to the highest of (N, 2) places."""
+    return float(np.ptp(surface.height(places_mm))) if len(places_mm) else 0.0
 
 
 def _robust_scale(values: Array) -> float:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.measurement.drape import (
+    LEVEL,
+    Rise,
     ball_contact_radius_mm,
     ball_depth,
     cuboid_depth,
@@ -26,6 +28,8 @@ Values = Mapping[str, float]
 
 TYPICAL_DECAY_MM = 0.7
 """Start value of the fitted decay length."""
+TINY_MM = 1e-12
+"""Distances below this have no direction."""
 SMALLEST_SIZE_MM = 0.1
 """No fitted diameter or side is smaller."""
 
@@ -65,7 +69,7 @@ class IndenterModel:
         return self if surface.flat else replace(self, depth=partial(self.depth_on, surface))
 
 
-def _cylinder(values: Values, x_mm: Array, y_mm: Array) -> Array:
+def _cylinder(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
     return cylinder_depth(
         np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
         cylinder_radius_mm=values["diameter_mm"] / 2.0,
@@ -73,10 +77,11 @@ def _cylinder(values: Values, x_mm: Array, y_mm: Array) -> Array:
         decay_mm=values["drape_decay_mm"],
         edge_radius_mm=values["edge_radius_mm"],
         blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+        rise=rise,
     )
 
 
-def _cuboid(values: Values, x_mm: Array, y_mm: Array) -> Array:
+def _cuboid(values: Values, x_mm: Array, y_mm: Array, rise: Rise = LEVEL) -> Array:
     along, across = _turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
     return cuboid_depth(
         along,
@@ -87,6 +92,7 @@ def _cuboid(values: Values, x_mm: Array, y_mm: Array) -> Array:
         edge_radius_mm=values["edge_radius_mm"],
         blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
         corner_rounding=values["corner_rounding"],
+        rise=rise,
     )
 
 
@@ -172,8 +178,8 @@ def _ball_outline(values: Values) -> Array:
 
 
 def _face_on(
-    flat: Callable[[Values, Array, Array], Array],
-    nearest: Callable[[Values, Array, Array], tuple[Array, Array]],
+    flat: Callable[[Values, Array, Array, Rise], Array],
+    wall: Callable[[Values, Array, Array], tuple[Array, Array]],
     surface: Surface,
     values: Values,
     x_mm: Array,
@@ -181,36 +187,45 @@ def _face_on(
 ) -> Array:
     """Return the depth of a flat face in a curved membrane, of which it stays a plane in space.
 
-    In the contact, it is that on a flat membrane plus the rise of the undeformed one. Outside, both
-    obey the same linear equation, the rise with its value at the nearest point of the contact.
+    In the contact, it is that in a flat membrane plus the rise of the undeformed one. Outside, the
+    membrane leaves each place of the wall as the depth and its lean there demand.
     """
-    contact = _contact(values)
-    rim = np.stack(nearest(contact, x_mm, y_mm), axis=-1)
-    rise = surface.height(rim) - surface.height(np.array([values["x_mm"], values["y_mm"]]))
-    return flat(values, x_mm, y_mm) + rise * flat(contact, x_mm, y_mm)
+    rim, outwards = wall(values, x_mm, y_mm)
+    middle_mm = surface.height(np.array([values["x_mm"], values["y_mm"]]))
+    rise = Rise(
+        surface.height(np.stack([x_mm, y_mm], axis=-1)) - middle_mm,
+        surface.height(rim) - middle_mm,
+        (surface.slopes(rim) * outwards).sum(axis=-1),
+    )
+    return flat(values, x_mm, y_mm, rise)
 
 
-def _contact(values: Values) -> dict[str, float]:
-    """Return a face 1 mm deep with a sharp edge, as large as the contact: up to the fillet."""
-    steep = values["height_mm"] / values["drape_decay_mm"]
-    inset = values["edge_radius_mm"] * (1.0 - steep / math.hypot(steep, 1.0))
-    sizes = ("diameter_mm", "side_a_mm", "side_b_mm")
-    smaller = {key: values[key] - 2.0 * inset for key in sizes if key in values}
-    return {**values, **smaller, "height_mm": 1.0, "edge_radius_mm": 0.0}
+def _wall_of_circle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
+    """Return the nearest places (..., 2) of the wall, and the directions outwards there."""
+    middle = np.array([values["x_mm"], values["y_mm"]])
+    away = np.stack([x_mm, y_mm], axis=-1) - middle
+    outwards = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), TINY_MM)
+    return middle + 0.5 * values["diameter_mm"] * outwards, outwards
 
 
-def _nearest_in_circle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
-    x, y, radius = x_mm - values["x_mm"], y_mm - values["y_mm"], values["diameter_mm"] / 2.0
-    share = radius / np.maximum(np.hypot(x, y), radius)
-    return values["x_mm"] + share * x, values["y_mm"] + share * y
-
-
-def _nearest_in_rectangle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
-    half = 0.5 * values["side_a_mm"], 0.5 * values["side_b_mm"]
-    along, across = _turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
-    along, across = np.clip(along, -half[0], half[0]), np.clip(across, -half[1], half[1])
-    x, y = _turned(along, across, -values["yaw"])
-    return values["x_mm"] + x, values["y_mm"] + y
+def _wall_of_rectangle(values: Values, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
+    """Return the same for four walls."""
+    middle = np.array([values["x_mm"], values["y_mm"]])
+    half = 0.5 * np.array([values["side_a_mm"], values["side_b_mm"]])
+    turned = _turned(x_mm - middle[0], y_mm - middle[1], values["yaw"])
+    place = np.stack(turned, axis=-1)
+    nearest = np.clip(place, -half, half)
+    # From inside, straight to the wall that is nearest.
+    inside = (nearest == place).all(axis=-1, keepdims=True)
+    left = half - np.abs(place)
+    straight = (left <= left.min(axis=-1, keepdims=True)) * np.where(place < 0.0, -1.0, 1.0)
+    away = np.where(inside, straight, place - nearest)
+    rim = np.where(inside & (straight != 0.0), straight * half, nearest)
+    outwards = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), TINY_MM)
+    rim, outwards = (
+        np.stack(_turned(v[..., 0], v[..., 1], -values["yaw"]), axis=-1) for v in (rim, outwards)
+    )
+    return middle + rim, outwards
 
 
 def _ball_on(surface: Surface, values: Values, x_mm: Array, y_mm: Array) -> Array:
@@ -233,7 +248,7 @@ MODELS: Mapping[str, IndenterModel] = {
         _start_cylinder,
         lambda values: _circle(values, values["diameter_mm"] / 2.0),
         _no_corners,
-        partial(_face_on, _cylinder, _nearest_in_circle),
+        partial(_face_on, _cylinder, _wall_of_circle),
     ),
     "cuboid": IndenterModel(
         "cuboid",
@@ -242,7 +257,7 @@ MODELS: Mapping[str, IndenterModel] = {
         _start_cuboid,
         _rectangle,
         lambda values: _rectangle(values)[:-1],
-        partial(_face_on, _cuboid, _nearest_in_rectangle),
+        partial(_face_on, _cuboid, _wall_of_rectangle),
     ),
     "ball": IndenterModel(
         "ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline, _no_corners, _ball_on

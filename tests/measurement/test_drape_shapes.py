@@ -17,6 +17,8 @@ from gelpolight_core.measurement.drape import (
     cuboid_depth,
     cylinder_depth,
 )
+from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.surface import Surface
 
 Array = NDArray[np.float64]
 
@@ -126,4 +128,25 @@ def test_the_cuboid_agrees_with_a_numerical_solution_of_the_obstacle_problem() -
     assert abs(left[wall].mean()) < 0.002
     # Without the rounding of the corner this is 0.0045.
     assert abs(left[beyond_corner].mean()) < 0.002
+    assert np.sqrt(np.mean(left**2)) < 0.002
+
+
+def test_a_cylinder_on_a_slope_agrees_with_a_numerical_solution_of_the_obstacle_problem() -> None:
+    pitch, decay, edge, half = 0.025, 0.7, 0.15, 1.5
+    # The cylinder is 0.05 mm deep on one side, and 0.55 mm on the other.
+    cap = Surface("spherical_cap", 2.0, 26.0, (-6.0, 0.0))
+    x, y = np.meshgrid(pitch * (np.arange(320) - 160.0), pitch * (np.arange(160) + 0.5))
+    into = np.hypot(x, y) - half + edge
+    face = np.where(into < edge, -edge + np.sqrt(edge**2 - np.clip(into, 0.0, edge) ** 2), -9.0)
+    rise = cap.height(np.stack([x, y], axis=-1)) - cap.height(np.zeros(2))
+    numerical = obstacle_solution(0.3 + rise + face, pitch, decay)
+    values = {"x_mm": 0.0, "y_mm": 0.0, "diameter_mm": 2 * half, "height_mm": 0.3}
+    form = {"drape_decay_mm": decay, "edge_radius_mm": edge, "blur_mm2": 0.0}
+    left = MODELS["cylinder"].on(cap).depth({**values, **form}, x, y) - numerical
+    for side in (-1.0, 1.0):
+        wall = (y < 0.5) & (side * x > half - edge) & (side * x < half + 0.4)
+        # That the drape also spreads sideways, away from the deeper side, is left out. With one
+        # place where the membrane leaves, the shallow side would be off by 0.013 mm.
+        assert abs(left[wall].mean()) < 0.004
+        assert np.ptp(numerical[wall]) > 0.03
     assert np.sqrt(np.mean(left**2)) < 0.002
