@@ -22,6 +22,7 @@ from gelpolight_core.reflectance.gathered_light import (
     Receivers,
     Slab,
     Surface,
+    across,
     flat_light,
     gathered,
 )
@@ -82,6 +83,8 @@ def with_light_from_around(
             view.view,
             own.field * background,
         )
+        if not at_rest.flat:
+            field = field._replace(across=across(field.points_mm, view.view, view.pitch_mm))
         places, at, _ = drape(own.points_mm, own.ray_slope)
         place = view.index(own.points_mm)
         nearest = np.clip(np.round(place), 0, np.array(shape) - 1)

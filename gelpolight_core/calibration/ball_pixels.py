@@ -13,7 +13,7 @@ from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.near_light.maps import block_average, middles
 from gelpolight_core.reflectance.gathered_light import ratio_reflected
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
-from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.reflectance.surroundings import Field, view_directions
 from gelpolight_core.surface import FLAT, Surface
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ MOST_RATIO = 4.0
 
 @dataclass(frozen=True, slots=True)
 class CoarseView:
-    """The camera's rays over the whole field, on coarse nodes.
+    """The camera's rays over the whole field, on coarse nodes; also where it does not see.
 
     Attributes
     ----------
@@ -48,6 +48,8 @@ class CoarseView:
         Nodes of the calibration's grid to one of these, along an axis.
     surface : Surface
         The undeformed membrane.
+    field : Field, optional
+        Which nodes the camera sees; by default all.
     """
 
     points_mm: Array
@@ -57,6 +59,7 @@ class CoarseView:
     pitch_mm: float
     factor: int
     surface: Surface = FLAT
+    field: Field | None = None
 
     @classmethod
     def of(cls, table: ResamplingTable, reflecting: NDArray[np.bool_]) -> CoarseView:
@@ -66,10 +69,23 @@ class CoarseView:
         share = block_average(reflecting.astype(np.float32), factor)
         ray_slope = np.nan_to_num(block_average(table.ray_slope, factor)).astype(np.float64)
         x, y = (middles(axis, factor) for axis in (grid.x_mm, grid.y_mm))
-        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        pitch = factor * grid.pitch_mm
-        view = view_directions(ray_slope)
-        return cls(points, ray_slope.reshape(-1, 2), view, share, pitch, factor, table.surface)
+        field = Field.around(table.surface, x, y)
+        points = np.stack(np.meshgrid(field.x_mm, field.y_mm), axis=-1).reshape(-1, 2)
+        ray_slope, share = field.continued(ray_slope), field.filled(share) + field.unseen
+        return cls(
+            points,
+            ray_slope.reshape(-1, 2),
+            view_directions(ray_slope),
+            share,
+            factor * grid.pitch_mm,
+            factor,
+            table.surface,
+            field,
+        )
+
+    def whole(self, seen: Map) -> Map:
+        """Return values (rows, columns, ...) of the nodes that are seen for all; 0 elsewhere."""
+        return seen if self.field is None else self.field.filled(seen)
 
     def index(self, points_mm: Array) -> Array:
         """Return row and column (N, 2) of points (N, 2)."""
@@ -147,8 +163,8 @@ def gather_ball_pixels(
     grid = table.grid
     base = np.maximum(background, LEAST_VALUE)
     ratio = np.asarray(image / base, np.float32)
-    whole = block_average(usable.astype(np.float32), view.factor)[..., None] > 0.99
-    seen = np.minimum(block_average(ratio, view.factor), np.float32(MOST_RATIO))
+    whole = view.whole(block_average(usable.astype(np.float32), view.factor))[..., None] > 0.99
+    seen = view.whole(np.minimum(block_average(ratio, view.factor), np.float32(MOST_RATIO)))
     field = ratio_reflected(seen, whole, view.reflecting)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))

@@ -21,7 +21,7 @@ from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.parallel import in_parallel, usable_cores
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
-from gelpolight_core.reconstruction.near_light.from_around import LEVEL_NZ, surface_normals
+from gelpolight_core.reconstruction.near_light.from_around import LEVEL, surface_normals
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
 from gelpolight_core.reconstruction.near_light.maps import (
     LEAST_SHARE,
@@ -252,7 +252,7 @@ def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> 
     around = np.zeros_like(flat)
     if full.membrane.interreflection <= LEAST_SHARE:
         return around
-    tilted = surface.normals[..., 2] > LEVEL_NZ
+    tilted = surface.normals[..., 2] > -LEVEL
     leds, receivers = full.led_positions_mm, Receivers.on(surface, tilted)
     found = gathered(surface, receivers, leds, full.membrane, pitch_mm)
     around[tilted] = full.membrane.interreflection * found / flat[tilted]

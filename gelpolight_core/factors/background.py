@@ -68,12 +68,27 @@ def calibrate_factors(
         & (background < SATURATED).all(axis=2)
     )
     factors[~usable] = 0.0
-    return FactorResult(factors, usable, _judge(factors, usable, radiance.usable))
+    flat = table.surface.flat
+    return FactorResult(factors, usable, _judge(factors, usable, radiance.usable, flat))
 
 
-def _judge(factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_]) -> QualityTable:
+def _judge(
+    factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_], flat: bool
+) -> QualityTable:
     inside = factors[usable] if usable.any() else np.full((1, 3), np.nan, np.float32)
     spread = float((1.4826 * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max())
+    # On a curved membrane, whose light is not measured, gloss spreads the factors, too.
+    evenness = (
+        judge(
+            "factor_spread_percent",
+            tr("Reflectance factor, spread"),
+            100.0 * spread,
+            "%",
+            warn=15.0,
+            fail=40.0,
+            remedy=tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
+        ),
+    )
     return QualityTable(
         (
             judge(
@@ -81,15 +96,7 @@ def _judge(factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_]) -> Q
                 tr("Reflectance factor, median over all channels"),
                 float(np.median(inside)),
             ),
-            judge(
-                "factor_spread_percent",
-                tr("Reflectance factor, spread"),
-                100.0 * spread,
-                "%",
-                warn=15.0,
-                fail=40.0,
-                remedy=tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
-            ),
+            *(evenness if flat else ()),
             judge(
                 "membrane_unusable_percent",
                 tr("Dead share of the lit membrane"),

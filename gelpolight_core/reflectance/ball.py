@@ -47,7 +47,6 @@ def ball_depth_from_contact(
     radius_mm: float,
     *,
     decay_mm: float = TYPICAL_DECAY_MM,
-    curvature_per_mm: float = 0.0,
 ) -> float:
     """Return a ball's indentation depth from its contact radius.
 
@@ -61,14 +60,11 @@ def ball_depth_from_contact(
         Of the contact and of the ball.
     decay_mm : float, optional
         Decay length of the membrane.
-    curvature_per_mm : float, optional
-        Of the membrane at rest, positive where it bulges outwards.
     """
     a = min(contact_radius_mm, 0.98 * radius_mm)
     to_centre = np.sqrt(radius_mm**2 - a**2)
-    slope = a / to_centre + curvature_per_mm * a
-    ring_mm = slope * decay_mm * k0e(a / decay_mm) / k1e(a / decay_mm)
-    return float(radius_mm - to_centre + 0.5 * curvature_per_mm * a**2 + ring_mm)
+    ring_mm = a / to_centre * decay_mm * k0e(a / decay_mm) / k1e(a / decay_mm)
+    return float(radius_mm - to_centre + ring_mm)
 
 
 def contact_radius_from_depth(
@@ -76,16 +72,12 @@ def contact_radius_from_depth(
     radius_mm: float,
     *,
     decay_mm: float = TYPICAL_DECAY_MM,
-    curvature_per_mm: float = 0.0,
 ) -> float:
     """Return the contact radius at an indentation depth; inverse of ball_depth_from_contact."""
     limit = 0.98 * radius_mm
 
     def excess(a: float) -> float:
-        reached = ball_depth_from_contact(
-            a, radius_mm, decay_mm=decay_mm, curvature_per_mm=curvature_per_mm
-        )
-        return reached - depth_mm
+        return ball_depth_from_contact(a, radius_mm, decay_mm=decay_mm) - depth_mm
 
     if excess(limit) <= 0.0:
         return limit

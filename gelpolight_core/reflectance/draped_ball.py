@@ -9,44 +9,116 @@ from numpy.typing import NDArray
 from scipy.special import k0, k1
 
 from gelpolight_core.reflectance.ball import BallPose, contact_radius_from_depth
-from gelpolight_core.surface import FLAT, Surface
+from gelpolight_core.surface import FLAT, STEP_MM, Surface
 
 Array = NDArray[np.float64]
 ROUNDS = 6
-NEAR_MM = 1.0
-"""From how far the curvature of a membrane is taken."""
-AT_REST = 8.0
-"""Decay lengths from a ball at which a curved membrane is at rest."""
+TERMS, ANGLES = 7, 32
+"""Of the free membrane around a contact that is not round: a ball on a slope of 30 degrees is right
+to 0.1 um, with 5 terms to 1 um."""
+STEEPEST = 0.98
+"""Share of a ball's radius up to which the membrane may follow it."""
+AT_REST = 12.0
+"""Decay lengths from a contact at which a curved membrane is at rest to 1e-5 of the depth."""
 
 
-class Frame(NamedTuple):
-    """The membrane's tangent plane below a ball: there it is a ball on a flat membrane.
+class Drape(NamedTuple):
+    """A ball in a curved membrane: where they touch, and the free membrane around.
+
+    The membrane is the same elastic foundation as a flat one, and moves along z: where it is free,
+    ``decay^2 laplacian(w) = w``, so that w is the real part of the sum of ``a_m K_m(r / decay)
+    exp(i m phi)``; it leaves the ball tangentially.
 
     Attributes
     ----------
-    foot_mm : (3,)
-        Point of the membrane at rest that is nearest to the ball's middle.
-    axes : (3, 3)
-        Rows: two tangents, and the normal away from the camera.
-    curvature_per_mm : float
-        Mean of the membrane at rest there, positive where it bulges outwards.
+    pose : BallPose
+        The ball.
+    surface : Surface
+        The undeformed membrane.
+    decay_mm : float
+        Decay length of the membrane.
+    middle_mm : (2,)
+        Inside of the contact; r and phi are about it.
+    edge_mm : (`ANGLES`,)
+        Radius of the contact.
+    terms : (`TERMS`,) complex
+        The factors a_m.
     """
 
-    foot_mm: Array
-    axes: Array
-    curvature_per_mm: float
+    pose: BallPose
+    surface: Surface
+    decay_mm: float
+    middle_mm: Array
+    edge_mm: Array
+    terms: NDArray[np.complex128]
 
     @classmethod
-    def below(cls, middle_mm: Array, surface: Surface) -> Frame:
-        """Return the frame below a ball's middle (3,)."""
-        place = surface.nearest(middle_mm)
-        normal = -surface.normals(place)
-        along = np.array([normal[2], 0.0, -normal[0]]) / np.hypot(normal[0], normal[2])
-        axes = np.stack([along, np.cross(normal, along), normal])
-        near = place + NEAR_MM * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-        falls = surface.points(place) - surface.points(near)
-        curvature = float(np.mean(2.0 * (falls @ normal) / (falls**2).sum(axis=1)))
-        return cls(surface.points(place), axes, curvature)
+    def of(cls, pose: BallPose, surface: Surface, decay_mm: float) -> Drape:
+        """Return the drape of a ball."""
+        middle = pose.middle_mm(surface)
+        place = surface.nearest(middle)
+        sunk_mm = pose.radius_mm - float(np.linalg.norm(middle - surface.points(place)))
+        start = contact_radius_from_depth(sunk_mm, pose.radius_mm, decay_mm=decay_mm)
+        edge, terms = np.full(ANGLES, start), np.zeros(TERMS, np.complex128)
+        drape = cls(pose, surface, decay_mm, place, edge, terms)
+        out = np.exp(2j * np.pi * np.arange(ANGLES) / ANGLES)
+        for _ in range(ROUNDS):
+            # Newton's step: where the free membrane is as deep as the ball, its slope must be too.
+            at = place + (edge + STEP_MM * np.array([[-1.0], [0.0], [1.0]]))[..., None] * np.stack(
+                [out.real, out.imag], axis=-1
+            )
+            ball = drape.touching(at)
+            waves = drape.waves(at)[1:-1]
+            real = np.concatenate([waves.real, -waves[1:].imag])
+            found = np.linalg.lstsq(real[:, 1].T, ball[1], rcond=None)[0]
+            before, here, after = np.tensordot(found, real, 1) - ball
+            bend = np.maximum(before + after - 2.0 * here, STEP_MM**2 / decay_mm)
+            moved = 0.5 * STEP_MM * (before - after) / bend
+            edge = edge + np.clip(moved, -0.3 * edge, 0.3 * edge)
+            terms = found[:TERMS] + 1j * np.append(0.0, found[TERMS:])
+        return drape._replace(edge_mm=edge, terms=terms)
+
+    def touching(self, points_mm: Array) -> Array:
+        """Return the depth (...) of a membrane that touches the ball, at points (..., 2)."""
+        away = ((points_mm - self.pose.centre_mm) ** 2).sum(axis=-1)
+        root = np.sqrt(self.pose.radius_mm**2 - np.minimum(away, self._steepest))
+        return np.asarray(
+            self.surface.height(points_mm) - self.pose.middle_mm(self.surface)[2] + root
+        )
+
+    def waves(self, points_mm: Array) -> NDArray[np.complex128]:
+        """Return ``K_m(r / decay) exp(i m phi)`` for m from -1 to `TERMS`, at points (..., 2)."""
+        beside = (points_mm - self.middle_mm) / self.decay_mm
+        r = np.maximum(np.hypot(beside[..., 0], beside[..., 1]), 1e-6)
+        turn = (beside[..., 0] + 1j * beside[..., 1]) / r
+        bessel = [k1(r), k0(r), k1(r)]
+        for m in range(1, TERMS):
+            bessel.append(bessel[-2] + 2.0 * m / r * bessel[-1])
+        return np.asarray([b * turn**m for m, b in enumerate(bessel, -1)])
+
+    def at(self, points_mm: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return depth (N,), its slopes (N, 2), and whether it is on the ball, at points (N, 2)."""
+        x, y = (points_mm - self.middle_mm).T
+        angles = np.linspace(0.0, 2.0 * np.pi, ANGLES + 1)
+        r, edge = np.hypot(x, y), np.append(self.edge_mm, self.edge_mm[0])
+        on_ball = r < np.interp(np.arctan2(y, x) % (2.0 * np.pi), angles, edge)
+        depth, slopes = np.zeros(len(r)), np.zeros((len(r), 2))
+        ball = points_mm[on_ball] - self.pose.centre_mm
+        root = np.sqrt(self.pose.radius_mm**2 - np.minimum((ball**2).sum(1), self._steepest))
+        depth[on_ball] = self.touching(points_mm[on_ball])
+        slopes[on_ball] = self.surface.slopes(points_mm[on_ball]) - ball / root[:, None]
+        free = ~on_ball & (r < edge.max() + AT_REST * self.decay_mm)
+        waves = self.waves(points_mm[free])
+        depth[free] = (self.terms @ waves[1:-1]).real
+        # The derivatives along x + iy and x - iy raise and lower m.
+        up, down = self.terms @ waves[2:], self.terms @ waves[:-2]
+        slopes[free] = np.stack([(up + down).real, (up - down).imag], axis=-1)
+        slopes[free] /= -2.0 * self.decay_mm
+        return depth, slopes, on_ball
+
+    @property
+    def _steepest(self) -> float:
+        return float((STEEPEST * self.pose.radius_mm) ** 2)
 
 
 def draped_ball(
@@ -60,8 +132,7 @@ def draped_ball(
     """Return the point and normal where each ray meets a pressed ball or its drape.
 
     Inside the contact the membrane is the ball; outside it decays as on an elastic foundation,
-    ``w = w_a K0(r / decay) / K0(a / decay)``, and leaves the ball tangentially. On a curved
-    membrane, the same holds in the frame of its tangent plane below the ball.
+    ``w = w_a K0(r / decay) / K0(a / decay)`` for a flat membrane, and leaves the ball tangentially.
 
     Parameters
     ----------
@@ -85,38 +156,27 @@ def draped_ball(
         Whether the point is in the contact.
     """
     if surface.flat:
-        return _on_tangent_plane(points_mm - pose.centre_mm, ray_slope, pose, decay_mm, 0.0)
-    middle = pose.middle_mm(surface)
-    frame = Frame.below(middle, surface)
-    sunk_mm = pose.radius_mm - float((middle - frame.foot_mm) @ frame.axes[2])
-    from_foot = (surface.points(points_mm) - frame.foot_mm) @ frame.axes.T
-    rays = np.concatenate([ray_slope, -np.ones((len(ray_slope), 1))], axis=1) @ frame.axes.T
-    across = rays[:, :2] / -rays[:, 2:]
-    local = BallPose((0.0, 0.0), pose.radius_mm, sunk_mm)
-    beside = from_foot[:, :2] + from_foot[:, 2:] * across
-    seen, normals, on_ball = _on_tangent_plane(
-        beside, across, local, decay_mm, frame.curvature_per_mm
-    )
-    seen, normals = seen @ frame.axes + frame.foot_mm, normals @ frame.axes
-    # The drape has fallen by exp(-8) where the parabola is no longer the membrane.
-    at_rest = np.hypot(*beside.T) > pose.radius_mm + AT_REST * decay_mm
-    seen[at_rest] = surface.points(points_mm[at_rest])
-    normals[at_rest] = surface.normals(points_mm[at_rest])
-    return seen, normals, on_ball
+        return _on_flat(points_mm, ray_slope, pose, decay_mm)
+    drape, start = Drape.of(pose, surface, decay_mm), surface.height(points_mm)
+    along = np.zeros(len(points_mm))
+    for _ in range(ROUNDS):  # each round shrinks the error by slope times ray slope
+        at = points_mm + along[:, None] * ray_slope
+        along = start - surface.height(at) + drape.at(at)[0]
+    at = points_mm + along[:, None] * ray_slope
+    _, slopes, on_ball = drape.at(at)
+    slopes = surface.slopes(at) - slopes
+    normals = np.concatenate([slopes, np.full((len(at), 1), -1.0)], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.concatenate([at, (start - along)[:, None]], axis=1), normals, on_ball
 
 
-def _on_tangent_plane(
-    beside_mm: Array, ray_slope: Array, pose: BallPose, decay_mm: float, curvature: float
+def _on_flat(
+    points_mm: Array, ray_slope: Array, pose: BallPose, decay_mm: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the result of :func:`draped_ball` for rays through points (N, 2) from its centre.
-
-    The membrane at rest falls by half its curvature times the squared distance.
-    """
-    radius = pose.radius_mm
-    contact = contact_radius_from_depth(
-        pose.depth_mm, radius, decay_mm=decay_mm, curvature_per_mm=curvature
-    )
-    ring = pose.depth_mm - radius + np.sqrt(radius**2 - contact**2) - 0.5 * curvature * contact**2
+    """Return the result of :func:`draped_ball` for a flat membrane, in closed form."""
+    radius, beside_mm = pose.radius_mm, points_mm - pose.centre_mm
+    contact = contact_radius_from_depth(pose.depth_mm, radius, decay_mm=decay_mm)
+    ring = pose.depth_mm - radius + np.sqrt(radius**2 - contact**2)
     share = ring / k0(contact / decay_mm)
     x, y = np.ascontiguousarray(beside_mm.T)
     slope_x, slope_y = np.ascontiguousarray(ray_slope.T)
@@ -124,7 +184,7 @@ def _on_tangent_plane(
     def profile(r: Array) -> Array:
         depth = pose.depth_mm - radius + np.sqrt(radius**2 - np.minimum(r, contact) ** 2)
         free = r >= contact
-        depth[free] = share * k0(r[free] / decay_mm) + 0.5 * curvature * r[free] ** 2
+        depth[free] = share * k0(r[free] / decay_mm)
         return depth
 
     depth = np.full(len(beside_mm), 0.5 * pose.depth_mm)
@@ -134,7 +194,7 @@ def _on_tangent_plane(
     r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     free, inside = r >= contact, np.minimum(r, contact)
     slope = -inside / np.sqrt(radius**2 - inside**2)
-    slope[free] = curvature * r[free] - share / decay_mm * k1(r[free] / decay_mm)
+    slope[free] = -share / decay_mm * k1(r[free] / decay_mm)
     normals = np.concatenate([-slope[:, None] * away / r[:, None], -np.ones((len(r), 1))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return np.concatenate([away + pose.centre_mm, -depth[:, None]], axis=1), normals, ~free

@@ -32,13 +32,17 @@ NEAR = 1
 Light from farther away comes from the larger facets of the whole field: walls mirror even distant
 membrane."""
 
+STRIDE, GRAZING_MM, PLACING = 2, 0.02, 3
+"""Wide facets between those at which a line to a distant facet is compared with the surface, how
+far it may be beyond it, and rounds to find which facet is at a position."""
+
 _single = np.float32
 _0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
 _PER_PI = _single(1.0 / pi)
 _LEAST_VIEW, _LEAST_COSINE = _single(LEAST_VIEW), _single(LEAST_COSINE)
 _LEAST_FACING = _single(0.1)
 _NO_LIGHT = _single(1e-9)
-_TINY = _single(1e-6)
+_TINY, _GRAZING = _single(1e-6), _single(GRAZING_MM)
 _POINT, _NORMAL, _AREA, _LIGHT, _PER_LED = 0, 3, 6, 7, 6
 _PLANES = _LIGHT + 3 * _PER_LED
 _DOWN = (_POINT + 2, _NORMAL + 2, *(_LIGHT + _PER_LED * k + 2 for k in range(3)))
@@ -57,19 +61,20 @@ class Slab(NamedTuple):
     ----------
     thickness_mm : float
         As if it were all elastomer.
-    refractive_index : float
-        Refractive index of the elastomer.
+    refractive_index, lower_index : float
+        Of the elastomer, and of the layer that touches the air: the window, if there is one.
     """
 
     thickness_mm: float
     refractive_index: float
+    lower_index: float
 
     @classmethod
     def of(cls, stack: LayerStack) -> Slab:
         """Return the slab of a sensor's layers, of which the first is air."""
         layers = list(zip(stack.thicknesses_mm, stack.indices, strict=True))[1:]
         index = stack.indices[-1]
-        return cls(sum(t * index / n for t, n in layers), index)
+        return cls(sum(t * index / n for t, n in layers), index, layers[0][1])
 
 
 class Surface(NamedTuple):
@@ -82,12 +87,16 @@ class Surface(NamedTuple):
     seen : (rows, columns, 3)
         Light of each channel to the camera, in units of :meth:`Membrane.response` times z / r^3;
         0 where there is no membrane.
+    across : (rows, columns), optional
+        From :func:`across`; by default that of a flat membrane. Parts of a curved membrane see each
+        other, and what is pressed in between hides them.
     """
 
     points_mm: NDArray[np.floating]
     normals: NDArray[np.floating]
     view: NDArray[np.floating]
     seen: NDArray[np.floating]
+    across: NDArray[np.floating] | None = None
 
 
 class Receivers(NamedTuple):
@@ -111,6 +120,22 @@ class Receivers(NamedTuple):
         """Return some (rows, columns) of a surface's own facets."""
         place = np.stack(np.nonzero(where), axis=-1)
         return cls(surface.points_mm[where], surface.normals[where], surface.view[where], place)
+
+
+def across(
+    points_mm: NDArray[np.floating], view: NDArray[np.floating], side_mm: float
+) -> NDArray[np.floating]:
+    """Return the area of the rays through a facet, across them, over its side squared.
+
+    Parameters
+    ----------
+    points_mm, view : (rows, columns, 3)
+        As in :class:`Surface`; where the surface is along the rays matters little.
+    side_mm : float
+        Distance between facets.
+    """
+    down, along = np.gradient(points_mm, side_mm, axis=(0, 1))
+    return np.asarray((np.cross(down, along) * view).sum(axis=-1))
 
 
 def ratio_reflected(ratio: NDArray[np.floating], known: NDArray[np.bool_], reflecting: Map) -> Map:
@@ -150,14 +175,15 @@ def _facets(
     rows : (int, int), optional
         Tiles that are needed, first and last + 1; the others emit nothing.
     """
-    points, normals, view, seen = (np.ascontiguousarray(part, np.float32) for part in surface)
+    parts = (*surface[:4], -surface.view[..., 2] if surface.across is None else surface.across)
+    points, normals, view, seen, rays = (np.ascontiguousarray(p, np.float32) for p in parts)
     tiles = [-(-n // WIDE) for n in points.shape[:2]]
     made = np.zeros((*tiles, _PLANES, _TILE), np.float32)
     first, last = rows or (0, tiles[0])
     lobe = _single(membrane.gloss), _single(membrane.roughness**2)
     leds, area = np.asarray(leds_mm, np.float32), _single(side_mm**2)
     first, last = max(first, 0), min(last, tiles[0])
-    emit_rows(first, last, points, normals, view, seen, leds, lobe, area, made)
+    emit_rows(first, last, points, normals, view, seen, rays, leds, lobe, area, made)
     return made
 
 
@@ -204,15 +230,29 @@ def gathered(
     middle = _facets(wide, leds_mm, membrane, WIDE * side_mm)
     far = _facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
-    mirrored, index2 = far, None
+    mirrored, indices = far, None
     if slab is not None:
-        mirrored, index2 = _mirrored(far, slab.thickness_mm), _single(slab.refractive_index**2)
-    fields = (near, middle, far, mirrored)
+        mirrored = _mirrored(far, slab.thickness_mm)
+        indices = _single(slab.refractive_index**2), _single(slab.lower_index)
+    heights = None if surface.across is None else _heights(wide.points_mm, WIDE * side_mm)
+    others = (points, (near, middle, far, mirrored), gloss, indices, heights, result)
     if run is None:
-        gather_rows(0, len(points), points, fields, gloss, index2, result)
+        gather_rows(0, len(points), *others)
     else:
-        run(len(points), gather_rows, points, fields, gloss, index2, result)
+        run(len(points), gather_rows, *others)
     return result
+
+
+def _heights(points_mm: NDArray[np.floating], side_mm: float) -> tuple[Any, ...]:
+    """Return x and y of the first node, nodes per mm, and the heights at true positions."""
+    first = points_mm[0, 0, :2]
+    nodes = np.indices(points_mm.shape[:2]).astype(np.float32)[::-1]
+    moved = np.moveaxis((points_mm[..., :2] - first) / side_mm, -1, 0).astype(np.float32) - nodes
+    x, y = nodes
+    for _ in range(PLACING):
+        x, y = (n - cv2.remap(m, x, y, cv2.INTER_LINEAR) for n, m in zip(nodes, moved, strict=True))
+    height = cv2.remap(points_mm[..., 2].astype(np.float32), x, y, cv2.INTER_LINEAR)
+    return _single(first[0]), _single(first[1]), _single(1.0 / side_mm), height
 
 
 def _mirrored(sent: Map, depth_mm: float) -> Map:
@@ -245,7 +285,7 @@ def returned_to_flat(
         As in :func:`gathered`.
     """
     rows, columns = flat.shape[:2]
-    surface = Surface(points_mm, normals, view, flat)
+    surface = Surface(points_mm, normals, view, flat, across(points_mm, view, side_mm))
     step = 2 * WIDE
     where = np.zeros((rows, columns), bool)
     where[::step, ::step] = True
@@ -287,10 +327,11 @@ def flat_light(
 
 def widened(surface: Surface) -> Surface:
     """Return the surface on wide facets."""
-    points, normals, view, seen = (_means(part) for part in surface)
+    points, normals, view, seen = (_means(part) for part in surface[:4])
     for unit in (normals, view):
         unit /= np.linalg.norm(unit, axis=-1, keepdims=True)
-    return Surface(points, normals, view, seen)
+    rays = None if surface.across is None else _means(surface.across)
+    return Surface(points, normals, view, seen, rays)
 
 
 def _means(values: NDArray[np.floating]) -> Map:
@@ -300,19 +341,21 @@ def _means(values: NDArray[np.floating]) -> Map:
 
 
 @_whole
-def emit_rows(first, last, points, normals, view, seen, leds, gloss, area, made):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def emit_rows(first, last, points, normals, view, seen, rays, leds, gloss, area, made):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find the light that facets emit, for the rows of tiles `first` to `last`.
 
     Parameters
     ----------
     points, normals, view, seen : (rows, columns, 3) float32
         As in :class:`Surface`.
+    rays : (rows, columns) float32
+        `Surface.across`.
     leds : (3, 3) float32
         Sensor frame.
     gloss : (float, float)
         Share and squared roughness of the lobe.
     area : float
-        Of the flat membrane, for each facet.
+        Square of a facet's side.
     made : (tile rows, tile columns, planes, facets of a tile) float32
         Written: point, normal, area; for each LED its direction, the cosine to it, and the light
         that goes into the lobe and into the other directions.
@@ -325,8 +368,8 @@ def emit_rows(first, last, points, normals, view, seen, leds, gloss, area, made)
             for k in range(3):
                 to[_POINT + k, m], to[_NORMAL + k, m] = p[k], n[k]
             s = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
-            # Along its ray, a facet covers the same part of the flat membrane for any tilt.
-            to[_AREA, m] = area * -v[2] / max(s, _LEAST_FACING)
+            # Along its ray, a facet covers the same part of the membrane at rest for any tilt.
+            to[_AREA, m] = area * rays[i, j] / max(s, _LEAST_FACING)
             s = max(s, _LEAST_VIEW)
             for k in range(3):
                 x, y, z = leds[k, 0] - p[0], leds[k, 1] - p[1], leds[k, 2] - p[2]
@@ -356,10 +399,33 @@ def _lobe(c, s, between, a2):  # type: ignore[no-untyped-def]  # pragma: no cove
 
 
 @_part
-def _gather(sent, row, column, hole, p, n, v, s, gloss, index2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _is_seen(p, x, y, z, heights):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return 1 where a line from a point p to x, y and z stays inside of the elastomer, else 0."""
+    x0, y0, per_mm, height = heights
+    start, rise = ((p[0] - x0) * per_mm, (p[1] - y0) * per_mm), z - p[2]
+    along, down = (x - p[0]) * per_mm, (y - p[1]) * per_mm
+    count = int(max(abs(down), abs(along))) // STRIDE
+    for k in range(1, count):
+        t = _single(k) / _single(count)
+        x, y = start[0] + t * along, start[1] + t * down
+        i, j = min(max(int(y), 0), height.shape[0] - 2), min(max(int(x), 0), height.shape[1] - 2)
+        y, x = y - _single(i), x - _single(j)
+        up = height[i, j] + x * (height[i, j + 1] - height[i, j])
+        low = height[i + 1, j] + x * (height[i + 1, j + 1] - height[i + 1, j])
+        if p[2] + t * rise > up + y * (low - up) + _GRAZING:
+            return _0
+    return _1
+
+
+@_part
+def _gather(sent, row, column, hole, p, n, v, s, gloss, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the light of a tile via a point to the camera, without the facets around a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
     tile = sent[row, column]
+    if hiding is not None:
+        heights, seen = hiding
+        for j in range(_TILE):
+            seen[j] = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
     for j in range(_TILE):
         dx, dy, dz = tile[0, j] - p[0], tile[1, j] - p[1], tile[2, j] - p[2]
         short = _1 / sqrt(dx * dx + dy * dy + dz * dz + _TINY)
@@ -372,8 +438,11 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, index2):  # type: ignore
             up, along = row * WIDE + j // WIDE - hole[0], column * WIDE + j % WIDE - hole[1]
             beside = -NEAR <= up <= NEAR and -NEAR <= along <= NEAR
             part = _0 if beside else part
-        if index2 is not None:
-            part = part * _returned_share(-uz, index2)
+        if indices is not None:
+            part = part * _returned_share(-uz, indices)
+        if hiding is not None:
+            _, seen = hiding
+            part = part * seen[j]
         if gloss is None:
             r_sum += part * tile[12, j]
             g_sum += part * tile[18, j]
@@ -399,35 +468,36 @@ def _around(sent, place, hole, p, n, v, s, gloss):  # type: ignore[no-untyped-de
     r_sum, g_sum, b_sum = _0, _0, _0
     for i in range(max(place[0] - NEAR, 0), min(place[0] + NEAR + 1, sent.shape[0])):
         for j in range(max(place[1] - NEAR, 0), min(place[1] + NEAR + 1, sent.shape[1])):
-            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, None)
+            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, None, None)
             r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
     return r_sum, g_sum, b_sum
 
 
 @_part
-def _everywhere(sent, hole, p, n, v, s, gloss, index2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _everywhere(sent, hole, p, n, v, s, gloss, indices, hiding):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the light of all tiles, without a hole."""
     r_sum, g_sum, b_sum = _0, _0, _0
     for i in range(sent.shape[0]):
         for j in range(sent.shape[1]):
-            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, index2)
+            r, g, b = _gather(sent, i, j, hole, p, n, v, s, gloss, indices, hiding)
             r_sum, g_sum, b_sum = r_sum + r, g_sum + g, b_sum + b
     return r_sum, g_sum, b_sum
 
 
 @_part
-def _returned_share(up, index2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the share of light that the lower face returns, with cosine `up` to its normal."""
-    out2 = _1 - index2 * (_1 - up * up)
-    out = sqrt(out2 if out2 > _0 else _0)
-    index = sqrt(index2)
+def _returned_share(up, indices):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the share of light that the lower face returns, with cosine `up` in the elastomer."""
+    index2, index = indices
+    sine2 = index2 * (_1 - up * up)
+    out = sqrt(_1 - sine2 if sine2 < _1 else _0)
+    up = sqrt(_1 - sine2 / (index * index))
     across = (index * up - out) / (index * up + out)
     along = (index * out - up) / (index * out + up)
     return _HALF * (across * across + along * along)
 
 
 @_whole
-def gather_rows(first, last, at, fields, gloss, index2, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def gather_rows(first, last, at, fields, gloss, indices, heights, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Gather the light of the points `first` to `last`.
 
     Parameters
@@ -439,12 +509,16 @@ def gather_rows(first, last, at, fields, gloss, index2, result):  # type: ignore
         ones' mirror images in the lower face.
     gloss : (float, float) or None
         Share and squared roughness of the lobe.
-    index2 : float or None
-        Square of the elastomer's refractive index; None where no face returns light.
+    indices : (float, float) or None
+        Square of the elastomer's refractive index, and the index of the layer that touches the air;
+        None where no face returns light.
+    heights : (float, float, float, (rows, columns) float32) or None
+        From `_heights`; None where no part hides another one.
     result : (points, 3) float32
         Written: light to the camera, in the facets' unit.
     """
     near, middle, far, mirrored = fields
+    seen = np.empty(_TILE, np.float32)
     for m in range(first, last):
         p, n = (at[m, 0], at[m, 1], at[m, 2]), (at[m, 3], at[m, 4], at[m, 5])
         v = (at[m, 6], at[m, 7], at[m, 8])
@@ -455,9 +529,10 @@ def gather_rows(first, last, at, fields, gloss, index2, result):  # type: ignore
         b = row // WIDE**2, column // WIDE**2
         r0, g0, b0 = _around(near, a, None, p, n, v, s, gloss)
         r1, g1, b1 = _around(middle, b, a, p, n, v, s, gloss)
-        r2, g2, b2 = _everywhere(far, b, p, n, v, s, gloss, None)
+        hiding = None if heights is None else (heights, seen)
+        r2, g2, b2 = _everywhere(far, b, p, n, v, s, gloss, None, hiding)
         r0, g0, b0 = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
-        if index2 is not None:
-            r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, index2)
+        if indices is not None:
+            r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, indices, None)
             r0, g0, b0 = r0 + r1, g0 + g1, b0 + b1
         result[m, 0], result[m, 1], result[m, 2] = r0, g0, b0

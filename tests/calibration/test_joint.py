@@ -40,7 +40,7 @@ PIXELS = 120  # on the cap, and as many on the drape
 # This many neighbouring pixels have a common error; the square of the program's own factor.
 TOGETHER = 16
 # An index of 1 has no lower face that returns light.
-SLAB = Slab(14.0, 1.0)
+SLAB = Slab(14.0, 1.0, 1.0)
 NO_MAP = np.zeros((1, 1, 3), np.float32)
 SIDE_MM, NODES = 0.2, 96
 AXIS = SIDE_MM * (np.arange(NODES) - 0.5 * (NODES - 1))

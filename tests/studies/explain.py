@@ -199,7 +199,7 @@ def _light_at(maps: SensorMaps, truth: TrueDepth, solved: SolvedRegion) -> np.nd
     ratio = np.moveaxis(image.ratio, 0, -1).astype(np.float64)
     around = np.moveaxis(np.broadcast_to(solved.compared.fine.around, image.ratio.shape), 0, -1)
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
-    sent = ratio_reflected(ratio, usable[..., None], maps.reflecting) * flat
+    sent = ratio_reflected(ratio, usable[..., None], maps.reflecting[maps.field.seen]) * flat
     facets = Surface(view.points_mm, view.normals, view_directions(ray_slope), sent)
     thinned = np.zeros_like(usable)
     thinned[::2, ::2] = (usable & view.known & (slope >= BANDS[0]))[::2, ::2]

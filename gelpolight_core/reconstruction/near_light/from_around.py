@@ -27,6 +27,7 @@ from gelpolight_core.reflectance.gathered_light import (
     WIDE,
     Receivers,
     Surface,
+    across,
     gathered,
     ratio_reflected,
 )
@@ -34,8 +35,9 @@ from gelpolight_core.reflectance.surroundings import view_directions
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-LEVEL_NZ = -0.9986
-"""Below 3 degrees interreflected light changes little between nodes: some nodes are enough."""
+LEVEL = 0.9986
+"""Within 3 degrees of the membrane at rest, interreflected light changes little between nodes: some
+nodes are enough."""
 CLEAR = 0.015
 """A light is hidden if the slope between its ray and the surface is less than this: an LED of 0.2
 mm, 10 to 14 mm away, is then about half hidden."""
@@ -95,16 +97,22 @@ class FromAround:
         scale = self.maps.scale(COARSE)
         (top, left), (rows, columns) = region.at(1)
         at = np.s_[top : top + rows, left : left + columns]
-        whole = self._pressed(at, ratio, surface)
-        clear = self._clearance(whole, at, surface[0])
+        (above, _), (before, _) = self.maps.field.room
+        top, left = top + above, left + before
+        of_field = np.s_[top : top + rows, left : left + columns]
+        whole = self._pressed(at, of_field, ratio, surface)
+        clear = self._clearance(whole, of_field, surface[0])
         if reflectance <= LEAST_SHARE:
             return np.zeros_like(ratio), clear
         membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
-        tilted = whole.normals[at][..., 2] > LEVEL_NZ
+        assert self._flat is not None
+        up = self._flat.normals[of_field]
+        tilted = np.einsum("ijk,ijk->ij", whole.normals[of_field], up) < LEVEL
         some = np.zeros_like(tilted)
         some[WIDE // 2 :: WIDE, WIDE // 2 :: WIDE] = True
         receivers = [
-            Receivers.on(whole, _within(at, part, scale.kind.shape)) for part in (some, tilted)
+            Receivers.on(whole, _within(of_field, part, whole.seen.shape[:2]))
+            for part in (some, tilted)
         ]
         both = Receivers(*(np.concatenate(parts) for parts in zip(*receivers, strict=True)))
         found = gathered(
@@ -115,37 +123,44 @@ class FromAround:
         coarse = found[:split].reshape(len(np.unique(place[0])), -1, 3)
         reflected = np.asarray(cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR))
         reflected[tilted] = found[split:]
-        around = np.moveaxis(reflected, -1, 0) / -scale.flat[(slice(None), *at)] * reflectance
+        around = np.moveaxis(reflected, -1, 0) / -scale.flat[(slice(None), *at)]
+        own, here = membrane.interreflection, (slice(None), *at)
+        beyond = np.maximum(around - self.maps.returned[here] / own, 0.0)
+        around = own * around + (reflectance - own) * beyond
         around *= scale.kind[at] == 2
         return np.ascontiguousarray(around, np.float32), clear
 
     def _pressed(
-        self, at: tuple[slice, slice], ratio: Map, surface: tuple[Map, Map, Map]
+        self,
+        at: tuple[slice, slice],
+        of_field: tuple[slice, slice],
+        ratio: Map,
+        surface: tuple[Map, Map, Map],
     ) -> Surface:
         """Return the whole membrane with a region of it pressed."""
-        scale = self.maps.scale(COARSE)
+        scale, field = self.maps.scale(COARSE), self.maps.field
         if self._flat is None:
-            self._ray_slope = np.moveaxis(scale.rays[:2], 0, -1)
-            y, x = (
-                first + scale.pitch_mm * np.arange(n, dtype=np.float32)
-                for first, n in zip((scale.y_mm, scale.x_mm), scale.kind.shape, strict=True)
-            )
-            places = np.stack(np.meshgrid(x, y), axis=-1)
+            self._ray_slope = np.moveaxis(self.maps.rays_of_field, 0, -1).astype(np.float32)
+            places = np.stack(np.meshgrid(field.x_mm, field.y_mm), axis=-1)
             at_rest = self.maps.calibration.surface
             flat, up = at_rest.points(places), at_rest.normals(places)
-            light = -np.moveaxis(scale.flat, 0, -1) * self.maps.reflecting[..., None]
-            parts = (flat, up, view_directions(self._ray_slope.astype(np.float64)), light)
+            light = -np.moveaxis(self.maps.flat_of_field, 0, -1) * self.maps.reflecting[..., None]
+            to_camera = view_directions(self._ray_slope.astype(np.float64))
+            parts = (flat, up, to_camera, light)
             self._flat = Surface(*(part.astype(np.float32) for part in parts))
         depth, nx, ny = surface
-        points, normals, view, seen = (part.copy() for part in self._flat)
-        points[at][..., :2] += depth[..., None] * self._ray_slope[at]
-        points[at][..., 2] -= depth
+        points, normals, view, seen = (part.copy() for part in self._flat[:4])
+        points[of_field][..., :2] += depth[..., None] * self._ray_slope[of_field]
+        points[of_field][..., 2] -= depth
         down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
-        normals[at] = np.stack([nx, ny, down], axis=-1)
+        normals[of_field] = np.stack([nx, ny, down], axis=-1)
         known = (scale.kind[at] == 2)[..., None]
-        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), known, self.maps.reflecting[at])
-        seen[at] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
-        return Surface(points, normals, view, seen)
+        share = self.maps.reflecting[of_field]
+        reflected = ratio_reflected(np.moveaxis(ratio, 0, -1), known, share)
+        seen[of_field] = -np.moveaxis(scale.flat, 0, -1)[at] * reflected
+        curved = not self.maps.calibration.surface.flat
+        rays = across(points, view, scale.pitch_mm) if curved else None
+        return Surface(points, normals, view, seen, rays)
 
     def _clearance(self, whole: Surface, at: tuple[slice, slice], pressed_mm: Map) -> Map:
         """Return the least slope between the surface and the rays to the lights."""
@@ -160,7 +175,8 @@ class FromAround:
         seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR), np.float32)
         points = np.ascontiguousarray(whole.points_mm[at], np.float32)
         leds = self.maps.full.led_positions_mm.astype(np.float32)
-        origin = (single(scale.x_mm), single(scale.y_mm), single(scale.pitch_mm))
+        x, y = self.maps.field.x_mm[0], self.maps.field.y_mm[0]
+        origin = (single(x), single(y), single(scale.pitch_mm))
         return clearance(points, seen, origin, leds, self._workers)
 
 

@@ -21,7 +21,7 @@ from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers
 from gelpolight_core.reconstruction.solver import flat_normals
 from gelpolight_core.reflectance.gathered_light import Slab, flat_light
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
-from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.reflectance.surroundings import Field, view_directions
 from gelpolight_core.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.surface import FLAT, Surface
 
@@ -91,9 +91,34 @@ class SensorMaps:
 
     @cached_property
     def reflecting(self) -> Map:
-        """Share of each node that reflects light onto others, (rows, columns), coarsest scale."""
+        """Share of each node of the field that reflects light onto others, (rows, columns)."""
         found = reflects_light(self.calibration.table.valid, self.full.background)
-        return block_average(found.astype(np.float32), COARSE)
+        return (
+            self.field.filled(block_average(found.astype(np.float32), COARSE)) + self.field.unseen
+        )
+
+    @cached_property
+    def field(self) -> Field:
+        """The nodes of the coarsest scale, and those that the camera does not see."""
+        grid = self.calibration.table.grid
+        return Field.around(
+            self.calibration.surface, *(middles(axis, COARSE) for axis in (grid.x_mm, grid.y_mm))
+        )
+
+    @cached_property
+    def rays_of_field(self) -> Array:
+        """Slopes of its rays, (2, rows, columns)."""
+        table, field = self.calibration.table, self.field
+        slopes = np.moveaxis(block_average(table.ray_slope, COARSE), -1, 0).astype(np.float64)
+        seen = _whole(slopes, field.x_mm[field.seen[1]], field.y_mm[field.seen[0]])
+        return np.moveaxis(field.continued(np.moveaxis(seen, 0, -1)), -1, 0)
+
+    @cached_property
+    def flat_of_field(self) -> Map:
+        """`Scale.flat` of all its nodes."""
+        field, returned = self.field, (self.slab, self.reflecting)
+        axes, surface = (field.x_mm, field.y_mm), self.calibration.surface
+        return _flat_brightness(self.full, *axes, self.rays_of_field, surface, returned)
 
     @property
     def slab(self) -> Slab:
@@ -152,15 +177,14 @@ class SensorMaps:
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
             rest = rest_of(self.calibration.surface, x, y)
             return Scale(*position, flat, kind, coarse.rays, factor / COARSE, rest)
-        ray_slope = np.moveaxis(block_average(self.calibration.table.ray_slope, factor), -1, 0)
-        returned = (self.slab, self.reflecting)
+        seen = (slice(None), *self.field.seen)
         return sensor_scale(
             self.full,
             (x, y),
-            ray_slope,
+            self.rays_of_field[seen],
             kind,
             factor=factor,
-            returned=returned,
+            flat=np.ascontiguousarray(self.flat_of_field[seen]),
             surface=self.calibration.surface,
         )
 
@@ -172,7 +196,7 @@ def sensor_scale(
     kind: Any,
     *,
     factor: int,
-    returned: tuple[Slab, Map] | None = None,
+    flat: Map | None = None,
     surface: Surface = FLAT,
 ) -> Scale:
     """Return a scale with ray maps of its own.
@@ -189,8 +213,8 @@ def sensor_scale(
         As in :class:`Scale`.
     factor : int
         As in :class:`Scale`.
-    returned : (Slab, (rows, columns)), optional
-        The layers that reflect light from below, and the share of nodes that send it.
+    flat : (3, rows, columns) float32, optional
+        As in :class:`Scale`; by default that of direct light.
     surface : Surface, optional
         The undeformed membrane.
     """
@@ -202,7 +226,7 @@ def sensor_scale(
     for position, axis in ((2, 1), (4, 0)):
         for k in range(2):
             rays[position + k] = np.gradient(whole[k], pitch, axis=axis)
-    flat = _flat_brightness(full, x, y, whole, surface, returned)
+    flat = _flat_brightness(full, x, y, whole, surface) if flat is None else flat
     rest = rest_of(surface, x, y)
     return Scale(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0, rest)
 
