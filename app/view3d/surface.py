@@ -211,6 +211,6 @@ def surface_of(
         texture=texture,
         scale=scale,
         range_mm=range_mm,
-        axis=tr("depth (mm)") if heightmap.at_rest.flat else tr("depth from the boundary (mm)"),
+        axis=tr("depth (mm)") if heightmap.at_rest.flat else tr("\N{MINUS SIGN}height (mm)"),
         light=light,
     )
