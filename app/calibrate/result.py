@@ -290,7 +290,7 @@ class ResultStep(Step):
             text = tr("Failed: {titles}")
             return text.format(titles=", ".join(failed)), "fail"
         if made and poor:
-            return tr("Usable, with warnings: {n} figures.").format(n=poor), "warn"
+            return tr("Usable. Figures with a warning: {n}").format(n=poor), "warn"
         if made:
             text = tr("Passed: all {n} figures are within their limits.")
             return text.format(n=len(figures)), "pass"
