@@ -233,7 +233,8 @@ def gathered(
     mirrored, indices = far, None
     if slab is not None:
         mirrored = _mirrored(far, slab.thickness_mm)
-        indices = _single(slab.refractive_index**2), _single(slab.lower_index)
+        lower = slab.lower_index
+        indices = tuple(map(_single, (slab.refractive_index**2, lower, 1.0 / lower**2)))
     heights = None if surface.across is None else _heights(wide.points_mm, WIDE * side_mm)
     others = (points, (near, middle, far, mirrored), gloss, indices, heights, result)
     if run is None:
@@ -487,13 +488,14 @@ def _everywhere(sent, hole, p, n, v, s, gloss, indices, hiding):  # type: ignore
 @_part
 def _returned_share(up, indices):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the share of light that the lower face returns, with cosine `up` in the elastomer."""
-    index2, index = indices
+    index2, index, per_index2 = indices
     sine2 = index2 * (_1 - up * up)
     out = sqrt(_1 - sine2 if sine2 < _1 else _0)
-    up = sqrt(_1 - sine2 / (index * index))
-    across = (index * up - out) / (index * up + out)
-    along = (index * out - up) / (index * out + up)
-    return _HALF * (across * across + along * along)
+    up = sqrt(_1 - sine2 * per_index2)
+    # Both polarisations over one denominator: divisions are slow.
+    a, b, c, d = index * up - out, index * up + out, index * out - up, index * out + up
+    across, along, whole = a * d, c * b, b * d
+    return _HALF * (across * across + along * along) / (whole * whole)
 
 
 @_whole
@@ -509,9 +511,9 @@ def gather_rows(first, last, at, fields, gloss, indices, heights, result):  # ty
         ones' mirror images in the lower face.
     gloss : (float, float) or None
         Share and squared roughness of the lobe.
-    indices : (float, float) or None
-        Square of the elastomer's refractive index, and the index of the layer that touches the air;
-        None where no face returns light.
+    indices : (float, float, float) or None
+        Square of the elastomer's refractive index, the index of the layer that touches the air, and
+        one over its square; None where no face returns light.
     heights : (float, float, float, (rows, columns) float32) or None
         From `_heights`; None where no part hides another one.
     result : (points, 3) float32
