@@ -99,7 +99,8 @@ class Surface:
 
     def height(self, points_mm: Array) -> Array:
         """Return the height (...) in mm at points (..., 2) in mm."""
-        x, y = np.moveaxis(np.asarray(points_mm, np.float64) - self.axis_mm, -1, 0)
+        away = np.asarray(points_mm, np.float64) - self.axis_mm
+        x, y = away[..., 0], away[..., 1]
         found = SHAPES[self.shape](self, x, y)
         if self.rise_mm:
             found = found + self.rise_mm * (1.0 - (x**2 + y**2) / (0.5 * self.diameter_mm) ** 2)

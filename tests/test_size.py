@@ -35,7 +35,7 @@ MOST = {
     "app/view3d": 1547,
     "app/widgets": 968,
     "app/workspace": 537,
-    "gelpolight_core/.": 1991,
+    "gelpolight_core/.": 1992,
     "gelpolight_core/batch": 622,
     "gelpolight_core/calibration": 4136,
     "gelpolight_core/design": 316,
