@@ -80,11 +80,8 @@ class Drape(NamedTuple):
 
     def touching(self, points_mm: Array) -> Array:
         """Return the depth (...) of a membrane that touches the ball, at points (..., 2)."""
-        away = ((points_mm - self.pose.centre_mm) ** 2).sum(axis=-1)
-        root = np.sqrt(self.pose.radius_mm**2 - np.minimum(away, self._steepest))
-        return np.asarray(
-            self.surface.height(points_mm) - self.pose.middle_mm(self.surface)[2] + root
-        )
+        above = self.surface.height(points_mm) - self.pose.middle_mm(self.surface)[2]
+        return np.asarray(above + self._root(points_mm - self.pose.centre_mm))
 
     def waves(self, points_mm: Array) -> NDArray[np.complex128]:
         """Return ``K_m(r / decay) exp(i m phi)`` for m from -1 to `TERMS`, at points (..., 2)."""
@@ -104,9 +101,8 @@ class Drape(NamedTuple):
         on_ball = r < np.interp(np.arctan2(y, x) % (2.0 * np.pi), angles, edge)
         depth, slopes = np.zeros(len(r)), np.zeros((len(r), 2))
         ball = points_mm[on_ball] - self.pose.centre_mm
-        root = np.sqrt(self.pose.radius_mm**2 - np.minimum((ball**2).sum(1), self._steepest))
         depth[on_ball] = self.touching(points_mm[on_ball])
-        slopes[on_ball] = self.surface.slopes(points_mm[on_ball]) - ball / root[:, None]
+        slopes[on_ball] = self.surface.slopes(points_mm[on_ball]) - ball / self._root(ball)[:, None]
         free = ~on_ball & (r < edge.max() + AT_REST * self.decay_mm)
         waves = self.waves(points_mm[free])
         depth[free] = (self.terms @ waves[1:-1]).real
@@ -116,9 +112,10 @@ class Drape(NamedTuple):
         slopes[free] /= -2.0 * self.decay_mm
         return depth, slopes, on_ball
 
-    @property
-    def _steepest(self) -> float:
-        return float((STEEPEST * self.pose.radius_mm) ** 2)
+    def _root(self, away_mm: Array) -> Array:
+        """Return how far the ball (...) is from its equator, at places (..., 2) from its middle."""
+        square = np.minimum((away_mm**2).sum(axis=-1), (STEEPEST * self.pose.radius_mm) ** 2)
+        return np.asarray(np.sqrt(self.pose.radius_mm**2 - square))
 
 
 def draped_ball(

@@ -34,7 +34,8 @@ membrane."""
 
 STRIDE, GRAZING_MM, PLACING = 2, 0.02, 3
 """Wide facets between those at which a line to a distant facet is compared with the surface, how
-far it may be beyond it, and rounds to find which facet is at a position."""
+far it may be beyond it (as a ball of 1 mm radius bends between wide facets of 0.4 mm), and rounds
+to find which facet is at a position."""
 
 _single = np.float32
 _0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
@@ -88,8 +89,8 @@ class Surface(NamedTuple):
         Light of each channel to the camera, in units of :meth:`Membrane.response` times z / r^3;
         0 where there is no membrane.
     across : (rows, columns), optional
-        From :func:`across`; by default that of a flat membrane. Parts of a curved membrane see each
-        other, and what is pressed in between hides them.
+        From :func:`across`; by default that of a flat membrane. Parts of a curved membrane light
+        each other, unless a press between them blocks the light.
     """
 
     points_mm: NDArray[np.floating]
