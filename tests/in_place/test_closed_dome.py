@@ -17,7 +17,7 @@ from gelpolight_core.surface import Surface
 from tests.in_place.conftest import close_session
 
 MM_PER_PX = 0.0251
-"""Distance of the dome over the focal length, behind the elastomer: 38 mm less a third of 14."""
+"""By the calibration of the open sensor, fitted over 20 mm of the dome."""
 DOME = '\n[membrane]\nshape = "spherical_cap"\napex_height_mm = 2.0\ndiameter_mm = 26.0\n'
 
 

@@ -133,7 +133,7 @@ def test_the_cuboid_agrees_with_a_numerical_solution_of_the_obstacle_problem() -
 
 def test_a_cylinder_on_a_slope_agrees_with_a_numerical_solution_of_the_obstacle_problem() -> None:
     pitch, decay, edge, half = 0.025, 0.7, 0.15, 1.5
-    # The cylinder is 0.05 mm deep on one side, and 0.55 mm on the other.
+    # The cylinder is 0.07 mm deep on one side, and 0.48 mm on the other.
     cap = Surface("spherical_cap", 2.0, 26.0, (-6.0, 0.0))
     x, y = np.meshgrid(pitch * (np.arange(320) - 160.0), pitch * (np.arange(160) + 0.5))
     into = np.hypot(x, y) - half + edge
