@@ -54,7 +54,7 @@ MOST = {
     "gelpolight_core/reconstruction": 6048,
     "gelpolight_core/recording": 494,
     "gelpolight_core/records": 487,
-    "gelpolight_core/reflectance": 2519,
+    "gelpolight_core/reflectance": 2520,
     "gelpolight_core/report": 1341,
     "gelpolight_core/response": 398,
     "gelpolight_core/session": 1014,
