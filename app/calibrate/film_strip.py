@@ -32,7 +32,7 @@ from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from app.widgets.pixmaps import pixmap_of
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import decode_image
+from gelpolight_core.session.images import read_raw_image
 from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
@@ -198,18 +198,18 @@ class _Thumb(QStyledItemDelegate):
 def thumbnail(path: Path) -> QPixmap:
     """Return a thumbnail of an image file; an empty one if the file cannot be read."""
     try:
-        raw, _ = decode_image(path, cv2.IMREAD_REDUCED_COLOR_8)
+        rgb = read_raw_image(path).rgb
     except InputError:  # reported where the image is used
         empty = QPixmap(THUMB)
         empty.fill(Qt.GlobalColor.darkGray)
         return empty
     width, height = THUMB.toTuple()
-    factor = max(width / raw.shape[1], height / raw.shape[0])
-    size = max(round(factor * raw.shape[1]), width), max(round(factor * raw.shape[0]), height)
+    factor = max(width / rgb.shape[1], height / rgb.shape[0])
+    size = max(round(factor * rgb.shape[1]), width), max(round(factor * rgb.shape[0]), height)
     x, y = (size[0] - width) // 2, (size[1] - height) // 2
     kind = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_LINEAR
-    scaled = cv2.resize(raw, size, interpolation=kind)
-    return pixmap_of(scaled[y : y + height, x : x + width, ::-1])
+    scaled = cv2.resize(rgb, size, interpolation=kind)
+    return pixmap_of(scaled[y : y + height, x : x + width])
 
 
 def _capture_of(item: QListWidgetItem) -> Capture:

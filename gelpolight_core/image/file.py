@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image import opencv, tiff
 from gelpolight_core.io.reading import brief, missing_file, read_file, unreadable
 from gelpolight_core.translation import tr
 
@@ -45,6 +47,9 @@ class ImageFormat:
     loss : callable
         Takes the bytes and returns the standard deviation by which compression may have changed a
         value, in grey levels of 8 bit; 0 without loss.
+    decoded : callable
+        Takes the bytes and the path for a refusal, and returns the values, grey or RGB; ValueError
+        where they are damaged.
     """
 
     name: str
@@ -53,6 +58,7 @@ class ImageFormat:
     complete: Callable[[bytes], bool]
     sizes: Callable[[bytes], Iterator[tuple[int, int]]]
     loss: Callable[[bytes], float] = lambda _data: 0.0
+    decoded: Callable[[bytes, Path], NDArray[Any]] = lambda data, _path: opencv.decoded(data)
 
 
 def format_of(data: bytes) -> ImageFormat | None:
@@ -105,15 +111,8 @@ def _strange(data: bytes) -> str:
     return tr("The file is not an image")
 
 
-def decode_image(path: Path, flags: int | None = None) -> tuple[np.ndarray[Any, Any], float]:
-    """Return the values of an image file in OpenCV's order, and their loss as by its format.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    flags : int, optional
-        Flags for OpenCV, such as those for a reduced size.
+def decode_image(path: Path) -> tuple[NDArray[Any], float]:
+    """Return the values of an image file, grey or RGB, and their loss as by its format.
 
     Raises
     ------
@@ -121,9 +120,6 @@ def decode_image(path: Path, flags: int | None = None) -> tuple[np.ndarray[Any, 
         If the file is missing, is no image of :data:`FORMATS`, is not complete, or declares more
         pixels than any camera has.
     """
-    import cv2
-
-    flags = cv2.IMREAD_UNCHANGED if flags is None else flags
     data = read_image_file(path)
     form = format_of(data)
     if form is None:
@@ -137,18 +133,14 @@ def decode_image(path: Path, flags: int | None = None) -> tuple[np.ndarray[Any, 
                 path,
                 Remedy.SMALLER_IMAGES,
             )
-    raw = None
     if form.complete(data):
-        with suppress(cv2.error):
-            values = np.frombuffer(_upright(data), np.uint8)
-            raw = cv2.imdecode(values, flags | cv2.IMREAD_IGNORE_ORIENTATION)
-    if raw is None or (raw.ndim == 3 and raw.shape[2] not in (3, 4)):
-        raise InputError(
-            tr("The {format} image is not complete").format(format=form.name),
-            path,
-            Remedy.CAPTURE_AGAIN,
-        )
-    return raw, form.loss(data)
+        with suppress(ValueError):
+            return form.decoded(data, path), form.loss(data)
+    raise InputError(
+        tr("The {format} image is not complete").format(format=form.name),
+        path,
+        Remedy.CAPTURE_AGAIN,
+    )
 
 
 def read_image_file(path: Path) -> bytes:
@@ -166,10 +158,6 @@ def read_image_file(path: Path) -> bytes:
 
 
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"
-TIFF_HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_KINDS = {1: "B", 3: "H", 4: "I", 16: "Q"}
-_TAGS = {256: "width", 257: "height", 277: "samples", 322: "tile_width", 323: "tile_height"}
-_ORIENTATION = 274
 
 
 def _png_complete(data: bytes) -> bool:
@@ -195,45 +183,6 @@ def _png_sizes(data: bytes) -> Iterator[tuple[int, int]]:
         if kind in (b"IHDR", b"fcTL") and body + 8 <= len(data):
             yield struct.unpack_from(">II", data, body)
         position += 12 + length
-
-
-def _tiff_entries(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield tag, value and place of the value of the first directory, which is the one decoded."""
-    order, big = "<" if data[:2] == b"II" else ">", 43 in data[2:4]
-    offset, count, entry, room = ("Q", "Q", 20, 8) if big else ("I", "H", 12, 4)
-    try:
-        (position,) = struct.unpack_from(order + offset, data, 8 if big else 4)
-        (entries,) = struct.unpack_from(order + count, data, position)
-        position += struct.calcsize(order + count)
-        for at in range(position, min(position + entries * entry, len(data) - entry + 1), entry):
-            tag, kind = struct.unpack_from(order + "HH", data, at)
-            if kind in _KINDS:
-                place = at + entry - room
-                yield tag, struct.unpack_from(order + _KINDS[kind], data, place)[0], place
-    except (struct.error, OverflowError):
-        return  # truncated: the decoder will report it
-
-
-def _tiff_sizes(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yield the sizes of a TIFF and of its tiles; more than four samples count as wider."""
-    values: dict[str, int] = {}
-    for tag, value, _place in _tiff_entries(data):
-        if tag in _TAGS:
-            values[_TAGS[tag]] = max(value, values.get(_TAGS[tag], 0))
-    wider = max(1, -(-values.get("samples", 1) // 4))
-    yield wider * values.get("width", 0), values.get("height", 0)
-    yield wider * values.get("tile_width", 0), values.get("tile_height", 0)
-
-
-def _upright(data: bytes) -> bytes:
-    """Return a file whose decoder does not turn it; only that of TIFF does."""
-    if not data.startswith(TIFF_HEADS):
-        return data
-    for tag, value, place in _tiff_entries(data):
-        if tag == _ORIENTATION and value != 1:
-            one = (1).to_bytes(2, "little" if data[:2] == b"II" else "big")
-            return data[:place] + one + data[place + 2 :]
-    return data
 
 
 def _jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -303,7 +252,12 @@ WEBP_LOSS = 157.0 / math.sqrt(12.0)
 FORMATS = (
     ImageFormat("PNG", (".png",), lambda d: d.startswith(PNG_HEAD), _png_complete, _png_sizes),
     ImageFormat(
-        "TIFF", (".tif", ".tiff"), lambda d: d.startswith(TIFF_HEADS), lambda _d: True, _tiff_sizes
+        "TIFF",
+        (".tif", ".tiff"),
+        lambda d: d.startswith(tiff.HEADS),
+        lambda _d: True,
+        tiff.sizes,
+        decoded=lambda data, path: tiff.decoded(data, path, FILE_LIMIT),
     ),
     ImageFormat(
         "JPEG",

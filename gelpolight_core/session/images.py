@@ -281,11 +281,7 @@ def read_raw_image(path: Path) -> RawImage:
             tr("The image contains {kind} values").format(kind=raw.dtype), path, Remedy.PNG
         )
     grey = raw.ndim == 2
-    rgb = cv2.cvtColor(
-        raw if grey else np.ascontiguousarray(raw[:, :, :3]),
-        cv2.COLOR_GRAY2RGB if grey else cv2.COLOR_BGR2RGB,
-    )
-    return RawImage(rgb, grey, loss)
+    return RawImage(cv2.cvtColor(raw, cv2.COLOR_GRAY2RGB) if grey else raw, grey, loss)
 
 
 def require_colour(image: LinearImage, *, where: str) -> None:

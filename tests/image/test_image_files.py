@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+import tifffile
+from hypothesis import given
+from hypothesis import strategies as st
 
 from gelpolight_core.calibration.image_files import judge_image_files
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import FORMATS, SUFFIXES, files_in, format_of, names_of
+from gelpolight_core.image.tiff import decoded as tiff_decoded
 from gelpolight_core.session.images import read_image, read_raw_image
 from gelpolight_core.session.session import SensorData, Session
 
@@ -65,26 +71,134 @@ def test_the_loss_of_a_jpeg_grows_with_its_rounding() -> None:
 @pytest.mark.parametrize("orientation", [3, 6, 8])
 def test_no_image_is_turned(tmp_path: Path, orientation: int) -> None:
     """Neither by the tag of a TIFF nor by the Exif data of a JPEG."""
-    tiff = bytearray(encoded(".tiff"))
-    (place,) = struct.unpack_from("<I", tiff, 4)
+    turned = bytearray(encoded(".tiff"))
+    (place,) = struct.unpack_from("<I", turned, 4)
     entries = [
-        tiff[at : at + 12]
-        for at in range(place + 2, place + 2 + 12 * tiff[place], 12)
-        if struct.unpack_from("<H", tiff, at)[0] != 274
+        turned[at : at + 12]
+        for at in range(place + 2, place + 2 + 12 * turned[place], 12)
+        if struct.unpack_from("<H", turned, at)[0] != 274
     ]
     entries.append(bytearray(struct.pack("<HHIHH", 274, 3, 1, orientation, 0)))
     entries.sort(key=lambda entry: struct.unpack_from("<H", entry)[0])
-    tiff[4:8] = struct.pack("<I", len(tiff))
-    tiff += struct.pack("<H", len(entries)) + b"".join(entries) + bytes(4)
+    turned[4:8] = struct.pack("<I", len(turned))
+    turned += struct.pack("<H", len(entries)) + b"".join(entries) + bytes(4)
     body = b"Exif\0\0II*\0" + struct.pack("<IHHHIHHI", 8, 1, 274, 3, 1, orientation, 0, 0)
     jpeg = encoded(".jpg")
     jpeg = jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(body) + 2) + body + jpeg[2:]
-    for name, data in (("a.tif", bytes(tiff)), ("a.jpg", jpeg)):
+    for name, data in (("a.tif", bytes(turned)), ("a.jpg", jpeg)):
         (tmp_path / name).write_bytes(data)
         rgb = read_raw_image(tmp_path / name).rgb
         assert rgb.shape == (24, 40, 3)
         assert int(rgb[3, 35, 0]) > int(rgb[3, 5, 0]) + 60
         assert int(rgb[20, 3, 1]) > int(rgb[3, 3, 1]) + 60
+
+
+def tiff(
+    values: np.ndarray, *, together: bool = True, order: str = "<", pages: int = 1, **options: Any
+) -> bytes:
+    """Return a TIFF of values (rows, columns, channels); further pages are upside down."""
+    planes = values if together else np.moveaxis(values, 2, 0)
+    planes = planes if values.shape[2] > 1 else values[..., 0]
+    colour = "rgb" if values.shape[2] >= 3 else "minisblack"
+    form = {"planarconfig": "contig" if together else "separate"} if values.shape[2] > 1 else {}
+    file = io.BytesIO()
+    with tifffile.TiffWriter(file, byteorder=order) as out:
+        for page in range(pages):
+            image = planes[:: -1 if page else 1]
+            out.write(image, photometric=colour, metadata=None, **form, **options)
+    return file.getvalue()
+
+
+@given(
+    kind=st.sampled_from([np.uint8, np.uint16]),
+    shape=st.tuples(st.integers(2, 40), st.integers(2, 40), st.integers(1, 4)),
+    together=st.booleans(),
+    order=st.sampled_from("<>"),
+    packed=st.sampled_from([{}, {"compression": "zlib"}, {"compression": "zlib", "predictor": 2}]),
+    parts=st.sampled_from([{}, {"rowsperstrip": 3}, {"tile": (16, 32)}]),
+    orientation=st.integers(1, 8),
+)
+def test_a_tiff_of_every_form_has_the_values_of_its_first_page(
+    tmp_path_factory: pytest.TempPathFactory,
+    kind: type[np.generic],
+    shape: tuple[int, int, int],
+    together: bool,
+    order: str,
+    packed: dict[str, Any],
+    parts: dict[str, Any],
+    orientation: int,
+) -> None:
+    values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, shape, kind, endpoint=True)
+    turned = [(274, 3, 1, orientation, True)]
+    path = tmp_path_factory.getbasetemp() / "form.tif"
+    data = tiff(
+        values, together=together, pages=2, order=order, extratags=turned, **packed, **parts
+    )
+    path.write_bytes(data)
+    raw = read_raw_image(path)
+    assert raw.grey is (values.shape[2] < 3)
+    assert raw.rgb.dtype == values.dtype
+    assert np.array_equal(
+        raw.rgb, np.repeat(values[..., :1], 3, 2) if raw.grey else values[..., :3]
+    )
+    path.write_bytes(data[: len(data) // 3])
+    with pytest.raises(InputError, match="TIFF image is not complete"):
+        read_raw_image(path)
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("way", [1, 5, 8, 32773])
+def test_a_tiff_of_every_common_compression_is_read(
+    tmp_path: Path, kind: type[np.generic], way: int
+) -> None:
+    """Without packages that tifffile would need for LZW."""
+    values = np.random.default_rng(0).integers(0, 256, (9, 13, 3)).astype(kind)
+    path = tmp_path / "image.tif"
+    cv2.imwrite(str(path), values[..., ::-1], [cv2.IMWRITE_TIFF_COMPRESSION, way])
+    assert np.array_equal(read_raw_image(path).rgb, values)
+
+
+def with_tag(data: bytes, tag: int, value: int) -> bytes:
+    """Return a TIFF with another value of a tag."""
+    with tifffile.TiffFile(io.BytesIO(data)) as file:
+        place = file.pages.first.tags[tag].valueoffset
+    return data[:place] + struct.pack("<H", value) + data[place + 2 :]
+
+
+VALUES = np.random.default_rng(0).integers(0, 256, (9, 13, 5))
+WHITE_IS_ZERO = with_tag(tiff(VALUES[..., :1].astype(np.uint16)), 262, 0)
+
+
+def test_a_tiff_that_counts_from_white_is_inverted(tmp_path: Path) -> None:
+    (tmp_path / "i.tif").write_bytes(WHITE_IS_ZERO)
+    assert np.array_equal(read_raw_image(tmp_path / "i.tif").rgb[..., 0], 65535 - VALUES[..., 0])
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (tiff(VALUES[..., :3].astype(np.float32)), "float32 values"),
+        (tiff(VALUES[..., :1].astype(np.int16)), "int16 values"),
+        (tiff(VALUES.astype(np.uint8)), "5 x NONE CONTIG uint8 values"),
+        (
+            with_tag(tiff(VALUES[..., :3].astype(np.uint16), together=False), 259, 5),
+            "LZW SEPARATE uint16 values",
+        ),
+    ],
+)
+def test_a_tiff_of_another_form_is_refused_by_its_form(
+    tmp_path: Path, data: bytes, reason: str
+) -> None:
+    (tmp_path / "i.tif").write_bytes(data)
+    with pytest.raises(InputError, match=reason):
+        read_raw_image(tmp_path / "i.tif")
+
+
+def test_a_tiff_takes_no_more_memory_than_an_image(tmp_path: Path) -> None:
+    data = tiff(np.zeros((2000, 2000, 1), np.uint8), compression="zlib", rowsperstrip=2000)
+    assert tiff_decoded(data, tmp_path, 4_000_000).shape == (2000, 2000)
+    with pytest.raises(ValueError, match="too large"):
+        tiff_decoded(data, tmp_path, 3_999_999)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import fuzz_mutations as spoil
 import numpy as np
+import tifffile
 
 from app.command_line.tool_arguments import read_tools
 from app.services.settings import Settings
@@ -207,11 +208,17 @@ def _encoded(end: str) -> tuple[bytes, ...]:
 
 def _tiffs() -> tuple[bytes, ...]:
     light = np.random.default_rng(0).integers(0, 255, (10, 12, 3))
-    return tuple(
+    found = [
         cv2.imencode(".tif", light.astype(kind), [cv2.IMWRITE_TIFF_COMPRESSION, way])[1].tobytes()
         for kind in (np.uint8, np.uint16, np.float32)
         for way in (1, 5, 8)
-    )
+    ]
+    for options in ({"byteorder": ">"}, {"tile": (16, 16), "compression": "zlib"}):
+        file = io.BytesIO()
+        planes = np.moveaxis(light, 2, 0).astype(np.uint16)
+        tifffile.imwrite(file, planes, photometric="rgb", planarconfig="separate", **options)
+        found.append(file.getvalue())
+    return tuple(found)
 
 
 def _records(folder: Path) -> tuple[bytes, ...]:

@@ -1,0 +1,148 @@
+"""TIFF images: the first page of a file, decoded by tifffile.
+
+OpenCV decodes what tifffile needs other packages for. OpenCV 5.0.0.93 mixes up separate planes of
+16 bit without an error.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import math
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.image import opencv
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from tifffile import TiffPage
+
+HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+# What it finds wrong in a file is reported once, by the refusal.
+logging.getLogger("tifffile").setLevel(logging.CRITICAL)
+_UNCOMPRESSED, _DEFLATE = 1, (8, 32946)
+_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB = 0, 1, 2
+_DEFLATE_RATIO = 1032
+"""Most bytes that one byte of Deflate stands for (zlib, "Maximum Compression Factor")."""
+_ORIENTATION = 274
+_TOGETHER = 1
+
+
+@contextmanager
+def _first_page(data: bytes) -> Iterator[TiffPage]:
+    """Open the first page; ValueError wherever the file turns out to be damaged."""
+    import tifffile
+
+    try:
+        with tifffile.TiffFile(io.BytesIO(data)) as file:
+            page = file.pages.first
+            if not isinstance(page, tifffile.TiffPage):
+                raise ValueError("no page")
+            yield page
+    except (
+        LookupError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        NotImplementedError,
+        OSError,
+        struct.error,
+        zlib.error,
+    ) as error:
+        raise ValueError(str(error)) from error
+
+
+def sizes(data: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the sizes of the page and of its tiles; more than four samples count as wider."""
+    try:
+        with _first_page(data) as page:
+            wider = -(-int(page.samplesperpixel) // 4)
+            page_size = wider * int(page.imagewidth), int(page.imagelength) * int(page.imagedepth)
+            tile_size = wider * int(page.tilewidth), int(page.tilelength) * int(page.tiledepth)
+    except ValueError:
+        return  # reported when it is decoded
+    yield page_size
+    yield tile_size
+
+
+def decoded(data: bytes, path: Path, most_bytes: int) -> NDArray[Any]:
+    """Return the first page as (rows, columns) grey or (rows, columns, 3) RGB values, not turned.
+
+    Parameters
+    ----------
+    data : bytes
+        Content of the file, whose :func:`sizes` have been judged.
+    path : Path
+        Named in a refusal.
+    most_bytes : int
+        What a part of an image may need when it is unpacked.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged.
+    InputError
+        If nothing here reads its form.
+    """
+    with _first_page(data) as page:
+        _refuse_missing(page, data, most_bytes)
+        kind, samples = page.dtype, page.samplesperpixel
+        separate = samples > 1 and page.planarconfig != _TOGETHER
+        if kind in (bool, np.uint8, np.uint16) and samples <= 4:
+            if _is_plain(page):
+                whole = page.asarray(squeeze=False, maxworkers=1)
+                values = np.moveaxis(whole[:, 0, :, :, 0], 0, -1) if separate else whole[0, 0]
+                if page.photometric == _WHITE_IS_ZERO:
+                    values = ~values
+                return np.ascontiguousarray(values[..., :3] if samples > 2 else values[..., 0])
+            if kind != np.uint16 or not separate:
+                return opencv.decoded(_upright(data, page))
+        form = " ".join(getattr(t, "name", str(t)) for t in (page.compression, page.planarconfig))
+        raise InputError(
+            tr("The image contains {kind} values").format(kind=f"{samples} x {form} {kind}"),
+            path,
+            Remedy.PNG,
+        )
+
+
+def _is_plain(page: TiffPage) -> bool:
+    """Return whether tifffile decodes a page of whole bytes without further packages."""
+    return (
+        page.bitspersample in (8, 16)
+        and page.compression in (_UNCOMPRESSED, *_DEFLATE)
+        and page.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB)
+        and page.fillorder == 1
+    )
+
+
+def _refuse_missing(page: TiffPage, data: bytes, most_bytes: int) -> None:
+    """Refuse a page that lacks strips or tiles, which tifffile leaves black, or one too large."""
+    places = list(zip(page.dataoffsets, page.databytecounts, strict=False))
+    if len(places) < math.prod(page.chunked):
+        raise ValueError("strips are missing")
+    for place, count in places:
+        if not (0 < place and 0 < count and place + count <= len(data)):
+            raise ValueError("a strip is missing")
+        if page.compression in _DEFLATE and _DEFLATE_RATIO * count > most_bytes:
+            unpacking = zlib.decompressobj()
+            unpacking.decompress(data[place : place + count], most_bytes)
+            if unpacking.unconsumed_tail:
+                raise ValueError("a strip is too large")
+
+
+def _upright(data: bytes, page: TiffPage) -> bytes:
+    """Return a file that OpenCV does not turn."""
+    if (tag := page.tags.get(_ORIENTATION)) is None:
+        return data
+    size = tag.valuebytecount
+    one = (1).to_bytes(size, "little" if data[:2] == b"II" else "big")
+    return data[: tag.valueoffset] + one + data[tag.valueoffset + size :]
