@@ -211,7 +211,7 @@ def _mapping(results: Sequence[Press]) -> Characteristic:
     known = [
         (complex(*press.position_mm), complex(*press.measurement.centre_mm), press.position_sd_mm)
         for press in results
-        if press.measurement is not None and math.isfinite(press.position_sd_mm)
+        if press.measurement is not None and press.position_sd_mm is not None
     ]
     missing = LEAST_POSITIONS - len(known)
     if missing > 0:

@@ -45,8 +45,8 @@ class Press:
         Position on the sensor, and number of the repeat; empty if the file does not state it.
     position_mm : (float, float)
         Where a protocol wants its middle, (x, y) in the sensor frame, or where it is stated to be.
-    position_sd_mm : float
-        Standard deviation of a stated position along each axis; NaN: it is not known.
+    position_sd_mm : float or None
+        Standard deviation of a stated position along each axis; None: it is not known.
     yaw_deg : float
         Rotation of a cuboid, from x to y, in a protocol.
     outcome : Measurement or str
@@ -59,7 +59,7 @@ class Press:
     repeat: str = ""
     position_mm: tuple[float, float] = (0.0, 0.0)
     yaw_deg: float = 0.0
-    position_sd_mm: float = math.nan
+    position_sd_mm: float | None = None
     outcome: Measurement | str = field(default="", compare=False)
 
     @property

@@ -99,7 +99,7 @@ def test_the_mapping_deviation_is_that_of_the_one_shifted_position(tmp_path: Pat
     found = by_key(results)["mapping_deviation_xy_um"]
     # A sixth of the shift goes into the translation.
     assert found.value == pytest.approx(50.0, abs=2.0) and found.expanded > 10.0
-    assert "4 " in by_key([replace(results[0], position_sd_mm=math.nan)])[found.key].needed
+    assert "4 " in by_key([replace(results[0], position_sd_mm=None)])[found.key].needed
     (tmp_path / "truth.csv").write_text(lines[0] + "\n0.png,cylinder,5,1,nan,2,0.01")
     with pytest.raises(InputError, match="x_mm"):
         read_truth(tmp_path)
