@@ -176,7 +176,7 @@ class OpenFake:
         self._camera.closed += 1
 
 
-def eventually(holds: Callable[[], Any], *, within_s: float = 20.0) -> Any:
+def eventually(holds: Callable[[], Any], *, within_s: float = 60.0) -> Any:
     """Wait until something is true, and return it."""
     limit = time.monotonic() + within_s
     while time.monotonic() < limit:

@@ -65,7 +65,7 @@ class Forks:
         trace: TracebackType | None,
     ) -> None:
         """End the process that the copies are made of."""
-        self._process.communicate(timeout=30.0)
+        self._process.communicate(timeout=600.0)
 
     def lines_until_killed(
         self, arguments: Sequence[str], folder: Path, *, seed: int, longest_s: float

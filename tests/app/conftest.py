@@ -19,6 +19,7 @@ import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThread, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
+from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
 from app.context.context import AppContext
@@ -31,7 +32,14 @@ from gelpolight_core.reconstruction.threads import THREAD_NAME as ROWS_THREAD
 
 # tqdm's monitor lives as long as the process; numba and its kind start no Python threads.
 LASTING_THREADS = ("TMonitor",)
-GRACE_S = 20.0  # on a busy machine a thread takes long to end
+# What is waited for may be compiled first, on a busy machine; only a failing test waits so long.
+GRACE_S, WAIT_MS = 60.0, 300_000
+for wait in (
+    QtBot.waitActive, QtBot.waitCallback, QtBot.waitExposed, QtBot.waitSignal, QtBot.waitSignals,
+    QtBot.waitUntil,
+):  # fmt: skip
+    assert wait.__kwdefaults__["timeout"]
+    wait.__kwdefaults__["timeout"] = WAIT_MS
 
 
 @pytest.fixture(scope="session")

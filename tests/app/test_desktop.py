@@ -48,7 +48,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 
 def test_the_window_is_up_before_the_numerical_libraries() -> None:
     process = start()
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 0, err
     assert out.strip() == "[]"
 
@@ -62,7 +62,7 @@ def test_a_request_to_end_closes_the_window_and_keeps_its_settings(
     assert process.stdout.readline()
     time.sleep(0.2)
     process.send_signal(number)
-    assert process.wait(timeout=10) == 0
+    assert process.wait(timeout=600) == 0
     process.communicate()
     settings = list(Path(os.environ["XDG_CONFIG_HOME"]).rglob("desktop.ini"))
     assert len(settings) == 1

@@ -28,7 +28,7 @@ def test_nothing_is_cut_in_german_at_twice_the_scale(tmp_path: Path) -> None:
     }
     done = subprocess.run(
         [sys.executable, str(HERE / "layout_walk.py"), str(tmp_path)],
-        env=environment, capture_output=True, text=True, timeout=300,
+        env=environment, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == ["2.0"]

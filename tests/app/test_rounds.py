@@ -94,7 +94,7 @@ def test_many_rounds_leave_no_widget_thread_or_memory(tmp_path: Path) -> None:
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
     )
     assert (done.returncode, done.stderr) == (0, "")
     left = json.loads(done.stdout)

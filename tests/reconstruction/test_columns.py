@@ -53,5 +53,5 @@ def test_threads_end_with_their_owner(owner: object) -> None:
     del kept
     gc.collect()
     for thread in started:
-        thread.join(10.0)
+        thread.join(60.0)
         assert not thread.is_alive()

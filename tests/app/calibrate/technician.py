@@ -23,7 +23,7 @@ from gelpolight_core.calibration.project import Project
 
 RATE_HZ = 60.0
 # Much longer than a busy machine needs; only a failing test waits so long.
-WAIT_MS, REST_MS = 60_000, 300_000
+WAIT_MS = 300_000
 
 
 def read_rgb(path: Path) -> NDArray[Any]:
@@ -109,7 +109,7 @@ class Technician:
             previews = self.page.findChildren(Preview)
             return not (self.wizard.model.busy or any(preview.busy for preview in previews))
 
-        self._qtbot.waitUntil(at_rest, timeout=REST_MS)
+        self._qtbot.waitUntil(at_rest, timeout=WAIT_MS)
 
     def until(self, what: Callable[[], object]) -> None:
         """Wait until a condition is true."""

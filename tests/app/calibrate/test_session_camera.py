@@ -18,7 +18,7 @@ from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.session.session import read_session
 
-WAIT_MS = 60_000
+WAIT_MS = 300_000
 TEXTS = {"name": "C310", "identity": "x", "control.gain": "3"}
 Made = Callable[[], Project]
 

@@ -72,7 +72,7 @@ def test_captures_do_not_wait_for_a_computation(
     from app.services.jobs import Job
 
     def work(_progress: object) -> None:
-        technician_waits.wait(20.0)
+        technician_waits.wait(60.0)
 
     technician_waits = threading.Event()
     technician.wizard.model.jobs.submit(Job("Long work", work, lambda _: release.append(True)))

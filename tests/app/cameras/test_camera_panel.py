@@ -262,7 +262,7 @@ def test_camera_settings_are_stored_without_a_session(
     info = context.cameras.infos()[0]
     stream = Stream(info.open())
     stream.start()
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     stream.stop()
     assert fake.settings["exposure_ms"].value == 8.0
 

@@ -21,7 +21,7 @@ from gelpolight_core.sensor_calibration import Calibration
 
 zmq = pytest.importorskip("zmq")
 GUIDE = Path(__file__).resolve().parents[3] / "docs" / "reference/streaming.md"
-WAIT_MS = 60_000
+WAIT_MS = 300_000
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from app.live.live_detection import LiveDetection
 from app.live.session import LiveSession
 from app.sources.stopping import join_left_behind
 
-WAIT_S = 5.0
+WAIT_S = 60.0
 
 
 def test_a_slow_detector_does_not_keep_the_page_alive(context: AppContext) -> None:

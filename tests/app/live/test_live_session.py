@@ -13,7 +13,7 @@ from app.context.context import AppContext
 from app.live.session import LiveSession
 from app.sources.source import Frame, Setting, SourceInfo, SourceLost
 
-WAIT_MS = 5000
+WAIT_MS = 60_000
 
 
 class Camera:

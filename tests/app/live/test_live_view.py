@@ -195,7 +195,7 @@ def test_the_reason_for_a_lost_camera_is_shown(view: LiveView, qtbot: QtBot) -> 
     stream.put(black())
     qtbot.waitUntil(lambda: stream.newest.frame is None)
     stream.lost = "Camera: it was unplugged. Plug it in again."
-    qtbot.waitUntil(lambda: child(view, "live.exposure").text() == stream.lost, timeout=3000)
+    qtbot.waitUntil(lambda: child(view, "live.exposure").text() == stream.lost)
 
 
 def test_sixteen_bit_frames_are_shown_with_their_own_values(view: LiveView) -> None:

@@ -14,7 +14,7 @@ from fake_camera import eventually
 from app.inspect.stream import Publisher
 
 zmq = pytest.importorskip("zmq")
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 @pytest.fixture

@@ -36,7 +36,7 @@ from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.reference import Truth
 from gelpolight_core.sensor_calibration import Calibration
 
-PATIENCE_MS = 60_000
+PATIENCE_MS = 300_000
 
 
 @pytest.fixture(scope="module")
@@ -464,10 +464,10 @@ def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(
 
     def wait(_records: Records) -> None:
         waiting.set()
-        go.wait(20.0)
+        go.wait(60.0)
 
     book.change("Waiting", wait)
-    assert waiting.wait(20.0)
+    assert waiting.wait(60.0)
     book.add(record, lambda _number: None)
     context.workspace.folder = tmp_path / "other"
     context.requests.calibrations_changed.emit()

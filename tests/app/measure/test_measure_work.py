@@ -17,7 +17,7 @@ from app.services.newest_wins import Finished, NewestWins
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 
-PATIENCE_MS = 60_000
+PATIENCE_MS = 300_000
 
 
 def _other_sensors(calibration: Calibration) -> Calibration:

@@ -301,7 +301,7 @@ def test_a_report_is_written_in_the_background(
     page.offered["report"].trigger()
     assert bar.isVisible()
     assert not page.offered["report"].isEnabled()
-    qtbot.waitUntil(lambda: page.offered["report"].isEnabled(), timeout=20000)
+    qtbot.waitUntil(lambda: page.offered["report"].isEnabled())
     assert not bar.isVisible()
     assert place.stat().st_size > 1000
     assert str(place) in page.findChild(QLabel, "sensors.message").text()
@@ -315,7 +315,7 @@ def test_a_failed_report_is_shown_to_the_user(
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(place), ""))
     page.open_path(source)
     page.offered["report"].trigger()
-    qtbot.waitUntil(lambda: page.offered["report"].isEnabled(), timeout=20000)
+    qtbot.waitUntil(lambda: page.offered["report"].isEnabled())
     assert str(place.parent) in page.findChild(QLabel, "sensors.message").text()
 
 
@@ -331,7 +331,7 @@ def test_the_gel_of_a_calibration_is_shown_and_named(
     elastomer.setFocus()
     qtbot.keyClicks(elastomer, "gel 7")
     qtbot.keyClick(elastomer, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: read_summary(chosen.path).elastomer == "gel 7", timeout=60_000)
-    qtbot.waitUntil(lambda: not page._library.jobs.busy, timeout=60_000)
+    qtbot.waitUntil(lambda: read_summary(chosen.path).elastomer == "gel 7")
+    qtbot.waitUntil(lambda: not page._library.jobs.busy)
     again = page.chosen()
     assert again.summary.identity == chosen.summary.identity

@@ -36,7 +36,7 @@ def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:
 
 def test_required_jobs_run_when_all_others_are_cancelled() -> None:
     jobs, go, written = Jobs("jobs"), threading.Event(), list[str]()
-    jobs.submit(Job("wait", lambda _progress: go.wait(10.0)))
+    jobs.submit(Job("wait", lambda _progress: go.wait(60.0)))
     jobs.submit(Job("compute", lambda _progress: written.append("computed")))
     jobs.submit(Job("save", lambda _progress: written.append("saved"), must=True))
     jobs.cancel()
@@ -52,10 +52,10 @@ def test_a_hanging_job_does_not_block_closing(
 
     def hang(_progress: Tell) -> bool:
         begun.set()
-        return go.wait(30.0)
+        return go.wait(60.0)
 
     jobs.submit(Job("hang", hang))
-    assert begun.wait(10.0)
+    assert begun.wait(60.0)
     assert not jobs.close(timeout_s=0.05)
     assert "hanging did not stop" in caplog.text
     go.set()
@@ -67,7 +67,7 @@ def test_a_hanging_required_job_is_reported_and_still_completed(
 ) -> None:
     jobs, reported, written, go = Jobs("jobs"), list[str](), list[str](), threading.Event()
     jobs.refused.connect(reported.append)
-    jobs.submit(Job("wait", lambda _progress: go.wait(30.0), must=True))
+    jobs.submit(Job("wait", lambda _progress: go.wait(60.0), must=True))
     jobs.submit(Job("save", lambda _progress: written.append("saved"), must=True))
     jobs.submit(Job("keep", lambda _progress: written.remove("nothing"), must=True))
     assert not jobs.close(timeout_s=0.05)
@@ -88,11 +88,11 @@ def test_the_caller_is_notified_however_a_job_ends(end: str, qtbot: QtBot) -> No
             raise InputError("the image is grey", where="a.png", advice="Take it in colour")
         if end == "faulty":
             raise ValueError("nobody thought of this")
-        assert go.wait(10.0)
+        assert go.wait(60.0)
         progress(0.5)
 
     if end == "dropped":
-        jobs.submit(Job("first", lambda _progress: go.wait(10.0)))
+        jobs.submit(Job("first", lambda _progress: go.wait(60.0)))
     jobs.submit(Job("export", work, ended=lambda: ended.append(end)))
     if end in ("stopped", "dropped"):
         jobs.cancel()
@@ -110,14 +110,14 @@ def test_the_caller_is_notified_that_a_job_was_stopped(runs: bool, qtbot: QtBot)
 
     def work(progress: Tell) -> None:
         begun.set()
-        assert go.wait(10.0)
+        assert go.wait(60.0)
         progress(0.5)
 
     if not runs:
-        jobs.submit(Job("first", lambda _progress: go.wait(10.0)))
+        jobs.submit(Job("first", lambda _progress: go.wait(60.0)))
     jobs.submit(Job("export", work, stopped=reported.append))
     if runs:
-        assert begun.wait(10.0)
+        assert begun.wait(60.0)
     jobs.cancel()
     go.set()
     qtbot.waitUntil(lambda: not jobs.busy)

@@ -16,7 +16,7 @@ from app.shell.loader import Loader
 def slow_modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Return the names of two modules. Loading the first one waits for a signal."""
     (tmp_path / "loader_first.py").write_text(
-        "import threading\nimport loader_gate\nloader_gate.begun.set()\nloader_gate.go.wait(5)\n"
+        "import threading\nimport loader_gate\nloader_gate.begun.set()\nloader_gate.go.wait(60)\n"
     )
     (tmp_path / "loader_second.py").write_text("")
     gate = type(sys)("loader_gate")

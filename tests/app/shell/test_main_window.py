@@ -403,7 +403,7 @@ def test_the_log_window_follows_the_log_and_filters(window: MainWindow, qtbot: Q
     log._levels.setCurrentIndex(3)
     assert "a note" not in log._text.toPlainText()
     window.context.toasts.show("another problem", "fail")
-    qtbot.waitUntil(lambda: "another problem" in log._text.toPlainText(), timeout=2000)
+    qtbot.waitUntil(lambda: "another problem" in log._text.toPlainText())
     log.copy()
     assert "another problem" in QApplication.clipboard().text()
 

@@ -22,7 +22,8 @@ sender.flag.connect(seen.append)
 sender.thing.connect(seen.append)
 sender.plain.connect(lambda: None)
 thing = object()
-watched = (True, False, None, thing)
+# From Python 3.12 on nothing ends the others, and their counts mean nothing (PEP 683).
+watched = (True, False, None, thing) if sys.version_info < (3, 12) else (thing,)
 def counts():
     seen.clear()
     return [sys.getrefcount(x) for x in watched]
@@ -40,7 +41,7 @@ print(min(b - a for a, b in zip(before, counts())))
 def test_emitting_a_signal_loses_no_reference() -> None:
     """PySide6 6.12.0 loses one with every emit; some hundreds end Python 3.11 in a crash."""
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False, timeout=600
     )
     assert done.returncode == 0, done.stderr
     # A few references come and go with the interpreter's own work.

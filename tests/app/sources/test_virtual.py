@@ -17,7 +17,7 @@ from app.sources.virtual import VirtualSource
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor, Whiteboard
 
-WAIT_S = 60.0
+WAIT_S = 300.0
 
 
 def design_without_noise(design: SensorDesign) -> SensorDesign:

@@ -91,7 +91,7 @@ def test_icons_that_qt_copies_live_as_long_as_it_needs_them() -> None:
     """Also at program exit."""
     environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
     done = subprocess.run(
-        [sys.executable, "-c", CHANGING], cwd=ROOT, capture_output=True, text=True, timeout=60,
+        [sys.executable, "-c", CHANGING], cwd=ROOT, capture_output=True, text=True, timeout=600,
         env=environment,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -135,6 +135,6 @@ assert gc.isenabled()
 
 def test_switching_survives_widgets_that_are_garbage() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", SWITCHING], cwd=ROOT, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", SWITCHING], cwd=ROOT, capture_output=True, text=True, timeout=600
     )
     assert done.returncode == 0, done.stderr

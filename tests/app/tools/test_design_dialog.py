@@ -33,14 +33,14 @@ def test_the_design_is_checked_while_live_processing_rests_and_the_table_saved(
     asked: list[bool] = []
     context.requests.rest.connect(asked.append)
     dialog.start.click()
-    qtbot.waitUntil(lambda: dialog.result_shown is not None, timeout=30_000)
+    qtbot.waitUntil(lambda: dialog.result_shown is not None)
     assert asked == [True, False]
     rows = len(dialog.table.shown)
     assert rows > 5
     assert "The design" in dialog.words.text()
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
     dialog.save.click()
-    qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=30_000)
+    qtbot.waitUntil(lambda: not dialog.jobs.busy)
     lines = (tmp_path / "design-check.csv").read_text("utf-8").splitlines()
     assert len(lines) == 1 + rows
     assert context.settings.folder("report") == tmp_path
@@ -54,4 +54,4 @@ def test_a_refusal_is_one_sentence(
 
     monkeypatch.setattr(design_dialog, "check_design", refuse)
     dialog.start.click()
-    qtbot.waitUntil(lambda: "in a row" in dialog.words.text(), timeout=30_000)
+    qtbot.waitUntil(lambda: "in a row" in dialog.words.text())

@@ -62,7 +62,7 @@ def applied_by(camera: Camera, change: Callable[[], None]) -> dict[str, Applied]
 
 
 def test_images_arrive_in_the_best_format_with_their_times(camera: Camera, stream: Stream) -> None:
-    frames = stream.capture(3).result(20.0)
+    frames = stream.capture(3).result(60.0)
     assert frames[0].rgb.shape == (96, 128, 3)
     assert frames[0].time_s < frames[1].time_s < frames[2].time_s <= time.monotonic()
     red, _, blue = frames[0].rgb.mean(axis=(0, 1))
@@ -79,7 +79,7 @@ def test_stored_settings_are_applied_on_opening_and_read_back(
     camera.want(STORED)
     fake.calls.clear()
     stream.start()
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     assert values(camera).items() >= LOCKED.items()
     assert all(applied.holds for applied in camera.state.applied)
     assert camera.state.format == Format("YUYV", 64, 48, 30.0)
@@ -91,7 +91,7 @@ def test_stored_settings_are_applied_on_opening_and_read_back(
 def test_ignored_rejected_and_missing_settings_are_reported(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     fake.ignores, fake.refuses, fake.reads_back = {"gain"}, {"white_balance_k"}, {"sharpness": 9.0}
     wanted = {**LOCKED, "exposure_ms": 9000.0, "sharpness": 20.0, "focus": 3.0}
     applied = applied_by(camera, lambda: camera.change(wanted))
@@ -105,9 +105,9 @@ def test_ignored_rejected_and_missing_settings_are_reported(
 
 
 def test_images_from_before_a_change_are_not_captured(camera: Camera, stream: Stream) -> None:
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     applied_by(camera, lambda: camera.change({"exposure_auto": 0.0, "exposure_ms": 10.0}))
-    frames = stream.capture(2).result(20.0)
+    frames = stream.capture(2).result(60.0)
     assert all(frame.settled for frame in frames)
     assert frames[0].rgb[..., 0].mean() == pytest.approx(30.0, abs=2.0)
 
@@ -116,19 +116,19 @@ def test_an_unplugged_camera_is_reported_and_returns_with_its_settings(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     camera.want(STORED)
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     waiting = stream.capture(10_000)
     fake.plugged, fake.forgets = False, True
     assert "not plugged in" in eventually(
         lambda: (lost := stream.figures().lost) and "plugged" in lost and lost
     )
     with pytest.raises(SourceLost):
-        waiting.result(20.0)
+        waiting.result(60.0)
     with pytest.raises(SourceLost, match="not plugged in"):
-        stream.capture(1).result(20.0)
+        stream.capture(1).result(60.0)
     fake.plugged = True
     eventually(lambda: stream.figures().lost is None)
-    assert len(stream.capture(2).result(20.0)) == 2
+    assert len(stream.capture(2).result(60.0)) == 2
     assert values(camera).items() >= LOCKED.items()
     assert fake.opened == 2
 
@@ -136,7 +136,7 @@ def test_an_unplugged_camera_is_reported_and_returns_with_its_settings(
 def test_only_a_camera_with_a_serial_number_continues_at_another_port(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     fake.plugged = False
     eventually(lambda: stream.figures().lost)
     fake.device = replace(C310, identity="046d:081b@1-9:1.0", address="/dev/video5")
@@ -199,7 +199,7 @@ def test_a_camera_in_another_window_of_the_program_is_refused_with_its_name_unti
     assert f"process {window.pid}" in why and C310.name in why
     window.kill()
     window.communicate()
-    assert stream.capture(1).result(20.0)
+    assert stream.capture(1).result(60.0)
     stream.stop()
 
 
@@ -212,7 +212,7 @@ def test_closing_during_opening_does_not_block(fake: FakeCamera, camera: Camera)
     assert [thread.name for thread in threading.enumerate()].count(f"capture {C310.name}") == 0
     stream.start()  # the driver still hangs in the first open call
     fake.hangs.set()
-    assert len(stream.capture(1).result(20.0)) == 1
+    assert len(stream.capture(1).result(60.0)) == 1
     stream.stop()
     assert join_left_behind(20.0)
     assert fake.opened == fake.closed
@@ -222,12 +222,12 @@ def test_closing_during_opening_does_not_block(fake: FakeCamera, camera: Camera)
 def test_two_users_share_a_camera_and_the_last_one_closes_it(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     other = Stream(CameraSource(camera))
     other.start()
-    assert len(other.capture(2).result(20.0)) == 2
+    assert len(other.capture(2).result(60.0)) == 2
     stream.stop()
-    assert len(other.capture(2).result(20.0)) == 2
+    assert len(other.capture(2).result(60.0)) == 2
     other.stop()
     assert (fake.opened, fake.closed) == (1, 1)
 
@@ -235,7 +235,7 @@ def test_two_users_share_a_camera_and_the_last_one_closes_it(
 def test_another_format_reopens_the_camera(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     camera.want(STORED)
     eventually(lambda: camera.state.format == Format("YUYV", 64, 48, 30.0))
     eventually(lambda: values(camera).items() >= LOCKED.items())
@@ -247,7 +247,7 @@ def test_another_format_reopens_the_camera(
 def test_a_lock_fixes_the_present_automatic_values(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     fake.settings["exposure_ms"] = replace(fake.settings["exposure_ms"], value=21.0)
     applied = applied_by(camera, camera.lock)
     assert applied["exposure_ms"].read == 21.0
@@ -261,7 +261,7 @@ def test_a_camera_without_settings_or_formats_still_delivers() -> None:
     fake = FakeCamera(formats=(), settings={})
     stream = Stream(CameraSource(Camera(FakeDriver(fake), C310, pause_s=0.02)))
     stream.start()
-    (frame,) = stream.capture(1).result(20.0)
+    (frame,) = stream.capture(1).result(60.0)
     assert frame.rgb.dtype == np.uint8
     stream.stop()
 
@@ -269,7 +269,7 @@ def test_a_camera_without_settings_or_formats_still_delivers() -> None:
 def test_a_driver_error_is_logged_and_retried(
     camera: Camera, stream: Stream, fake: FakeCamera, caplog: pytest.LogCaptureFixture
 ) -> None:
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     real, fake.light = fake.light, lambda number: 1 // 0
     assert "internal error" in eventually(lambda: stream.figures().lost)
     fake.light = real
@@ -283,7 +283,7 @@ def test_a_slow_reopening_does_not_end_a_stream(
     monkeypatch.setattr("app.sources.camera.camera.SLOW_REOPEN_S", 0.05)
     stream = Stream(CameraSource(camera), silence_s=0.5)
     stream.start()
-    stream.capture(1).result(20.0)
+    stream.capture(1).result(60.0)
     fake.hangs = threading.Event()
     camera.want(STORED)
     eventually(lambda: "being reopened" in (stream.figures().lost or ""))
@@ -291,5 +291,5 @@ def test_a_slow_reopening_does_not_end_a_stream(
     assert camera.trouble() == ""
     fake.hangs.set()
     eventually(lambda: stream.figures().lost is None)
-    assert len(stream.capture(1).result(20.0)) == 1
+    assert len(stream.capture(1).result(60.0)) == 1
     stream.stop()
