@@ -29,7 +29,7 @@ def _rise(bumps, heights, k, cosine, flat_cosine):  # type: ignore[no-untyped-de
     """Return the logarithm of the curve of channel k at a cosine, less that at the flat one."""
     last, total = bumps.shape[0] - 1, 0.0
     for sign, c in ((1.0, cosine), (-1.0, flat_cosine)):
-        position = min(max(c, 0.0), 1.0) * last
+        position = min(max(0.0, c), 1.0) * last  # 0 also for a NaN, which has no place
         below = min(int(position), last - 1)
         share = position - below
         for m in range(bumps.shape[1]):

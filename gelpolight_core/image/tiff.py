@@ -33,8 +33,10 @@ _UNCOMPRESSED, _DEFLATE = 1, (8, 32946)
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB = 0, 1, 2
 _DEFLATE_RATIO = 1032
 """Most bytes that one byte of Deflate stands for (zlib, "Maximum Compression Factor")."""
-_ORIENTATION = 274
-_TOGETHER = 1
+_ORIENTATION, _TOGETHER = 274, 1
+_SURPRISES = LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError, OSError
+_DAMAGE = (*_SURPRISES, struct.error, zlib.error)
+"""What tifffile raises for damaged files, beside ValueError."""
 
 
 @contextmanager
@@ -48,16 +50,7 @@ def _first_page(data: bytes) -> Iterator[TiffPage]:
             if not isinstance(page, tifffile.TiffPage):
                 raise ValueError("no page")
             yield page
-    except (
-        LookupError,
-        TypeError,
-        AttributeError,
-        ArithmeticError,
-        NotImplementedError,
-        OSError,
-        struct.error,
-        zlib.error,
-    ) as error:
+    except _DAMAGE as error:
         raise ValueError(str(error)) from error
 
 
