@@ -13,6 +13,7 @@ npz files of ``reconstruct``; ``outputs/NAME.npz`` holds the depth of every STEP
 from __future__ import annotations
 
 import csv
+import ctypes
 import json
 import math
 import shutil
@@ -39,8 +40,22 @@ SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 STEP = 4
 UNIT_MM = 1e-5
 """Depth is recorded and compared in units of 0.01 um."""
-PROCESSOR = cpu_target.target_context.codegen().magic_tuple()[1]
-"""Loops are compiled for it, so another one adds float32 numbers in another order."""
+
+
+def linear_algebra() -> str:
+    """Return the kernel and the threads of NumPy's library, which decide its order of adding."""
+    found = list(Path(np.__file__).parents[1].glob("numpy.libs/libscipy_openblas64_*"))
+    if not found:
+        return "another library"
+    library = ctypes.CDLL(str(found[0]))
+    name = library.scipy_openblas_get_corename64_
+    name.restype = ctypes.c_char_p
+    return f"{name().decode()} {library.scipy_openblas_get_num_threads64_()}"
+
+
+PROCESSOR = f"{cpu_target.target_context.codegen().magic_tuple()[1]} {linear_algebra()}"
+"""Loops are compiled for it, and it chooses the kernel of the linear algebra library (the number
+behind it: of its threads). Any of them changes in which order numbers are added."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +73,9 @@ SAME_PROCESSOR = Tolerance(1e-4, 1e-8, 1e-8, 2, 0.0)
 """Values repeat exactly; 1e-4 lets sums change their order. Depth: two rounded values."""
 OTHER_PROCESSOR = Tolerance(0.01, 0.002, 0.05, 100, 1e-4)
 """With loops for Haswell and libraries without AVX2, this set differed by up to 0.5 % or 0.0012 mm,
-0.022 %, 0.4 um of depth and one flag of 73728. For a closer comparison, record the outputs of the
-commit before on the same machine."""
+0.022 %, 0.4 um of depth and one flag of 73728; with loops for znver3 and the kernel for Prescott
+(OPENBLAS_CORETYPE), by up to 0.0015 mm, 0.00001 % and 0.01 um of depth. For a closer comparison,
+record the outputs of the commit before on the same machine."""
 
 OWN = ("id", "calibration_id", "calibration", "format", "version", "sha256")
 """Keys whose values follow from the exact bits of a calibration, or name the form of a file."""
