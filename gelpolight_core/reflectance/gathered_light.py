@@ -15,11 +15,10 @@ from math import pi, sqrt
 from typing import Any, NamedTuple
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
@@ -51,8 +50,8 @@ _DOWN = (_POINT + 2, _NORMAL + 2, *(_LIGHT + _PER_LED * k + 2 for k in range(3))
 _TILE = WIDE**2
 """Facets of a larger facet. They lie side by side, so that one instruction handles all of them."""
 
-_part = numba.njit(fastmath=True, error_model="numpy", **PART)
-_whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+_part = compiling.part(fastmath=True, error_model="numpy")
+_whole = compiling.whole(fastmath=True, error_model="numpy")
 
 
 class Slab(NamedTuple):

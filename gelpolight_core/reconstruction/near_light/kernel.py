@@ -20,11 +20,10 @@ from __future__ import annotations
 
 from math import cos, pi, radians, sin, sqrt
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
 from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
@@ -86,8 +85,8 @@ def _starts() -> NDArray[np.float32]:
 
 STARTS = _starts()
 
-_part = numba.njit(fastmath=True, error_model="numpy", **PART)
-_whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+_part = compiling.part(fastmath=True, error_model="numpy")
+_whole = compiling.whole(fastmath=True, error_model="numpy")
 
 
 @_part
