@@ -5,15 +5,13 @@ from __future__ import annotations
 import sys
 
 from app.warm_up import compile_loops
-from gelpolight_core.translation import tr
 
 
 def main() -> int:
     """Prepare what the first start would otherwise wait for; quick when nothing has changed."""
 
     def show(what: str, number: int, count: int) -> None:
-        line = tr("Set-up: compiling {what}, {n} of {m}.")
-        print(line.format(what=what, n=number, m=count), flush=True)
+        print(f"Set-up: compiling {number} of {count}: {what}.", flush=True)
 
     compile_loops(show)
     return 0

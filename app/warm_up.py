@@ -19,7 +19,6 @@ import numba
 import numpy as np
 
 from gelpolight_core.recording import differences
-from gelpolight_core.translation import tr
 
 SCALE, BALLS = 0.25, 6
 """The smallest images, and the fewest balls, with which every stage of an open sensor works."""
@@ -49,7 +48,7 @@ def compile_loops(progress: Callable[[str, int, int], None]) -> bool:
     if stamp.is_file() and stamp.read_text() == state:
         return False
     with tempfile.TemporaryDirectory() as folder:
-        for number, title in enumerate(_steps(Path(folder)), start=1):
+        for title, number in zip(_steps(Path(folder)), range(1, STEPS + 1), strict=True):
             progress(title, number, STEPS)
     stamp.write_text(state)
     return True
@@ -83,29 +82,29 @@ def _steps(folder: Path) -> Iterator[str]:
     from gelpolight_core.simulation.session import simulate_session
 
     design = SensorDesign()
-    yield tr("the virtual sensor")
+    yield "the virtual sensor"
     opened = replace(design, balls=design.balls[:BALLS])
     simulate_session(opened, folder / "open", scale=SCALE)
-    yield tr("the calibration of an open sensor")
+    yield "the calibration of an open sensor"
     calibration = calibrate(read_session(folder / "open")).calibration
     # Commands give linear light, a camera whole numbers.
     linear = read_colours(folder / "open" / PRESS).rgb
     seen = np.round(255.0 * linear).astype(np.uint8)
     for effort in EFFORTS:
-        yield tr("depth, effort {name}").format(name=effort)
+        yield f"depth, effort {effort}"
         reconstructor = Reconstructor(calibration, effort=effort)
         for frame in (seen, linear):
             reconstructor.depth(frame)
-    yield tr("sizes, and the model of the paper")
+    yield "sizes, and the model of the paper"
     for frame in (seen, linear):
         measure_heightmap(reconstructor.depth(frame, uncertainty=True), shape=AUTO)
         Reconstructor(calibration, model="paper").depth(frame)
-    yield tr("the closed sensor")
+    yield "the closed sensor"
     simulate_session(design, folder / "closed", scale=SCALE, closed=True)
     closed = calibrate(read_session(folder / "closed")).calibration
     for frame in (seen, linear):
         Reconstructor(closed).depth(frame)
-    yield tr("recordings and views")
+    yield "recordings and views"
     with RecordingWriter(folder / "press.gplrec", RecordingHeader()) as recording:
         recording.append(seen, 0, 0.0)
     with Recording.open(folder / "press.gplrec") as opened_again:
