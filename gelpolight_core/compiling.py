@@ -36,7 +36,7 @@ def whole(**how: Any) -> Decorator:
     def compiled(function: Callable[..., Any]) -> Any:
         made = numba.njit(nogil=True, **how)(function)
         try:
-            made._cache = _Kept(function)
+            made._cache = _Kept(function)  # type: ignore[no-untyped-call]
         except RuntimeError:  # no folder can be written
             say_that_nothing_is_kept()
         return made
@@ -52,19 +52,19 @@ def part(**how: Any) -> Decorator:
     return whole(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **how)
 
 
-class _Kept(FunctionCache):  # type: ignore[misc]
+class _Kept(FunctionCache):
     """What was compiled of a function, for as long as its folder can be used."""
 
     def load_overload(self, *what: Any) -> Any:
         try:
-            return super().load_overload(*what)
+            return super().load_overload(*what)  # type: ignore[no-untyped-call]
         except OSError:
             say_that_nothing_is_kept()
             return None
 
     def save_overload(self, *what: Any) -> None:
         try:
-            super().save_overload(*what)
+            super().save_overload(*what)  # type: ignore[no-untyped-call]
         except OSError:  # a full disk, a home over quota
             say_that_nothing_is_kept()
 

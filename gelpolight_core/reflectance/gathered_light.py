@@ -231,7 +231,8 @@ def gathered(
     far = _facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
     # What is not there is empty: for None, the loop would be compiled once more.
-    mirrored, indices = far[:0], (_1, _1, _1)
+    mirrored = far[:0]
+    indices: tuple[Any, ...] = (_1, _1, _1)
     if slab is not None:
         mirrored = _mirrored(far, slab.thickness_mm)
         lower = slab.lower_index
