@@ -7,18 +7,16 @@ here with a small virtual sensor is what a person does: images, calibrations, de
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 
 import llvmlite.binding
-import numba
-import numpy as np
-
-from gelpolight_core.recording import differences
 
 SCALE, BALLS = 0.25, 6
 """The smallest images, and the fewest balls, with which every stage of an open sensor works."""
@@ -41,12 +39,13 @@ def compile_loops(progress: Callable[[str, int, int], None]) -> bool:
     bool
         Whether there was anything to do.
     """
-    kept = differences.add_up.stats.cache_path
-    if kept is None:  # nothing that is compiled now is found later
-        return False
-    stamp, state = Path(kept) / STAMP, _state()
+    # Where numba looks first for what it kept.
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    kept = Path(named) if named else Path(__file__).with_name("__pycache__")
+    stamp, state = kept / STAMP, _state()
     if stamp.is_file() and stamp.read_text() == state:
         return False
+    kept.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         for title, number in zip(_steps(Path(folder)), range(1, STEPS + 1), strict=True):
             progress(title, number, STEPS)
@@ -57,7 +56,7 @@ def compile_loops(progress: Callable[[str, int, int], None]) -> bool:
 def _state() -> str:
     """Return a hash of what decides whether compiled loops can be used."""
     name = llvmlite.binding.get_host_cpu_name()
-    found = hashlib.sha256(f"{numba.__version__} {sys.version} {name}".encode())
+    found = hashlib.sha256(f"{version('numba')} {sys.version} {name}".encode())
     root = Path(__file__).resolve().parents[1]
     for package in ("app", "gelpolight_core"):
         for path in sorted((root / package).rglob("*.py")):
@@ -68,6 +67,8 @@ def _state() -> str:
 
 def _steps(folder: Path) -> Iterator[str]:
     """Do one thing after the other, each after its title was taken."""
+    import numpy as np  # slow imports
+
     from app.view2d import shading
     from gelpolight_core.calibration.project import calibrate
     from gelpolight_core.design.sensor_design import SensorDesign
