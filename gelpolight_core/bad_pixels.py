@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 
 Pixels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -218,7 +217,7 @@ def differing(
     return marks
 
 
-@numba.njit(fastmath={"nsz", "arcp", "contract"}, **PART)
+@compiling.part(fastmath={"nsz", "arcp", "contract"})
 def _differs(p, a, b, c, d, least, share):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return whether p is far from a, b, c and d, which agree, or by more from all but one."""
     low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
@@ -233,7 +232,7 @@ def _differs(p, a, b, c, d, least, share):  # type: ignore[no-untyped-def]  # pr
     return p > above or p < below
 
 
-@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+@compiling.whole(fastmath={"nsz", "arcp", "contract"})
 def _differing(raw, light, rows, least, share, marks):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write the marks of some rows; the outermost two pixels are left out."""
     height, width = raw.shape[0], raw.shape[1]

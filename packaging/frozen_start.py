@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import atexit
 import multiprocessing
 import os
-import shutil
 import sys
-import tempfile
 from pathlib import Path
 
 import platformdirs
@@ -26,21 +23,8 @@ def give_back_environment() -> None:
             os.environ[name] = before
 
 
-def is_writable(folder: Path) -> bool:
-    """Whether files can be written into a folder, which is made where need be."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError:  # a full disk, a home that can only be read
-        return False
-    return True
-
-
 def choose_caches(folder: Path) -> None:
-    """Keep compiled loops and the list of fonts in `folder`, for this run alone if need be."""
-    if not is_writable(folder):
-        folder = Path(tempfile.mkdtemp(prefix="gelpolight-"))
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    """Keep compiled loops and the list of fonts in `folder`, away from those of an installation."""
     os.environ.setdefault("NUMBA_CACHE_DIR", str(folder / "kernels"))
     os.environ["MPLCONFIGDIR"] = str(folder / "matplotlib")
 

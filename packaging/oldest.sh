@@ -3,7 +3,8 @@
 # the core and the commands while Qt and VTK are not installed (thin: nor what draws reports), then the windows and what reads their files.
 #
 #     sh packaging/oldest.sh         all of the core, and a choice of the windows
-#     sh packaging/oldest.sh thin    from saved calibrations to measured sizes by the commands, and all files; no windows
+#     sh packaging/oldest.sh thin    from a saved calibration to a measured size by the commands, and files of every library;
+#                                    no windows
 #
 # Needs what "sh packaging/setup.sh test" installs from the system. PYTHON=/path/to/python chooses another Python;
 # the oldest versions are older than Python 3.14.
@@ -14,9 +15,10 @@ how=${1:-whole}
 # These also spoil, and write, what only the windows have.
 needs_windows="tests/strangers/test_any_spoilt_file.py tests/strangers/test_clock_set_back.py
     tests/strangers/test_forgeries.py tests/strangers/test_two_programs.py"
-core="tests/command_line/test_without_window_libraries.py tests/io tests/records tests/session
-    tests/export --ignore tests/export/test_board_page.py"
-after="tests/test_house.py tests/export/test_board_page.py" # with what was left out at first, without the windows
+core="tests/command_line/test_without_window_libraries.py::test_images_become_depth_maps_and_sizes
+    tests/session/test_session.py tests/export/test_heightmap_files.py tests/export/test_surface_files.py"
+# With what was left out at first, without the windows.
+after="tests/test_house.py::test_the_core_works_in_a_notebook_without_the_desktop_program tests/export/test_board_page.py"
 processes=1 # beside the tests with the locked libraries
 left_out='pyside6-essentials|shiboken6|pyqtgraph|vtk|pytest-qt'
 added='matplotlib|typst' # what draws reports

@@ -5,6 +5,7 @@
 #     sh packaging/setup.sh commands    the same without the system libraries of a window, for machines without a screen
 #     sh packaging/setup.sh test        what the program, the checks and the tests need
 #
+# Except for tests, what the first start would otherwise compile is compiled here (about a minute).
 # Safe to run again; quick when nothing has changed. PYTHON=/path/to/python chooses another Python.
 # What the system lacks is installed with apt-get, as root or by sudo, in one step and only when it is missing.
 set -eu
@@ -200,6 +201,10 @@ if [ "$(cat "$project_stamp" 2>/dev/null)" != "$project" ] || [ ! -x "$venv/bin/
     begin "installing the project into $venv"
     pip install --quiet --no-deps --no-build-isolation --no-index --editable .
     echo "$project" >"$project_stamp"
+fi
+# Tests compile while their types are checked.
+if [ "$kind" != test ] && ! "$venv/bin/python" -m app.prepare; then
+    echo "Set-up: this step failed, see above. The program works, but its first start will take longer." >&2
 fi
 step="finishing"
 echo "Set-up: $venv is ready."

@@ -109,7 +109,7 @@ class CalibrationChoice(QObject):
 
     def _read(self, path: Path) -> None:
         def work(progress: Callable[[float], None]) -> object:
-            from app.live.frame_results import warm_up
+            from app.view2d.shading import warm_up
             from gelpolight_core.calibration.file import read_calibration
             from gelpolight_core.reconstruction.reconstructor import Reconstructor
 

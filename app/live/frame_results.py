@@ -412,9 +412,3 @@ class _Images:
 
 def _in_colours(values: NDArray[Any], scale: ColourScale) -> NDArray[np.uint8]:
     return shading.coloured(np.asarray(values, np.float32), scale.table, scale.low, scale.high)
-
-
-def warm_up() -> None:
-    """Compile the functions that the first image would otherwise wait for."""
-    flat, display = np.zeros((8, 8), np.float32), Display()
-    shading.shaded(flat, 0.1, colour_table(display.colours), (0.0, 1.0), display.light)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiling import whole
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+
+@whole(fastmath=True)
 def shade(
     depth: NDArray[np.float32],
     level: NDArray[np.float32],

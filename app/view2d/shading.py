@@ -175,3 +175,9 @@ def map_image(heightmap: HeightMap, display: Display) -> MapImage:
     rgb = shading.shaded(depth, heightmap.pitch_mm, table, shown, display.light)
     outside = heightmap.flags & np.uint8(Flag.OUTSIDE)
     return MapImage(shading.outside_filled(rgb, outside, SURROUND), shown)
+
+
+def warm_up() -> None:
+    """Compile what the first image would otherwise wait for."""
+    flat, display = np.zeros((8, 8), np.float32), Display()
+    shaded(flat, 0.1, colour_table(display.colours), (0.0, 1.0), display.light)

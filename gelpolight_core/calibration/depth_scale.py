@@ -289,7 +289,7 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     scale = sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)
     membrane, steps = membrane_numbers(full), Steps(STEPS, SETTLED**2, True, False)
     rows, columns = depth_mm.shape
-    reflected = membrane.interreflection is not None
+    reflected = membrane.interreflection > 0.0
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     x, y = np.meshgrid(field.x_mm, field.y_mm)

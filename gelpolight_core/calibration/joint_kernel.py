@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from math import exp, sqrt
 
-import numba
-
+from gelpolight_core.compiling import whole
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, brightness
 
 SHADOW_COSINE = 0.08
@@ -13,7 +12,7 @@ SHADOW_COSINE = 0.08
 CORRELATION = 4.0
 """Errors of the pixels of one ball are correlated (lens, centre, membrane): weights are lower."""
 
-_compiled = numba.njit(nogil=True, error_model="numpy", cache=True)
+_compiled = whole(error_model="numpy")
 
 
 @_compiled

@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 from gelpolight_core.image.in_time import SIGMAS
 
 Array = NDArray[np.float64]
@@ -161,14 +160,14 @@ def block_grain(raw: NDArray[Any], light: Map, corner: Index) -> Array:
     return found
 
 
-@numba.njit(fastmath=True, **PART)
+@compiling.part(fastmath=True)
 def _square(raw, table, r, c, apart, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     upper = table[raw[r, c, k]] - table[raw[r, c + apart, k]]
     lower = table[raw[r + apart, c, k]] - table[raw[r + apart, c + apart, k]]
     return (upper - lower) ** 2
 
 
-@numba.njit(nogil=True, fastmath=True, cache=True)
+@compiling.whole(fastmath=True)
 def _block_grain(raw, light, corner, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     # The variance of each of four pixels, in three channels.
     products = np.float32(4 * 3 * FAR * FAR // 2)

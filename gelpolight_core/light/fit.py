@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiling import whole
 from gelpolight_core.light.samples import PARAMETERS, Samples
 
 Array = NDArray[np.float64]
@@ -223,7 +223,7 @@ def _gross(samples: Samples, change: Array, usable: Mask) -> Array:
     return values
 
 
-@numba.njit(nogil=True, fastmath=True, cache=True, forceinline=True)
+@whole(fastmath=True, forceinline=True)
 def _remaining(normal, change, values, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write each cell's change of light (cells, 3) beyond the common one, as a share."""
     for c in range(left.shape[0]):
@@ -234,7 +234,7 @@ def _remaining(normal, change, values, left):  # type: ignore[no-untyped-def]  #
             left[c, k] = (change[c, 2 * k] - explained) / normal[c, 2 * k, 2 * k]
 
 
-@numba.njit(nogil=True, cache=True)
+@whole()
 def _outer_part(beside, kept):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Keep only the connected part with the longest share of the field's boundary.
 
@@ -262,7 +262,7 @@ def _outer_part(beside, kept):  # type: ignore[no-untyped-def]  # pragma: no cov
         kept[c] &= part[c] == best
 
 
-@numba.njit(nogil=True, fastmath=True, cache=True)
+@whole(fastmath=True)
 def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     normal,
     count,

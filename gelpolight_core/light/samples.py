@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiling import whole
 from gelpolight_core.image.grain import block_corners
 from gelpolight_core.masks import SATURATED, lit
 from gelpolight_core.optics.resampling import ResamplingTable
@@ -285,7 +285,7 @@ def _normal(plain: Array, weight: Map, cell: Index, cells: int) -> Array:
     return normal
 
 
-@numba.njit(nogil=True, fastmath=True, cache=True)
+@whole(fastmath=True)
 def compare_samples(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     raw,
     light,

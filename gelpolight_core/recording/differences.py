@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
+from gelpolight_core.compiling import whole
 
 
-@numba.njit(cache=True, nogil=True)
+@whole()
 def add_up(differences, rgb):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Undo the differences to the left neighbour, modulo the range of the values."""
     for row in range(rgb.shape[0]):

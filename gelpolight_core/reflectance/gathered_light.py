@@ -15,11 +15,10 @@ from math import pi, sqrt
 from typing import Any, NamedTuple
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
@@ -51,8 +50,8 @@ _DOWN = (_POINT + 2, _NORMAL + 2, *(_LIGHT + _PER_LED * k + 2 for k in range(3))
 _TILE = WIDE**2
 """Facets of a larger facet. They lie side by side, so that one instruction handles all of them."""
 
-_part = numba.njit(fastmath=True, error_model="numpy", **PART)
-_whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+_part = compiling.part(fastmath=True, error_model="numpy")
+_whole = compiling.whole(fastmath=True, error_model="numpy")
 
 
 class Slab(NamedTuple):
@@ -231,12 +230,16 @@ def gathered(
     middle = _facets(wide, leds_mm, membrane, WIDE * side_mm)
     far = _facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
-    mirrored, indices = far, None
+    # What is not there is empty: for None, the loop would be compiled once more.
+    mirrored = far[:0]
+    indices: tuple[Any, ...] = (_1, _1, _1)
     if slab is not None:
         mirrored = _mirrored(far, slab.thickness_mm)
         lower = slab.lower_index
         indices = tuple(map(_single, (slab.refractive_index**2, lower, 1.0 / lower**2)))
-    heights = None if surface.across is None else _heights(wide.points_mm, WIDE * side_mm)
+    heights: tuple[Any, ...] = (_0, _0, _0, np.empty((0, 0), np.float32))
+    if surface.across is not None:
+        heights = _heights(wide.points_mm, WIDE * side_mm)
     others = (points, (near, middle, far, mirrored), gloss, indices, heights, result)
     if run is None:
         gather_rows(0, len(points), *others)
@@ -426,8 +429,9 @@ def _gather(sent, row, column, hole, p, n, v, s, gloss, indices, hiding):  # typ
     tile = sent[row, column]
     if hiding is not None:
         heights, seen = hiding
-        for j in range(_TILE):
-            seen[j] = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
+        if heights[3].size:
+            for j in range(_TILE):
+                seen[j] = _is_seen(p, tile[0, j], tile[1, j], tile[2, j], heights)
     for j in range(_TILE):
         dx, dy, dz = tile[0, j] - p[0], tile[1, j] - p[1], tile[2, j] - p[2]
         short = _1 / sqrt(dx * dx + dy * dy + dz * dz + _TINY)
@@ -509,19 +513,19 @@ def gather_rows(first, last, at, fields, gloss, indices, heights, result):  # ty
         Point, normal, view, and its row and column among the facets of the field.
     fields : 4 of (tile rows, tile columns, planes, facets of a tile) float32
         Facets, wide and widest facets of the whole field, from :func:`emit_rows`, and the widest
-        ones' mirror images in the lower face.
+        ones' mirror images in the lower face, none where no face returns light.
     gloss : (float, float) or None
         Share and squared roughness of the lobe.
-    indices : (float, float, float) or None
+    indices : (float, float, float)
         Square of the elastomer's refractive index, the index of the layer that touches the air, and
-        one over its square; None where no face returns light.
-    heights : (float, float, float, (rows, columns) float32) or None
-        From `_heights`; None where no part hides another one.
+        one over its square.
+    heights : (float, float, float, (rows, columns) float32)
+        From `_heights`; empty where no part hides another one.
     result : (points, 3) float32
         Written: light to the camera, in the facets' unit.
     """
     near, middle, far, mirrored = fields
-    seen = np.empty(_TILE, np.float32)
+    seen = np.ones(_TILE, np.float32)
     for m in range(first, last):
         p, n = (at[m, 0], at[m, 1], at[m, 2]), (at[m, 3], at[m, 4], at[m, 5])
         v = (at[m, 6], at[m, 7], at[m, 8])
@@ -532,10 +536,7 @@ def gather_rows(first, last, at, fields, gloss, indices, heights, result):  # ty
         b = row // WIDE**2, column // WIDE**2
         r0, g0, b0 = _around(near, a, None, p, n, v, s, gloss)
         r1, g1, b1 = _around(middle, b, a, p, n, v, s, gloss)
-        hiding = None if heights is None else (heights, seen)
-        r2, g2, b2 = _everywhere(far, b, p, n, v, s, gloss, None, hiding)
+        r2, g2, b2 = _everywhere(far, b, p, n, v, s, gloss, None, (heights, seen))
         r0, g0, b0 = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
-        if indices is not None:
-            r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, indices, None)
-            r0, g0, b0 = r0 + r1, g0 + g1, b0 + b1
-        result[m, 0], result[m, 1], result[m, 2] = r0, g0, b0
+        r1, g1, b1 = _everywhere(mirrored, None, p, n, v, s, gloss, indices, None)
+        result[m, 0], result[m, 1], result[m, 2] = r0 + r1, g0 + g1, b0 + b1

@@ -101,7 +101,7 @@ class Membrane:
         result = np.empty(light.shape[:2])
         lobes = (self.exponent, self.gloss, self.roughness)
         light, normals, view = (
-            np.ascontiguousarray(part, np.float64) for part in (light, normals, view)
+            np.require(part, np.float64, ["C", "W"]) for part in (light, normals, view)
         )
         brightness_of_points(light, normals, view, lobes, self.curves, result)
         return result

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-import numba
+from gelpolight_core.compiling import whole
 
 LEAST_COSINE = 1e-3
 LEAST_VIEW = 1e-2
 
-_compiled = numba.njit(nogil=True, error_model="numpy", cache=True)
+_compiled = whole(error_model="numpy")
 
 
 @_compiled

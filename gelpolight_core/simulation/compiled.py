@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numba
+from gelpolight_core.compiling import whole
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -14,11 +14,8 @@ Interrupt = Callable[[], None]
 
 
 def compiled(function: Function) -> Function:
-    """Compile a loop once, cache it on disk, and release the GIL while it runs.
-
-    Never use ``parallel=True``: numba's workqueue layer aborts when two threads enter it.
-    """
-    return cast(Function, numba.njit(function, cache=True, nogil=True, error_model="numpy"))
+    """Compile a loop once; it releases the GIL while it runs."""
+    return cast(Function, whole(error_model="numpy")(function))
 
 
 def never() -> None:

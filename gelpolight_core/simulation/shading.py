@@ -276,7 +276,7 @@ def shade_pressed(
 def _portions(pixels: NDArray[np.intp], interrupt: Interrupt) -> Iterator[NDArray[np.intp]]:
     for start in range(0, len(pixels), _PIXELS_AT_ONCE):
         interrupt()
-        yield pixels[start : start + _PIXELS_AT_ONCE]
+        yield np.ascontiguousarray(pixels[start : start + _PIXELS_AT_ONCE])
 
 
 def _is_rough(image: Array, limit: float) -> NDArray[np.bool_]:

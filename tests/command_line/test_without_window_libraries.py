@@ -14,6 +14,7 @@ import pytest
 from gelpolight_core.recording.reader import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
+SIZE_SD_MM = 0.24  # of a diameter by this small sensor, as `measure` states it
 
 # Python imports a module of this name automatically in every process that is started from here.
 BLOCK = """
@@ -111,16 +112,16 @@ def test_reports_and_figures_say_what_to_install(blocked: dict[str, str], tmp_pa
 
 
 def test_images_become_depth_maps_and_sizes(blocked: dict[str, str], tmp_path: Path) -> None:
-    """From saved files; with the oldest libraries, nothing is calibrated beside the other tests."""
+    """From saved files, by the model that compiles least: also with the oldest libraries."""
     sensor = ROOT / "tests/data/2026-11-23/workspace/sensors/small-1"
     recording = sensor / "recordings/press.gplrec"
     with Recording.open(recording) as opened:
         assert cv2.imwrite(str(tmp_path / "press.png"), opened.frame(1).rgb[..., ::-1])
     (tmp_path / "commands.py").write_text(COMMANDS)
     lines = f"""inspect {sensor / "first.gplcal"}
-reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif
-measure {sensor / "first.gplcal"} press.png --shape cylinder --json measured.json
-batch {sensor / "first.gplcal"} press.png {recording} -o batch
+reconstruct {sensor / "first.gplcal"} press.png -o depth --format npz,vtp,tif --model paper
+measure {sensor / "first.gplcal"} press.png --shape cylinder --json measured.json --model paper
+batch {sensor / "first.gplcal"} press.png {recording} -o batch --model paper
 benchmark {sensor / "first.gplcal"} press.png --json times.json --model paper
 """
     done = subprocess.run(
@@ -133,6 +134,6 @@ benchmark {sensor / "first.gplcal"} press.png --json times.json --model paper
     )
     assert done.returncode == 0, done.stderr
     measured = json.loads((tmp_path / "measured.json").read_text())
-    assert measured["diameter_mm"] == pytest.approx(5.0, abs=0.1)
+    assert measured["diameter_mm"] == pytest.approx(5.0, abs=2.0 * SIZE_SD_MM)
     for name in ("times.json", "batch/batch.csv", "depth/press.vtp"):
         assert (tmp_path / name).stat().st_size > 0, name

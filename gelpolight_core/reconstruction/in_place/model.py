@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.compiling import whole
 from gelpolight_core.reconstruction.in_place.change import (
     ColourChange,
     Reference,
@@ -163,7 +163,7 @@ def colour_cells(change: Map) -> NDArray[np.int32]:
     return np.asarray(cell, np.int32)
 
 
-@numba.njit(nogil=True, cache=True)
+@whole()
 def _cell(value, low, scale, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     position = (value - low) * scale
     if not position > np.float32(0.0):  # also values that are not numbers
@@ -171,7 +171,7 @@ def _cell(value, low, scale, last):  # type: ignore[no-untyped-def]  # pragma: n
     return min(int(min(position, np.float32(last))), last)
 
 
-@numba.njit(nogil=True, cache=True)
+@whole()
 def _beyond(change, slope_x, slope_y, seen, low, scale, steepest, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write where a slope's square is above `steepest`, or the cell of the colour is not `seen`."""
     rows, columns = slope_x.shape

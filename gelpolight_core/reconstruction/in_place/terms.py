@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from itertools import product
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from gelpolight_core.compiling import whole
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -99,7 +100,7 @@ def row_coefficients(coefficients: Array, y: Map) -> Map:
 POWERS = np.array(COLOUR_TERMS, np.int64)
 
 
-@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract", "reassoc"}, cache=True)
+@whole(fastmath={"nsz", "arcp", "contract", "reassoc"})
 def evaluate_rows(first, last, change, x, rows, powers, slope_x, slope_y):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Write the slopes of some rows of a frame.
 

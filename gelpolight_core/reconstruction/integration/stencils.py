@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 
 _flags = {"nsz", "contract", "reassoc"}
-_whole = njit(cache=True, nogil=True, fastmath=_flags)
-_part = njit(fastmath=_flags, **PART)
+_whole, _part = compiling.whole(fastmath=_flags), compiling.part(fastmath=_flags)
 
 
 @_part

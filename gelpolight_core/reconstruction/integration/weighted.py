@@ -12,12 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 from gelpolight_core.reconstruction.compiled import HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.integration.columns import settled_rows, solve_columns
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -30,8 +29,7 @@ SHARED_NODES, SHARED_SUMS = 60_000, 200_000
 """For smaller grids, one thread finishes transforms and passes before a second thread starts."""
 
 _flags = {"nsz", "arcp", "contract", "reassoc"}
-_whole = numba.njit(nogil=True, fastmath=_flags, cache=True)
-_part = numba.njit(fastmath=_flags, **PART)
+_whole, _part = compiling.whole(fastmath=_flags), compiling.part(fastmath=_flags)
 _SHARE = single(1.0 / 24.0)
 
 

@@ -20,11 +20,10 @@ from __future__ import annotations
 
 from math import cos, pi, radians, sin, sqrt
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
 from gelpolight_core.reconstruction.compiled import BLOCK, HALF, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
@@ -50,10 +49,14 @@ _B = BLOCK
 # membrane, the best normal so far, its misfit, the step from it, and where the steps from another
 # start ended.
 _WIDTHS = (3, 3, 3, 3, 1, 4, 4, 1, 3, 3, 3, 9, 3, 2, 1, 1, 1, 3, 1, 3, 3, 1)
-_FIRST = (np.cumsum(_WIDTHS) - _WIDTHS).tolist()
+# NumPy's whole numbers: for each of Python's, a part that takes it is compiled once more.
+_FIRST = np.cumsum(_WIDTHS) - _WIDTHS
 _RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND, _REST, *_LATER = _FIRST
 _SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE, _TRUST, _FLAG, _MOVED, *_GLOSSY = _LATER
 _BEST, _MISFIT, _STEP, _OTHER, _OTHER_MISFIT = _GLOSSY
+_RED, _GREEN, _BLUE = np.arange(3)
+_RAY_0, _RAY_1, _RAY_2, _RAY_3, _RAY_4, _RAY_5 = np.arange(6)
+_YES = np.bool_(True)
 _PI = single(pi)
 _LEAST_COSINE, _LEAST_VIEW = single(1e-3), single(1e-2)
 _STEEPEST = single(STEEPEST_NZ)
@@ -86,8 +89,8 @@ def _starts() -> NDArray[np.float32]:
 
 STARTS = _starts()
 
-_part = numba.njit(fastmath=True, error_model="numpy", **PART)
-_whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+_part = compiling.part(fastmath=True, error_model="numpy")
+_whole = compiling.whole(fastmath=True, error_model="numpy")
 
 
 @_part
@@ -194,14 +197,13 @@ def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 
 
 @_part
-def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0).
 
     Where shadows are `judged` by the present surface, a channel is dark where its light is hidden;
     otherwise where it shows almost no direct light.
     """
-    direct = ratio if interreflection is None else ratio - around
-    direct = direct * scale
+    direct = (ratio - around) * scale
     low = _most(dark, _least(_SIGMAS * sigma, _SHARE) * scale)
     lit = ONE if direct >= low else ZERO
     lit = ONE - hidden if judged > ZERO else lit
@@ -291,7 +293,7 @@ def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cov
 
 
 @_part
-def _channels(w, j, dark, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _channels(w, j, dark, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the result of `_direct_light` for the three channels of a node."""
     r0, r1, r2 = _triple(w, _RATIO, j)
     a0, a1, a2 = _triple(w, _AROUND, j)
@@ -301,9 +303,9 @@ def _channels(w, j, dark, interreflection, shadows):  # type: ignore[no-untyped-
     s0, s1, s2 = _triple(w, _SCALED, j)
     judged = w[(_HIDDEN + 3) * _B + j]
     return (
-        _direct_light(r0, a0, g0, b0, h0, judged, s0, dark[0], interreflection, shadows),
-        _direct_light(r1, a1, g1, b1, h1, judged, s1, dark[1], interreflection, shadows),
-        _direct_light(r2, a2, g2, b2, h2, judged, s2, dark[2], interreflection, shadows),
+        _direct_light(r0, a0, g0, b0, h0, judged, s0, dark[0], shadows),
+        _direct_light(r1, a1, g1, b1, h1, judged, s1, dark[1], shadows),
+        _direct_light(r2, a2, g2, b2, h2, judged, s2, dark[2], shadows),
     )
 
 
@@ -319,7 +321,7 @@ def _rest(w, j, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - com
 
 @_part
 def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    w, rays, position, leds, dark, curves, table, gloss, reflected, shadows, warm, rest
+    w, rays, position, leds, dark, curves, table, gloss, shadows, warm, rest
 ):
     """Find lights, view and a first normal of a block's nodes.
 
@@ -338,10 +340,10 @@ def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         l2, near2 = _light(leds[2], x, y + d * wy, d - height)
         s0, s1, s2 = _triple(w, _SCALE, j)
         _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
-        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, reflected, shadows)
-        f0 = _response(l0, flat, v, curves[0], table, gloss, 0)[0]
-        f1 = _response(l1, flat, v, curves[1], table, gloss, 1)[0]
-        f2 = _response(l2, flat, v, curves[2], table, gloss, 2)[0]
+        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, shadows)
+        f0 = _response(l0, flat, v, curves[0], table, gloss, _RED)[0]
+        f1 = _response(l1, flat, v, curves[1], table, gloss, _GREEN)[0]
+        f2 = _response(l2, flat, v, curves[2], table, gloss, _BLUE)[0]
         e0 = _least(_inner(l0, flat) * _most(d0, ZERO) / _most(f0, _DAMP), ONE)
         e1 = _least(_inner(l1, flat) * _most(d1, ZERO) / _most(f1, _DAMP), ONE)
         e2 = _least(_inner(l2, flat) * _most(d2, ZERO) / _most(f2, _DAMP), ONE)
@@ -361,9 +363,9 @@ def _begin_block(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 def _misfit(w, n, j, channels, curves, table, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return how far a normal is from a node's light, in squared standard deviations."""
     v = _triple(w, _VIEW, j)
-    f0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)[0]
-    f1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)[0]
-    f2 = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)[0]
+    f0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)[0]
+    f1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)[0]
+    f2 = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, _BLUE)[0]
     s0, s1, s2 = _triple(w, _SCALED, j)
     g0, g1, g2 = _triple(w, _NOISE, j)
     (t0, _, k0), (t1, _, k1), (t2, _, k2) = channels
@@ -375,7 +377,7 @@ def _misfit(w, n, j, channels, curves, table, gloss):  # type: ignore[no-untyped
 
 
 @_part
-def _search_block(w, dark, curves, table, gloss, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _search_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Where three lights fit badly, start again from the best of many normals farther away.
 
     Under a glossy lobe, brightness rises and falls with slope: steps from a bad start end at a
@@ -383,7 +385,7 @@ def _search_block(w, dark, curves, table, gloss, interreflection, shadows):  # t
     """
     worst = ZERO
     for j in range(_B):
-        (_, _, k0), (_, _, k1), (_, _, k2) = _channels(w, j, dark, interreflection, shadows)
+        (_, _, k0), (_, _, k1), (_, _, k2) = _channels(w, j, dark, shadows)
         judged = (k0 + k1 + k2 > single(2.5)) & (w[_KIND * _B + j] > single(1.5))
         misfit = w[_MISFIT * _B + j] if judged else ZERO
         w[_OTHER_MISFIT * _B + j] = misfit
@@ -394,7 +396,7 @@ def _search_block(w, dark, curves, table, gloss, interreflection, shadows):  # t
         return False
     for j in range(_B):
         if w[_OTHER_MISFIT * _B + j] > _BAD:
-            channels = _channels(w, j, dark, interreflection, shadows)
+            channels = _channels(w, j, dark, shadows)
             least, found = _WORST, _triple(w, _OTHER, j)
             for k in range(STARTS.shape[0]):
                 n = (STARTS[k, 0], STARTS[k, 1], STARTS[k, 2])
@@ -415,7 +417,7 @@ def _compare_block(w):  # type: ignore[no-untyped-def]  # pragma: no cover - com
 
 
 @_part
-def _step_block(w, dark, curves, table, gloss, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _step_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Do one Gauss-Newton step at a block's nodes; return the square of the longest.
 
     Under a glossy lobe, a step that fits worse than the best normal so far is taken back, and a
@@ -423,14 +425,14 @@ def _step_block(w, dark, curves, table, gloss, interreflection, shadows):  # typ
     """
     for j in range(_B):
         n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
-        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, interreflection, shadows)
+        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, shadows)
         s0, s1, s2 = _triple(w, _SCALED, j)
         g0, g1, g2 = _triple(w, _NOISE, j)
-        f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)
+        f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
         a11, a12, a22, ag1, ag2, am = _pull(f, gx, gy, gz, n, t0, s0, g0, k0)
-        f, gx, gy, gz = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)
+        f, gx, gy, gz = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)
         b11, b12, b22, bg1, bg2, bm = _pull(f, gx, gy, gz, n, t1, s1, g1, k1)
-        f, gx, gy, gz = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)
+        f, gx, gy, gz = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, _BLUE)
         c11, c12, c22, cg1, cg2, cm = _pull(f, gx, gy, gz, n, t2, s2, g2, k2)
         m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
         h1, h2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
@@ -473,11 +475,11 @@ def _kept(w, j, n, step, misfit):  # type: ignore[no-untyped-def]  # pragma: no 
 
 
 @_part
-def _best_block(w, dark, curves, table, gloss, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _best_block(w, dark, curves, table, gloss, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Go back to the best normal where the last step fits worse."""
     for j in range(_B):
         n, best = _triple(w, _NORMAL, j), _triple(w, _BEST, j)
-        channels = _channels(w, j, dark, interreflection, shadows)
+        channels = _channels(w, j, dark, shadows)
         misfit = _misfit(w, n, j, channels, curves, table, gloss)
         better = misfit <= _most(w[_MISFIT * _B + j], _BAD)
         w[_MISFIT * _B + j] = misfit if better else w[_MISFIT * _B + j]
@@ -492,15 +494,13 @@ def _unseen(w, light, n, j, range_of, counts):  # type: ignore[no-untyped-def]  
 
 
 @_part
-def _end_block(w, rays, dark, interreflection, coverage, shadows, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _end_block(w, rays, dark, coverage, shadows, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Turn a block's normals into slopes along the rays, their weights and their flags."""
     for j in range(_B):
         d, at = w[_DEPTH * _B + j], single(j)
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
         n = _triple(w, _NORMAL, j)
-        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(
-            w, j, dark, interreflection, shadows
-        )
+        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, shadows)
         known = k0 + k1 + k2
         solved = known > single(1.5)
         (_, rest_x, rest_y), flat = _rest(w, j, rest)
@@ -567,23 +567,23 @@ def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # p
     x = (position + 0.5) * step - 0.5
     last = (position + count - 0.5) * step - 0.5
     share = ONE / single(max(count - 1, 1))
-    a, a1 = _ramp(rays, 0, y, x, last, share)
-    b, b1 = _ramp(rays, 1, y, x, last, share)
-    c, c1 = _ramp(rays, 2, y, x, last, share)
-    d, d1 = _ramp(rays, 3, y, x, last, share)
-    e, e1 = _ramp(rays, 4, y, x, last, share)
-    f, f1 = _ramp(rays, 5, y, x, last, share)
+    a, a1 = _ramp(rays, _RAY_0, y, x, last, share)
+    b, b1 = _ramp(rays, _RAY_1, y, x, last, share)
+    c, c1 = _ramp(rays, _RAY_2, y, x, last, share)
+    d, d1 = _ramp(rays, _RAY_3, y, x, last, share)
+    e, e1 = _ramp(rays, _RAY_4, y, x, last, share)
+    f, f1 = _ramp(rays, _RAY_5, y, x, last, share)
     return a, a1, b, b1, c, c1, d, d1, e, e1, f, f1
 
 
 @_part
-def _load(w, image, depth, scale, rest, corner, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _load(w, image, depth, scale, rest, corner, reflects, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Copy a block of row `i` into the work array."""
     row, position = i + corner[0], begin + corner[1]
     # Plain indices: a view of a row is counted, and threads would wait for the counter.
     ratio, noise, around, marks = image.ratio, image.noise, image.around, image.marks
     flat, kind = scale.flat, scale.kind
-    from_around = around.shape[2] > 1
+    from_around = reflects and around.shape[2] > 1
     for k in range(3):
         for j in range(count):
             w[(_RATIO + k) * _B + j] = ratio[k, i, begin + j]
@@ -644,7 +644,8 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
     """
     columns = depth.shape[1]
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
-    gloss, interreflection, coverage = membrane.gloss, membrane.interreflection, membrane.coverage
+    gloss, coverage = membrane.gloss, membrane.coverage
+    reflects = membrane.interreflection > ZERO
     most, settled, shadows, warm = steps.most, single(steps.settled), steps.shadows, steps.warm
     w = np.zeros(sum(_WIDTHS) * _B, np.float32)
     begun, pitch, rest = ONE if warm else ZERO, single(scale.pitch_mm), scale.rest
@@ -653,25 +654,23 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
             position = corner[1] + begin
-            _load(w, image, depth, scale, rest, corner, slopes, warm, i, begin, count)
+            _load(w, image, depth, scale, rest, corner, reflects, slopes, warm, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
-            _begin_block(
-                w, rays, at, leds, dark, curves, table, gloss, interreflection, shadows, begun, rest
-            )
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, shadows, begun, rest)
             if gloss is not None:
                 w[_MISFIT * _B : (_MISFIT + 1) * _B] = _WORST
             for _ in range(most):
-                if _step_block(w, dark, curves, table, gloss, interreflection, shadows) < settled:
+                if _step_block(w, dark, curves, table, gloss, shadows) < settled:
                     break
             if gloss is not None:
-                _best_block(w, dark, curves, table, gloss, interreflection, shadows)
-                if _search_block(w, dark, curves, table, gloss, interreflection, shadows):
+                _best_block(w, dark, curves, table, gloss, shadows)
+                if _search_block(w, dark, curves, table, gloss, shadows):
                     for _ in range(most):
-                        _step_block(w, dark, curves, table, gloss, interreflection, shadows)
-                    _best_block(w, dark, curves, table, gloss, interreflection, shadows)
+                        _step_block(w, dark, curves, table, gloss, shadows)
+                    _best_block(w, dark, curves, table, gloss, shadows)
                     _compare_block(w)
-            _end_block(w, rays, dark, interreflection, coverage, shadows, rest)
+            _end_block(w, rays, dark, coverage, shadows, rest)
             _store(w, _SLOPE, slopes.slope_x, i, begin, count)
             _store(w, _SLOPE + 1, slopes.slope_y, i, begin, count)
             _store(w, _TRUST, slopes.weight, i, begin, count)
@@ -682,18 +681,18 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
 
 
 @_part
-def _left_over(w, j, dark, curves, table, gloss, interreflection, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _left_over(w, j, dark, curves, table, gloss, rest):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a node's light that no normal explains, its whole light, noise and slope of depth.
 
     Three channels have one direction more than a normal: that in which no change of the normal
     changes them. All are NaN where a channel is dark, saturated or hidden.
     """
     n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
-    (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, interreflection, True)
+    (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, _YES)
     s0, s1, s2 = _triple(w, _SCALED, j)
-    f0, x0, y0, z0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)
-    f1, x1, y1, z1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)
-    f2, x2, y2, z2 = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)
+    f0, x0, y0, z0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, _RED)
+    f1, x1, y1, z1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, _GREEN)
+    f2, x2, y2, z2 = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, _BLUE)
     c0, c1, c2 = _cross(
         (
             (n[0] * z0 - n[2] * x0) / s0,
@@ -738,7 +737,7 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
     """
     columns = depth.shape[1]
     leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
-    gloss, interreflection = membrane.gloss, membrane.interreflection
+    gloss, reflects = membrane.gloss, membrane.interreflection > ZERO
     w = np.zeros(sum(_WIDTHS) * _B, np.float32)
     pitch, rest = single(scale.pitch_mm), scale.rest
     for k in range(first, last):
@@ -747,17 +746,15 @@ def left_rows(first, last, image, depth, scale, corner, membrane, slopes, step, 
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
             position = corner[1] + begin
-            _load(w, image, depth, scale, rest, corner, slopes, True, i, begin, count)
+            _load(w, image, depth, scale, rest, corner, reflects, slopes, _YES, i, begin, count)
             at = (y, single(scale.x_mm + scale.pitch_mm * position), pitch)
             rays = ray_ramps(scale, i + corner[0], position, count)
-            _begin_block(
-                w, rays, at, leds, dark, curves, table, gloss, interreflection, True, ONE, rest
-            )
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, _YES, ONE, rest)
             for j in range(count):
                 nx, ny = slopes.normal_x[i, begin + j], slopes.normal_y[i, begin + j]
                 nz = -sqrt(_most(ONE - nx * nx - ny * ny, _TINY))
                 _put(w, _NORMAL, j, (nx, ny, nz))
-                found = _left_over(w, j, dark, curves, table, gloss, interreflection, rest)
+                found = _left_over(w, j, dark, curves, table, gloss, rest)
                 for part in range(4):
                     left[part, k, begin + j] = found[part]
 

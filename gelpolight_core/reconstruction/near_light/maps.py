@@ -271,7 +271,7 @@ def membrane_numbers(
         curves,
         None if error <= CURVE_ERROR else _table(membrane),
         (_single(membrane.gloss), _single(membrane.roughness**2)) if glossy else None,
-        _single(membrane.interreflection) if membrane.interreflection > LEAST_SHARE else None,
+        _single(membrane.interreflection if membrane.interreflection > LEAST_SHARE else 0.0),
         tuple((_single(low), _single(high)) for low, high in np.asarray(coverage)),
     )
 

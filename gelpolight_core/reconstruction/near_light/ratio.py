@@ -120,7 +120,7 @@ class PressSampler:
             if terms.sharpening:
                 self._sharpen(coarse, region, inverse_of_blur(HALVING / 4.0))
         fine = coarse if factor == COARSE else sampled
-        if self.maps.membrane.interreflection is not None:
+        if self.maps.membrane.interreflection > 0.0:
             coarse = self._as_if_flat(coarse, region, "coarse")
             fine = self._as_if_flat(fine, region, "fine")
         return Compared(fine, coarse, edge, kernel)

@@ -189,7 +189,7 @@ class RegionSolver:
         With interreflection, further rounds include it.
         """
         at = (self.maps.scale(COARSE), region.corner)
-        reflected = self.maps.membrane.interreflection is not None
+        reflected = self.maps.membrane.interreflection > 0.0
         normals: tuple[Map, Map] | None = None
         boundary = None if terms.free_boundary and terms.weights else Boundary()
         tolerances = list(settings.round_tolerances)

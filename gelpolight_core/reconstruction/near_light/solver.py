@@ -391,7 +391,7 @@ class NearLightSolver(OpenSolver):
             record.left_out(tr("denoising"), tr("switched off"))
         elif factor == COARSE:
             record.left_out(tr("denoising"), tr("averages over 4 x 4 pixels have little noise"))
-        if self.maps.membrane.interreflection is None:
+        if self.maps.membrane.interreflection == 0.0:
             record.left_out(tr("interreflection"), tr("this membrane has none"))
         if self.maps.membrane.gloss is None:
             record.left_out(tr("gloss"), tr("this membrane has none"))

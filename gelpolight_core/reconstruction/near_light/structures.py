@@ -102,8 +102,8 @@ class MembraneNumbers(NamedTuple):
         The same at even cosines, where no polynomial follows the curve.
     gloss : 2, or None
         Share and squared roughness of the glossy lobe.
-    interreflection : float or None
-        Reflectance for light from other parts of the membrane; None: it gives none.
+    interreflection : float
+        Reflectance for light from other parts of the membrane; 0: it gives none.
     coverage : 3 x 2
         Cosines of each light that the ball presses have shown.
     """
@@ -113,7 +113,7 @@ class MembraneNumbers(NamedTuple):
     curves: tuple[tuple[float, ...], ...]
     table: Map | None
     gloss: tuple[float, float] | None
-    interreflection: float | None
+    interreflection: float
     coverage: tuple[tuple[float, float], ...]
 
 

@@ -55,7 +55,7 @@ def surface_image(height_map: HeightMap, maps: SensorMaps, around: FromAround, s
     coarse = np.asarray(np.moveaxis(direct, -1, 0) / scale.flat, np.float32)
     reflected, clear = np.zeros_like(coarse), np.full_like(coarse, 2.0 * CLEAR)
     # Without interreflection, one round finds the shadows.
-    for _ in range(BOUNCES if maps.membrane.interreflection is not None else 1):
+    for _ in range(BOUNCES if maps.membrane.interreflection > 0.0 else 1):
         lit = np.where(clear < CLEAR, 0.0, coarse) + reflected
         reflected, clear = around.on(
             Region((0, 0), (rows, columns)),

@@ -185,7 +185,7 @@ def _ratio_sd(
     """Return the standard deviation (3, rows, columns) of press over background."""
     mix = maps.calibration.crosstalk.astype(np.float32)
     unmix = np.linalg.inv(maps.calibration.crosstalk) ** 2
-    base = maps.full.background[here]
+    base = np.ascontiguousarray(maps.full.background[here])
     # A step of a hundredth of the light: the curves are straight lines between few levels.
     even = np.linspace(0.0, 1.0, 101, dtype=np.float32)
     table = noise.at(np.repeat(even[None, None], 3, axis=0))[:, 0]

@@ -7,13 +7,13 @@ the loops that make them and the loops that add them up.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gelpolight_core.compiling import whole
 from gelpolight_core.reconstruction.integration.stencils import add_along_row, add_down
 from gelpolight_core.reconstruction.paper.kernel import solve_row, work_arrays
 
 
-@njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, error_model="numpy", cache=True)
+@whole(fastmath={"nsz", "arcp", "contract"}, error_model="numpy")
 def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     first, last, image, sensor, edges, top, left, keep, slope_x, slope_y, flags, field
 ):

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numba
 import numpy as np
 
-from gelpolight_core.compiled_part import PART
+from gelpolight_core import compiling
 from gelpolight_core.masks import DARK_COSINE
 from gelpolight_core.reconstruction.compiled import BLOCK, ONE, ZERO, single
 from gelpolight_core.reconstruction.height_map import Flag
@@ -37,8 +36,8 @@ _WIDTHS = (2, 3, 1, 1, 1, 3)
 _PLACE, _SEEN, _TOP, _FAR, _BAD, _OUT = (np.cumsum(_WIDTHS) - _WIDTHS).tolist()
 
 _flags = {"nsz", "arcp", "contract"}
-_part = numba.njit(fastmath=_flags, error_model="numpy", **PART)
-_whole = numba.njit(nogil=True, fastmath=_flags, error_model="numpy", cache=True)
+_part = compiling.part(fastmath=_flags, error_model="numpy")
+_whole = compiling.whole(fastmath=_flags, error_model="numpy")
 
 
 @_part

@@ -1,0 +1,68 @@
+"""Loops run wherever the program is installed, also where compiled code cannot be kept."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import shutil
+from pathlib import Path
+from types import ModuleType
+
+import numba
+import pytest
+
+from gelpolight_core import compiling
+
+LOOP = """
+from gelpolight_core.compiling import whole
+
+@whole()
+def twice(x):
+    return 2 * x
+"""
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with a module of loops; nothing can be written elsewhere."""
+    (tmp_path / "home").write_text("")  # a file: no folder can be made in it, not even by root
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "home" / "impossible"))
+    compiling.say_that_nothing_is_kept.cache_clear()
+    folder = tmp_path / "installed"
+    folder.mkdir()
+    (folder / "loops.py").write_text(LOOP)
+    return folder
+
+
+def load(folder: Path) -> ModuleType:
+    """Load the module of loops as in a new start."""
+    spec = importlib.util.spec_from_file_location("loops", folder / "loops.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_what_was_compiled_is_kept_beside_the_source(
+    installed: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert load(installed).twice(2) == 4
+    again = load(installed)
+    assert again.twice(2) == 4
+    assert sum(again.twice.stats.cache_hits.values()) == 1 and not caplog.records
+
+
+@pytest.mark.parametrize("when", ["at the start", "when it is written"])
+def test_loops_run_where_nothing_can_be_kept_and_the_log_says_so_once(
+    installed: Path, caplog: pytest.LogCaptureFixture, when: str
+) -> None:
+    kept = installed / "__pycache__"
+    if when == "at the start":
+        kept.write_text("")
+    loops = load(installed)
+    if when == "when it is written":
+        shutil.rmtree(kept)
+        kept.write_text("")
+    assert loops.twice(2) == 4 and loops.twice(2.5) == 5.0
+    assert [record.levelno for record in caplog.records] == [logging.WARNING]
