@@ -10,8 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QOpenGLContext, QSurface
 from PySide6.QtWidgets import QMainWindow
 from pytestqt.qtbot import QtBot
+from shiboken6 import getAllValidWrappers
 
 from app.services.jobs import Jobs
 from app.services.settings import Settings
@@ -236,13 +238,16 @@ def test_the_window_is_not_built_again_for_the_first_3d_view(
     window.deleteLater()
 
 
-def test_a_closed_view_is_freed(settings: Settings, made: Made, qtbot: QtBot) -> None:
+def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(
+    settings: Settings, made: Made, qtbot: QtBot
+) -> None:
     gone = []
-    for _ in range(3):
+    for _ in range(10):
         jobs = Jobs("test")
         panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+        panel.resize(200, 200)
         panel.show()
-        panel.show_surface(made(largest=128))
+        panel.show_surface(made(largest=16))
         qtbot.waitUntil(lambda p=panel: p.view is not None and p.view.drawings > 0, timeout=WAIT_MS)
         gone.append((weakref.ref(panel.view), weakref.ref(panel.view.scene)))
         panel.finish()
@@ -250,7 +255,9 @@ def test_a_closed_view_is_freed(settings: Settings, made: Made, qtbot: QtBot) ->
         panel.close()
         panel.deleteLater()
         del panel
-    qtbot.wait(50)
+        qtbot.wait(5)
+        # An object that Qt makes at their address later would come back to Python as one of these.
+        assert not [o for o in getAllValidWrappers() if isinstance(o, QSurface | QOpenGLContext)]
     gc.collect()
     assert [alive for pair in gone for alive in pair if alive() is not None] == []
 
