@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QOpenGLContext, QSurface
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtGui import QGuiApplication, QOpenGLContext, QSurface
+from PySide6.QtWidgets import QLabel, QMainWindow, QMenu, QWidget
 from pytestqt.qtbot import QtBot
 from shiboken6 import getAllValidWrappers
 
@@ -21,6 +21,7 @@ from app.view2d.display import colour_table
 from app.view3d.overlays import axes_marks
 from app.view3d.panel import SurfacePanel
 from app.view3d.style import VIEWS, Style
+from app.widgets.layout import hbox
 from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, Made, flat_map, pixels
 
 PLAIN = Style(axes=False, colour_bar=False, orientation=False)
@@ -213,7 +214,7 @@ def test_style_and_viewpoints_are_remembered(
     jobs.close()
 
 
-def test_the_window_is_not_built_again_for_the_first_3d_view(
+def test_a_3d_view_neither_rebuilds_its_window_nor_leaves_closed_menus_painted_on_it(
     settings: Settings, made: Made, qtbot: QtBot
 ) -> None:
     class Window(QMainWindow):
@@ -223,15 +224,29 @@ def test_the_window_is_not_built_again_for_the_first_3d_view(
             self.rebuilt += event.type() == QEvent.Type.WinIdChange
             return bool(super().event(event))
 
-    jobs, window = Jobs("test"), Window()
+    jobs, window, beside = Jobs("test"), Window(), QLabel("Beside the view")
     panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
-    window.setCentralWidget(panel)
+    centre = QWidget()
+    hbox(beside, (panel, 1), of=centre)
+    window.setCentralWidget(centre)
     window.show()
     qtbot.waitExposed(window)
+
+    def on_screen() -> np.ndarray:
+        at = beside.mapToGlobal(QPoint())
+        image = QGuiApplication.primaryScreen().grabWindow(0, at.x(), at.y(), 80, 200)
+        return pixels(image.toImage())
+
     before = window.rebuilt
     panel.show_surface(made(largest=128))
     qtbot.waitUntil(lambda: panel.view is not None and panel.view.drawings > 0, timeout=WAIT_MS)
     assert window.rebuilt == before
+    clean, menu = on_screen(), QMenu(window)
+    menu.addAction("An action with a long name")
+    menu.popup(beside.mapToGlobal(QPoint(0, 40)))
+    qtbot.waitUntil(lambda: not np.array_equal(on_screen(), clean), timeout=WAIT_MS)
+    menu.close()
+    qtbot.waitUntil(lambda: np.array_equal(on_screen(), clean), timeout=WAIT_MS)
     panel.finish()
     jobs.close()
     window.close()
