@@ -211,7 +211,6 @@ class InspectPage(QWidget):
 
     def _show_texts(self) -> None:
         self.modes.follow(self.live_depth.last)
-        self.views.surface.refresh_pins()
         texts = self.stream.text, self.live_depth.rate_text()
         self._rate.setText("\n".join(filter(None, texts)))
         self._rate.setToolTip(plain_tip(self.live_depth.trace_text()))

@@ -90,6 +90,21 @@ def test_pointing_finds_the_visible_point(
         assert found == pytest.approx((x, y), abs=0.15)  # a node
 
 
+def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(
+    panel: SurfacePanel, made: Made
+) -> None:
+    view = panel.view
+    assert view is not None
+    panel.set_pins((BUMP[:2],))
+    panel.show_surface(made(factor=0.5))
+    (height,) = view.actors["pins-points"].mapper.dataset.points[:, 2]
+    assert height == pytest.approx(view.scene.style.exaggeration * 0.5 * BUMP[2], abs=0.01)
+    assert "0.500 mm" in view.actors["pin-text"].GetText(1)
+    panel.show_surface(None)  # the source or the calibration changed
+    panel.show_surface(made())
+    assert not [name for name in view.actors if name.startswith("pin")]
+
+
 def test_a_click_sets_a_pin_and_a_drag_rotates(panel: SurfacePanel, qtbot: QtBot) -> None:
     panel.view_from("top")
     view = panel.view
