@@ -25,7 +25,9 @@ class NativeWindows(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Report a widget that is shown, and repaint what is uncovered."""
         if isinstance(watched, QWindow) and isinstance(event, QPaintEvent):
-            QWidget.find(watched.winId()).update(event.region())
+            around = QWidget.find(watched.winId())
+            if around is not None:
+                around.update(event.region())
         elif event.type() == QEvent.Type.Show and isinstance(watched, QWidget):
             watched.window().windowHandle().installEventFilter(self)
             self.appeared.emit()
