@@ -58,7 +58,9 @@ class InspectPage(QWidget):
         self._readout = named(
             PlainLabel(wrap=True), "inspect.readout", tr("Values under the cursor")
         )
-        self._readout.setMinimumHeight(2 * self._readout.fontMetrics().lineSpacing())
+        # For the deviation, the place and the flags, so that nothing below moves with the pointer.
+        self._readout.setFixedHeight(3 * self._readout.fontMetrics().lineSpacing())
+        self._readout.setAlignment(Qt.AlignmentFlag.AlignTop)
         show_meaning(self._readout, "muted")
         self._rate = named(PlainLabel(wrap=True), "inspect.rate", tr("Rate and processing time"))
         self._rate.setMinimumHeight(2 * self._rate.fontMetrics().lineSpacing())
@@ -211,7 +213,6 @@ class InspectPage(QWidget):
 
     def _show_texts(self) -> None:
         self.modes.follow(self.live_depth.last)
-        self.views.surface.refresh_pins()
         texts = self.stream.text, self.live_depth.rate_text()
         self._rate.setText("\n".join(filter(None, texts)))
         self._rate.setToolTip(plain_tip(self.live_depth.trace_text()))

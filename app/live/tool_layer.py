@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QFontMetricsF, QPainter, QPolygonF, QTransform
+from PySide6.QtGui import QFontMetricsF, QGuiApplication, QPainter, QPolygonF, QTransform
 
 from app.live.dragging import LEFT, Draggable
 from app.live.drawing import ROLE_COLOURS, colour_of, paint_grip, paint_plate, stroke
@@ -85,6 +85,7 @@ class ToolLayer(Draggable):
         self._grip = ""
         self._dragged = ""
         self._begun: tuple[Point, ...] = ()
+        self._towards: tuple[Point, ...] = ()
 
     def show_tools(
         self, tools: tuple[DrawnTool, ...], grips: tuple[Grip, ...], grip: str = ""
@@ -95,7 +96,7 @@ class ToolLayer(Draggable):
 
     def show_begun(self, clicked: tuple[Point, ...]) -> None:
         """Show the points clicked so far for a tool that needs more."""
-        self._begun = clicked
+        self._begun, self._towards = clicked, ()
         self.update()
 
     def boundingRect(self) -> QRectF:  # noqa: D102
@@ -108,16 +109,30 @@ class ToolLayer(Draggable):
         return None if self._grip_at(at) is None else Qt.CursorShape.SizeAllCursor
 
     def grab(self, at: QPointF) -> bool:
-        """Choose a grip, and begin to drag it."""
-        grip = None if self.placing else self._grip_at(at)
-        if grip is not None:
+        """Choose a grip, and begin to drag it; or the first point of a tool that is drawn."""
+        self._dragged = ""
+        if self.placing:
+            self._user.on_point((at.x(), at.y()))
+            return True
+        if (grip := self._grip_at(at)) is not None:
             self._dragged = grip.name
             self._user.on_grip(grip.name)
         return grip is not None
 
     def drag_to(self, down: QPointF, now: QPointF, *, ended: bool) -> None:
-        """Move the grip."""
-        self._user.on_drag(self._dragged, (now.x(), now.y()), ended=ended)
+        """Move the grip, or the next point of the tool that is drawn."""
+        if self._dragged:
+            self._user.on_drag(self._dragged, (now.x(), now.y()), ended=ended)
+            return
+        way = self.mapToScene(now) - self.mapToScene(down)
+        drawn = (
+            self.placing
+            and way.manhattanLength() >= QGuiApplication.styleHints().startDragDistance()
+        )
+        self._towards = ((now.x(), now.y()),) if drawn and not ended else ()
+        self.update()
+        if drawn and ended:
+            self._user.on_point((now.x(), now.y()))
 
     def mouseClickEvent(self, event: Any) -> None:  # noqa: D102
         if event.button() != LEFT or event.double():
@@ -154,7 +169,8 @@ class ToolLayer(Draggable):
         painter.save()
         painter.resetTransform()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        for tool in self.tools:
+        begun = DrawnTool(0, ((*self._begun, *self._towards),), CHOSEN)
+        for tool in (*self.tools, begun):
             self._paint_lines(painter, tool, to_screen)
         visible = to_screen.mapRect(QRectF(self.viewRect()))
         occupied: list[QRectF] = []
@@ -164,7 +180,7 @@ class ToolLayer(Draggable):
         for grip in self._grips:
             at = to_screen.map(QPointF(*grip.at_mm))
             paint_grip(painter, at, CHOSEN, grip.name == self._grip)
-        for point in self._begun:
+        for point in (*self._begun, *self._towards):
             paint_grip(painter, to_screen.map(QPointF(*point)), CHOSEN, False)
         painter.restore()
 

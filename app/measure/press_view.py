@@ -266,6 +266,8 @@ class PressView(QWidget):
 
     def release(self) -> None:
         """Continue with the live image."""
+        if self.work.image is not None and self.work.image.path is not None:
+            self.stage.surface.set_pins(())  # they were on another source's image
         self._steady.hold(None)
         self.work.take(None)
         self._want()
@@ -490,5 +492,6 @@ class PressView(QWidget):
     def _on_source(self) -> None:
         self._shown = None
         self._steady.restart()
+        self.stage.surface.set_pins(())
         if self.work.image is None:
             self.stage.say(tr("No depth yet."))

@@ -16,7 +16,7 @@ from app.measure.placing import BY_NAME, first_points, make_tool
 from app.measure.work import Work
 from app.view2d.map_point import Reading
 from app.widgets.keys import ARROWS
-from app.widgets.label import PlainLabel
+from app.widgets.label import CutLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
 from app.widgets.units import in_unit
@@ -46,8 +46,8 @@ class ToolMap(HeightPanel):
         self._work, self._on_placed = work, on_placed
         self._kind = ""
         self._points: list[Point] = []
-        self.hint = named(PlainLabel(), "measure.hint", tr("What to do next on the map"))
-        self.readout = named(PlainLabel(), "measure.readout", tr("Values under the pointer"))
+        self.hint = named(CutLabel(), "measure.hint", tr("What to do next on the map"))
+        self.readout = named(CutLabel(), "measure.readout", tr("Values under the pointer"))
         self.column.addLayout(hbox((self.hint, 1), self.readout, margins=(12, 4, 12, 4)))
 
     # Placing

@@ -82,7 +82,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         named(self, "main", tr("GelPoLight Studio"))
         self.setWindowTitle(tr("GelPoLight Studio"))
-        self.setMinimumSize(SMALLEST.boundedTo(self.screen().availableSize()))
+        self.setMinimumSize(SMALLEST.boundedTo(QGuiApplication.primaryScreen().availableSize()))
         self.setAcceptDrops(True)
         self.context = context
         self.entries = {entry.name: entry for entry in pages or all_pages()}
@@ -141,7 +141,7 @@ class MainWindow(QMainWindow):
     def _restore_layout(self) -> None:
         geometry, state = self.context.settings.window_state()
         if not self.restoreGeometry(geometry):
-            room = self.screen().availableSize()
+            room = QGuiApplication.primaryScreen().availableSize()
             self.resize(FIRST_SIZE.boundedTo(room * 0.9))
             if self.size() != FIRST_SIZE:
                 # The frame would extend beyond the edge of the screen and hide its last line.

@@ -46,8 +46,8 @@ class Reading:
         parts = [where.format(x=self.x_mm, y=self.y_mm, s=self.slope_deg)]
         if math.isfinite(self.depth_sd_mm):
             parts.insert(0, tr("± {d} (1 sd)").format(d=in_unit(self.depth_sd_mm)))
-        parts.extend(word for flag, word in flag_words().items() if self.flags & flag.value)
-        return "\n".join(parts)
+        words = (word for flag, word in flag_words().items() if self.flags & flag.value)
+        return "\n".join([*parts, ", ".join(words)]).strip()
 
 
 def read_at(heightmap: HeightMap, x_mm: float, y_mm: float) -> Reading | None:

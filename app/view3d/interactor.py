@@ -323,6 +323,9 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         """Stop drawing when VTK's window is closed."""
         self._finished = True
         super().closeEvent(event)
+        # Qt deletes both without a word to Python, and a new object at their address would come
+        # back as the old surface.
+        self._forget_context()
 
     # Theme
 

@@ -159,6 +159,8 @@ class SurfacePanel(QWidget):
             self.set_pins(())
         elif self.view is not None:
             self.view.show_surface(surface, still=still)
+            if self.pins:
+                self._draw_pins()
             self._stack.setCurrentWidget(self._frame)
         elif self._flat is not None:
             self._flat.set_image(surface.texture, surface.extent_mm)
@@ -227,11 +229,6 @@ class SurfacePanel(QWidget):
         self.pins = pins
         self._draw_pins()
 
-    def refresh_pins(self) -> None:
-        """Update the depths of the pins."""
-        if self.pins:
-            self._draw_pins()
-
     def image(self) -> QImage:
         """Return an image of the view as on the screen."""
         return QImage() if self.view is None else self.view.grabFramebuffer()
@@ -270,10 +267,10 @@ class SurfacePanel(QWidget):
             self.menu.popup(self.view.mapToGlobal(at))
 
     def _draw_pins(self) -> None:
-        if self.view is None or self._last is None:
-            return
-        self.view.scene.show_pins(self.pins, pins_text(self._last, self.pins))
-        self.view.update()
+        if self.view is not None:
+            text = "" if self._last is None else pins_text(self._last, self.pins)
+            self.view.scene.show_pins(self.pins, text)
+            self.view.update()
 
     def _fall_back(self, reason: str) -> None:
         _LOG.warning("No 3D view: %s", reason)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import html
 import re
 
-from PySide6.QtCore import QEvent
-from PySide6.QtGui import QKeySequence, Qt
+from PySide6.QtCore import QEvent, QSize
+from PySide6.QtGui import QKeySequence, QPainter, QPaintEvent, Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app.theme import theme
@@ -39,6 +39,29 @@ class PlainLabel(QLabel):
         self.setWordWrap(wrap)
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setText(text)
+
+
+class CutLabel(PlainLabel):
+    """Shows a line that is cut where it does not fit, and all of it as the tooltip.
+
+    Its neighbours keep their size whatever it shows.
+    """
+
+    def setText(self, text: str) -> None:
+        """Show another text."""
+        super().setText(text)
+        self.setToolTip(plain_tip(text))
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102
+        return QSize(0, super().minimumSizeHint().height())
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102
+        room, role, right = self.contentsRect(), self.foregroundRole(), Qt.TextElideMode.ElideRight
+        text = self.fontMetrics().elidedText(self.text(), right, room.width())
+        align, painter = int(self.alignment()), QPainter(self)
+        self.style().drawItemText(
+            painter, room, align, self.palette(), self.isEnabled(), text, role
+        )
 
 
 def placeholder(view: QWidget, text: str = "") -> PlainLabel:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QPaintEvent, QWindow
 from PySide6.QtWidgets import QWidget
 
 
 class NativeWindows(QObject):
-    """Reports native windows that appear. The newest one covers the others.
+    """Reports native windows that appear, and repaints what is uncovered in the window around them.
+
+    The newest native window covers the others. Qt would leave out what a closed menu uncovers in a
+    window that has an OpenGL widget in a native window of its own: without a compositor the menu's
+    picture stayed.
 
     Signals
     -------
@@ -18,8 +23,13 @@ class NativeWindows(QObject):
     appeared = Signal()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Report a widget that is shown."""
-        if event.type() == QEvent.Type.Show:
+        """Report a widget that is shown, and repaint what is uncovered."""
+        if isinstance(watched, QWindow) and isinstance(event, QPaintEvent):
+            around = QWidget.find(watched.winId())
+            if around is not None:
+                around.update(event.region())
+        elif event.type() == QEvent.Type.Show and isinstance(watched, QWidget):
+            watched.window().windowHandle().installEventFilter(self)
             self.appeared.emit()
         return False
 

@@ -170,10 +170,7 @@ def _left_windows(before: list[QWidget]) -> list[QWidget]:
     return [
         widget
         for widget in QApplication.topLevelWidgets()
-        # pyvistaqt keeps the surface of a dead context, which may have had a new widget's address.
-        if isinstance(widget, QWidget)
-        and widget.parent() is None
-        and not any(widget is old for old in before)
+        if widget.parent() is None and not any(widget is old for old in before)
     ]
 
 

@@ -118,7 +118,9 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     assert middle != corner
 
 
-def test_all_views_share_the_cursor_and_its_values_are_shown(pressed: InspectPage) -> None:
+def test_all_views_share_the_cursor_and_its_values_are_shown(
+    pressed: InspectPage, qtbot: QtBot
+) -> None:
     pressed.views.stage.point_at(1.0, 2.0)
     readout = pressed.findChild(QLabel, "inspect.readout")
     assert readout is not None
@@ -126,6 +128,12 @@ def test_all_views_share_the_cursor_and_its_values_are_shown(pressed: InspectPag
     value = pressed.findChild(QLabel, "inspect.depth")
     assert value is not None and value.text().endswith(" mm")
     assert pressed.views.map_panel.map._lines[0].value() == 1.0
+    # A point with a flag has one line more, but nothing below it moves.
+    before, lines = pressed.modes.box.y(), readout.text().count("\n")
+    pressed.views.stage.point_at(*pressed.views.map_panel.map._extent.topLeft().toTuple())
+    qtbot.waitUntil(lambda: readout.text().count("\n") == lines + 1)
+    qtbot.wait(1)
+    assert pressed.modes.box.y() == before
 
 
 def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(

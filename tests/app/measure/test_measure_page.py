@@ -14,8 +14,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pyqtgraph as pg
 import pytest
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QAction, QDropEvent
 from pytestqt.qtbot import QtBot
 from report_pdf import report_data
@@ -231,6 +232,38 @@ def test_tools_are_placed_moved_by_keys_and_undone(
     page.open_path(press)
     work, tool_map = page.press_view.work, page.press_view.map
     qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: tool_map.map.has_image)
+    qtbot.wait(50)
+    px_mm = 2.0 * abs(tool_map.layer.pixelLength(pg.Point(1.0, 0.0)))
+    view, left = tool_map.map.viewport(), Qt.MouseButton.LeftButton
+
+    def at(x_mm: float, y_mm: float) -> QPoint:
+        return tool_map.map.mapFromScene(tool_map.map.box.mapViewToScene(QPointF(x_mm, y_mm)))
+
+    # Two clicks: whatever the page says meanwhile, the map stays where it is.
+    page.press_view.palette_.buttons["step-height"].click()
+    place = view.mapToGlobal(at(0.0, 0.0))
+    for point in (at(-2.0, 1.0), at(2.0, 1.0)):
+        qtbot.mouseMove(view, point)
+        qtbot.mouseClick(view, left, pos=point)
+        tool_map.hint.setText(200 * "w")
+        qtbot.wait(1)
+        assert view.mapToGlobal(at(0.0, 0.0)) == place
+    assert work.tool.first.centre_mm == pytest.approx((-2.0, 1.0), abs=px_mm)
+    assert work.tool.second.centre_mm == pytest.approx((2.0, 1.0), abs=px_mm)
+    work.remove()
+
+    # A line that is drawn.
+    page.press_view.palette_.buttons["distance"].click()
+    qtbot.mousePress(view, left, pos=at(-2.0, 0.0))
+    qtbot.mouseMove(view, at(0.0, 0.0))
+    qtbot.mouseMove(view, at(2.0, 0.0))
+    qtbot.mouseRelease(view, left, pos=at(2.0, 0.0))
+    assert view.mapToGlobal(at(0.0, 0.0)) == place
+    assert work.tool.a_mm == pytest.approx((-2.0, 0.0), abs=px_mm)
+    assert work.tool.b_mm == pytest.approx((2.0, 0.0), abs=px_mm)
+    work.remove()
+
     page.press_view.palette_.buttons["distance"].click()
     tool_map.on_point((-2.0, 0.0))
     tool_map.on_point((2.0, 0.0))

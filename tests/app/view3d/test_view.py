@@ -10,8 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtGui import QGuiApplication, QOpenGLContext, QSurface
+from PySide6.QtWidgets import QLabel, QMainWindow, QMenu, QWidget
 from pytestqt.qtbot import QtBot
+from shiboken6 import getAllValidWrappers
 
 from app.services.jobs import Jobs
 from app.services.settings import Settings
@@ -19,6 +21,7 @@ from app.view2d.display import colour_table
 from app.view3d.overlays import axes_marks
 from app.view3d.panel import SurfacePanel
 from app.view3d.style import VIEWS, Style
+from app.widgets.layout import hbox
 from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, Made, flat_map, pixels
 
 PLAIN = Style(axes=False, colour_bar=False, orientation=False)
@@ -85,6 +88,21 @@ def test_pointing_finds_the_visible_point(
     for x, y, depth in (BUMP, SMALL, (-2.0, -4.0, 0.0)):
         found = panel.view.point_at(_screen_px(panel, x, y, depth))  # type: ignore[union-attr]
         assert found == pytest.approx((x, y), abs=0.15)  # a node
+
+
+def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(
+    panel: SurfacePanel, made: Made
+) -> None:
+    view = panel.view
+    assert view is not None
+    panel.set_pins((BUMP[:2],))
+    panel.show_surface(made(factor=0.5))
+    (height,) = view.actors["pins-points"].mapper.dataset.points[:, 2]
+    assert height == pytest.approx(view.scene.style.exaggeration * 0.5 * BUMP[2], abs=0.01)
+    assert "0.500 mm" in view.actors["pin-text"].GetText(1)
+    panel.show_surface(None)  # the source or the calibration changed
+    panel.show_surface(made())
+    assert not [name for name in view.actors if name.startswith("pin")]
 
 
 def test_a_click_sets_a_pin_and_a_drag_rotates(panel: SurfacePanel, qtbot: QtBot) -> None:
@@ -211,7 +229,7 @@ def test_style_and_viewpoints_are_remembered(
     jobs.close()
 
 
-def test_the_window_is_not_built_again_for_the_first_3d_view(
+def test_a_3d_view_neither_rebuilds_its_window_nor_leaves_closed_menus_painted_on_it(
     settings: Settings, made: Made, qtbot: QtBot
 ) -> None:
     class Window(QMainWindow):
@@ -221,28 +239,45 @@ def test_the_window_is_not_built_again_for_the_first_3d_view(
             self.rebuilt += event.type() == QEvent.Type.WinIdChange
             return bool(super().event(event))
 
-    jobs, window = Jobs("test"), Window()
+    jobs, window, beside = Jobs("test"), Window(), QLabel("Beside the view")
     panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
-    window.setCentralWidget(panel)
+    centre = QWidget()
+    hbox(beside, (panel, 1), of=centre)
+    window.setCentralWidget(centre)
     window.show()
     qtbot.waitExposed(window)
+
+    def on_screen() -> np.ndarray:
+        at = beside.mapToGlobal(QPoint())
+        image = QGuiApplication.primaryScreen().grabWindow(0, at.x(), at.y(), 80, 200)
+        return pixels(image.toImage())
+
     before = window.rebuilt
     panel.show_surface(made(largest=128))
     qtbot.waitUntil(lambda: panel.view is not None and panel.view.drawings > 0, timeout=WAIT_MS)
     assert window.rebuilt == before
+    clean, menu = on_screen(), QMenu(window)
+    menu.addAction("An action with a long name")
+    menu.popup(beside.mapToGlobal(QPoint(0, 40)))
+    qtbot.waitUntil(lambda: not np.array_equal(on_screen(), clean), timeout=WAIT_MS)
+    menu.close()
+    qtbot.waitUntil(lambda: np.array_equal(on_screen(), clean), timeout=WAIT_MS)
     panel.finish()
     jobs.close()
     window.close()
     window.deleteLater()
 
 
-def test_a_closed_view_is_freed(settings: Settings, made: Made, qtbot: QtBot) -> None:
+def test_an_ended_view_keeps_nothing_of_its_opengl_and_is_freed(
+    settings: Settings, made: Made, qtbot: QtBot
+) -> None:
     gone = []
-    for _ in range(3):
+    for _ in range(10):
         jobs = Jobs("test")
         panel = SurfacePanel(jobs, settings=settings, report=print, flat=flat_map)
+        panel.resize(200, 200)
         panel.show()
-        panel.show_surface(made(largest=128))
+        panel.show_surface(made(largest=16))
         qtbot.waitUntil(lambda p=panel: p.view is not None and p.view.drawings > 0, timeout=WAIT_MS)
         gone.append((weakref.ref(panel.view), weakref.ref(panel.view.scene)))
         panel.finish()
@@ -250,7 +285,9 @@ def test_a_closed_view_is_freed(settings: Settings, made: Made, qtbot: QtBot) ->
         panel.close()
         panel.deleteLater()
         del panel
-    qtbot.wait(50)
+        qtbot.wait(5)
+        # An object that Qt makes at their address later would come back to Python as one of these.
+        assert not [o for o in getAllValidWrappers() if isinstance(o, QSurface | QOpenGLContext)]
     gc.collect()
     assert [alive for pair in gone for alive in pair if alive() is not None] == []
 
