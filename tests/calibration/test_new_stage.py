@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.open_sensor import RESPONSE
-from gelpolight_core.calibration.project import Project, calibrate
+from gelpolight_core.calibration.project import Project, assemble, calibrate
 from gelpolight_core.calibration.recipe import Stage, Work
 from gelpolight_core.calibration.recipes import PAPER
 from gelpolight_core.calibration.status import StageState
@@ -74,13 +74,14 @@ def test_a_new_stage_is_computed_judged_and_made_stale(session: Path) -> None:
     assert [path.name for path in project.session.found("dark")] == [name]
 
 
-def test_its_table_and_images_are_part_of_the_calibration(session: Path) -> None:
+def test_its_table_and_images_are_part_of_the_calibration(
+    session: Path, small_project: Project
+) -> None:
     with pytest.raises(InputError, match="no images of: dark"):
         calibrate(read_session(session), RECIPE)
     size = read_session(session).images("whiteboard")[0].rgb.shape
     write_image(np.full(size, 1, np.uint8), session / "dark" / "dark.png")
-    titles: list[str] = []
-    run = calibrate(read_session(session), RECIPE, progress=lambda title, _: titles.append(title))
+    results = RECIPE.run(DARK, read_session(session), small_project.results)
+    run = assemble(RECIPE, read_session(session), results)
     assert run.calibration.quality["dark"]["dark_level_percent"].value < 0.5
     assert "dark/dark.png" in run.calibration.provenance.sources
-    assert "Dark level" in titles

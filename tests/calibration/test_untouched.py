@@ -52,10 +52,8 @@ def bare() -> NDArray[np.float64]:
 @pytest.mark.parametrize(
     ("indenter", "x_mm", "y_mm"),
     [
-        (Cylinder(6.0, 0.1), 3.0, -2.0),
         (Cylinder(6.0, 0.05), -4.0, 4.0),
         (Cuboid(12.0, 0.05), 0.0, 0.0),
-        (Ball(4.0, 0.05), 1.0, 1.0),
         (Ball(8.0, 0.5), 12.0, 3.0),
     ],
 )
@@ -77,7 +75,7 @@ def test_a_grain_of_dust_in_the_background_is_named_with_its_place(judged: Judge
     assert np.abs(np.subtract(place, (-5.0, 1.0))).max() < 0.5
 
 
-@pytest.mark.parametrize(("gain", "room_light"), [(0.98, 0.0), (1.02, 0.0), (1.0, 1.0)])
+@pytest.mark.parametrize(("gain", "room_light"), [(0.98, 0.0), (1.0, 1.0)])
 def test_a_background_in_other_light_is_named(
     judged: Judged, gain: float, room_light: float
 ) -> None:
