@@ -103,8 +103,6 @@ def test_a_lone_press_is_known_no_better_than_its_own_pixels_say() -> None:
 
 def test_a_calibration_says_how_sure_its_heights_are(small_calibration: Calibration) -> None:
     full = small_calibration.data.full
-    assert full is not None
-    assert full.scale_sd is not None
     figure = small_calibration.quality["joint"]["depth_sd_percent"]
     assert figure.value == pytest.approx(100.0 * full.scale_sd.depth)
     # Of a quarter of the image's size and five balls; below 0.1 % is no known sensor of this kind.

@@ -31,7 +31,6 @@ def drawn(calibration: Calibration, **more: str) -> Calibration:
 
 
 def membrane_of(calibration: Calibration) -> Membrane:
-    assert calibration.data.full is not None
     return calibration.data.full.membrane
 
 

@@ -70,7 +70,7 @@ class Truth:
 
 
 def truth(**changes: float) -> Truth:
-    return replace(Truth(MIRROR + MOVED_MM), **changes)  # type: ignore[arg-type]
+    return replace(Truth(MIRROR + MOVED_MM), **changes)
 
 
 def drape(place: Array, pose: BallPose, decay_mm: float) -> Array:
@@ -187,7 +187,7 @@ def found_press(pose: BallPose, random: np.random.Generator) -> BallPress:
     x, y = np.asarray(pose.centre_mm) + random.normal(scale=0.02, size=2)
     depth = pose.depth_mm * (1.0 + 0.05 * random.normal())
     start = BallPose((float(x), float(y)), pose.radius_mm, float(depth))
-    return BallPress("ball", start, 1.8, 0.02, 0.02, None, QualityTable(()))  # type: ignore[arg-type]
+    return BallPress("ball", start, 1.8, 0.02, 0.02, None, QualityTable(()))
 
 
 def refined(

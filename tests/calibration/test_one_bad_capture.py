@@ -40,7 +40,6 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
     project = computed_project()
     folder = project.session.folder / project.recipe[stage].folder
     camera = project.results[LENS].camera if project.results.get(LENS) else None
-    assert camera is not None
     reasons = spoil(folder, (camera.width, camera.height))
     if stage == "balls":
         text = (project.session.folder / "session.toml").read_text()
@@ -54,7 +53,6 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
     (left_out,) = [f for f in status.quality.figures if f.key.endswith("left_out")]
     assert left_out.value == len(reasons)
     lens = project.results.get(LENS)
-    assert lens is not None
     views = {view.name: view for view in lens.views}
     judges: dict[str, Callable[[str], Finding | None]] = {
         "lens": lambda name: judge_view(views.get(name)),
@@ -63,7 +61,6 @@ def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
     }
     for path in project.session.found(project.recipe[stage].folder):
         finding = judges[stage](path.name)
-        assert finding is not None
         assert (finding.verdict is Verdict.FAIL) is (path.name in reasons)
         if path.name in reasons:
             assert reasons[path.name] in finding.sentence

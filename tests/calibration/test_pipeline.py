@@ -46,12 +46,10 @@ def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
 def test_the_grain_of_the_ball_presses_is_in_the_calibration(small_project: Project) -> None:
     calibration = assemble(FULL, small_project.session, small_project.results).calibration
     grain = calibration.data.grain
-    assert grain is not None
     assert grain.ratio == pytest.approx(1.0, abs=0.1)
     reconstructor = Reconstructor(calibration)
     for path in small_project.session.files("balls"):
         seen = cv2.imread(str(path))
-        assert seen is not None
         found = reconstructor.health(np.ascontiguousarray(seen[..., ::-1]))
         assert "compressed" not in found.keys
         assert "compressed" not in found.unknown

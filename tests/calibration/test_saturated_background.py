@@ -20,7 +20,6 @@ def calibration() -> Calibration:
 
 def clipped(calibration: Calibration, *, top: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the true background, brighter so that a part exceeds 1, and what a camera shows."""
-    assert calibration.data.full is not None
     true = calibration.data.full.background * np.float32(
         top / calibration.data.full.background.max()
     )

@@ -20,7 +20,6 @@ def with_background(project: Project, source: Path) -> StageStatus:
     """Replace the background of the session by another image, with new noise."""
     (old,) = project.session.found("background")
     image = cv2.imread(str(source), cv2.IMREAD_UNCHANGED)
-    assert image is not None
     noise = np.random.default_rng(2).normal(0.0, 0.6, image.shape)
     assert cv2.imwrite(str(old), np.clip(np.round(image + noise), 0, 255).astype(np.uint8))
     return project.compute("background")

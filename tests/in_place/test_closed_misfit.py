@@ -40,7 +40,6 @@ def direct(run: Run, frame: Frame, height_map: HeightMap) -> tuple[np.ndarray, n
 
     The misfit is the least change of colour that makes the slopes agree.
     """
-    assert height_map.health is not None
     light = height_map.health.light
     gain = None if light is None else light.share
     seen = run.calibration.data.in_place.change(frame.astype(np.float32) / 255.0, gain)

@@ -116,7 +116,6 @@ def other_images(folder: Path, out: Path, change: Callable[[Array, bool], Array]
     shutil.copytree(folder, out)
     for path in sorted(out.glob("b*/*.png")):
         image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        assert image is not None
         most = np.iinfo(image.dtype).max
         changed = change(image.astype(np.float32), path.parent.name == "balls")
         assert cv2.imwrite(str(path), np.clip(changed, 0, most).round().astype(image.dtype))

@@ -164,7 +164,6 @@ def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
     """Every length of the sensor depends on this one."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["camera"]
     lens = rendered_optics(sensor)[LENS]
-    assert lens is not None
     assert lens.camera.fx == pytest.approx(truth["fx"], rel=1e-3)
     assert lens.camera.fy == pytest.approx(truth["fy"], rel=1e-3)
     # 1 px of the principal point is 0.03 mm on the membrane, and the pose compensates most of it.

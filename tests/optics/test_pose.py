@@ -92,7 +92,6 @@ def test_the_mirrored_pose_is_rejected_and_shown() -> None:
     image, truth = lying_board(tilt_deg=6.0)
     result = estimate_top_pose([image], BOARD, CAMERA)
     assert result.decision is Decision.EVIDENCE
-    assert result.mirrored is not None
     assert angle_deg(result.plane, truth) < 0.1
     assert angle_deg(result.mirrored.plane, truth) > 3.0
     assert result.mirrored.rms_px > 3.0 * result.rms_px
@@ -113,7 +112,6 @@ def test_two_poses_that_fit_equally_well_are_reported() -> None:
     result = estimate_top_pose([image], BOARD, far_camera())
     assert result.decision is Decision.TILT
     assert result.quality["mirrored_margin"].verdict is Verdict.WARN
-    assert result.mirrored is not None
     assert result.tilt_deg <= result.mirrored.tilt_deg
     nearest = min(angle_deg(plane, truth) for plane in (result.plane, result.mirrored.plane))
     assert nearest < 2.0
@@ -176,7 +174,6 @@ def test_rendered_sessions_give_the_surface_with_our_own_lens(
     """0.1 % of the distance is 0.1 % of every length; 0.1 degrees moves a light by 0.1 mm."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["top_plane"]
     result = rendered_optics(sensor)[TOP_POSE].pose
-    assert result is not None
     x, y, z = truth["normal_camera"]
     plane = TopPlane((x, y, z), truth["offset_mm"])
     assert result.plane.distance_mm == pytest.approx(plane.distance_mm, rel=1e-3)

@@ -43,7 +43,7 @@ def test_columns_are_solved_as_a_banded_solver_does(
 @pytest.mark.parametrize("owner", [RowWorkers, lambda n: PoissonSolver(90, 80, pitch_mm=0.1)])
 def test_threads_end_with_their_owner(owner: object) -> None:
     before = set(threading.enumerate())
-    kept = owner(2)  # type: ignore[operator]
+    kept = owner(2)
     if isinstance(kept, RowWorkers):
         kept.run(100, lambda first, last: None)
     else:

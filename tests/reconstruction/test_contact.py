@@ -34,9 +34,9 @@ def sensor(scale: float) -> KnownSensor:
 
 def face_um(found: object, at_mm: tuple[float, float]) -> float:
     """Return the median depth of the middle of a face 5 mm wide."""
-    x, y = np.meshgrid(found.x_mm, found.y_mm)  # type: ignore[attr-defined]
+    x, y = np.meshgrid(found.x_mm, found.y_mm)
     middle = np.hypot(x - at_mm[0], y - at_mm[1]) < 2.2
-    return float(1e3 * np.median(found.depth_mm[middle]))  # type: ignore[attr-defined]
+    return float(1e3 * np.median(found.depth_mm[middle]))
 
 
 @pytest.mark.parametrize("effort", ["fast", "best"])
@@ -82,7 +82,6 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
 ) -> None:
     known = sensor(0.25)
     full = known.calibration.data.full
-    assert full is not None
     brighter = np.float32(1.1 / full.background.max())
     true = full.background * brighter
     filled = np.where(true > 1.0, off * true, true).astype(np.float32)
@@ -125,7 +124,6 @@ def test_with_any_camera_response_nothing_is_solved_while_nothing_is_pressed(mod
     for effort in EFFORTS:
         found = Reconstructor(calibration, effort=effort).depth(frame)
         assert not found.depth_mm.any()
-        assert found.trace is not None
         assert len(found.trace.done) == 1
 
 
@@ -151,7 +149,6 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort: str)
         Reconstructor(known.calibration, effort=e).depth(press.frame) for e in (effort, "best")
     )
     np.testing.assert_array_equal(found.depth_mm, best.depth_mm)
-    assert found.trace is not None
     assert found.trace.effort == "best"
     assert (f"effort {effort}" in found.trace.left_out) == (effort != "best")
     (note,) = small_image_notes(found.pitch_mm, 0.7)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from compiled import RaySlopes, ShadedField, solve
+from compiled import RaySlopes, ShadedField, field_of, solve
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.height_map import Flag
@@ -85,19 +85,7 @@ def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
     around[..., 0] = 0.8
     around *= membrane.interreflection * 0.5 * (1.0 + normals[..., 2:])
     ratio = ratio + around
-    single = [np.asarray(a, np.float32) for a in (ratio, np.full_like(ratio, SIGMA), around)]
-    field = ShadedField(
-        single[0],
-        single[1],
-        single[2],
-        np.zeros(ratio.shape, bool),
-        np.ones(depth.shape, bool),
-        np.ones(depth.shape, bool),
-        DRIFT.astype(np.float32),
-        X,
-        Y,
-    )
-    return field, depth, normals
+    return field_of(ratio, DRIFT, X, Y, sigma=SIGMA, around=around), depth, normals
 
 
 def solved(field: ShadedField, depth: Array, membrane: Membrane, *, workers: int = 1) -> RaySlopes:
@@ -260,3 +248,17 @@ def test_walls_steeper_than_can_be_seen_are_held_and_flagged() -> None:
     steep = found.normals[..., 2] > -0.1501
     assert ((found.flags[steep] & int(Flag.NOT_OBSERVABLE)) != 0).all()
     assert np.isfinite(found.slope_x).all()
+
+
+def test_a_channel_seen_at_a_cosine_that_no_ball_showed_is_flagged() -> None:
+    field, depth, normals = scene_of(MATT)
+    place = np.concatenate([POINTS + depth[..., None] * DRIFT, -depth[..., None]], axis=-1)
+    away = LEDS[1] - place
+    cosines = (away * normals).sum(-1) / np.linalg.norm(away, axis=-1)
+    limit = float(np.percentile(cosines, 90))
+    coverage = ((-1.0, 2.0), (-1.0, limit), (-1.0, 2.0))
+    flags = solve(field, depth.astype(np.float32), LEDS, MATT, coverage=coverage).flags
+    far = (flags & int(Flag.EXTRAPOLATED)) != 0
+    clear = np.abs(cosines - limit) > 1e-3
+    np.testing.assert_array_equal(far[clear], (cosines > limit)[clear])
+    assert far[clear].any()

@@ -33,7 +33,7 @@ def seen_along_rays(depth_of: object, ray_slope: Array) -> Array:
     for _ in range(60):
         middle = 0.5 * (low + high)
         place = POINTS + middle[..., None] * ray_slope
-        above = middle > depth_of(place[..., 0], place[..., 1])  # type: ignore[operator]
+        above = middle > depth_of(place[..., 0], place[..., 1])
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return 0.5 * (low + high)
 

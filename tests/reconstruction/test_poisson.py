@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
-import scipy.sparse.linalg as sparse_linalg
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +13,6 @@ from gelpolight_core.reconstruction.integration.poisson import (
     SLOPE_LIMIT,
     Integration,
     PoissonSolver,
-    good_length,
 )
 
 
@@ -97,48 +94,6 @@ def test_depth_whose_slopes_are_polynomials_comes_back_exactly(
     found = solver.integrate(np.outer(along_y, slope_along_x), np.outer(slope_along_y, along_x))
     assert found.depth_mm.shape == (rows, columns)
     assert found.depth_mm == pytest.approx(depth, abs=1e-12)
-
-
-def sparse_answer(slope_x: np.ndarray, slope_y: np.ndarray, pitch_mm: float) -> np.ndarray:
-    """Return the least-squares depth of all edges, solved directly on the padded grid."""
-
-    def axis(size: int):
-        padded = good_length(size)
-        before = (padded - size) // 2
-        difference = sp.diags_array(
-            [np.ones(padded), -np.ones(padded)], offsets=[0, -1], shape=(padded + 1, padded)
-        )
-        weight = np.ones(padded + 1)
-        weight[[0, -1]] = 2.0  # half as long an edge: its slope counts double
-        integral = np.zeros((padded + 1, padded))
-        for edge in range(size + 1):
-            nodes = np.arange(4) + min(max(edge - 2, 0), size - 4)
-            for node in nodes:
-                values = (nodes == node).astype(float)
-                antiderivative = np.polynomial.Polynomial.fit(nodes, values, 3).integ()
-                begin, end = max(edge - 1, -0.5), min(edge, size - 0.5)
-                integral[edge + before, node + before] = antiderivative(end) - antiderivative(begin)
-        return before, difference, sp.diags_array(weight), sp.csr_array(integral)
-
-    (top, dy, wy, iy), (left, dx, wx, ix) = axis(slope_x.shape[0]), axis(slope_x.shape[1])
-    rows, columns = dy.shape[1], dx.shape[1]
-    inner = np.s_[top : top + slope_x.shape[0], left : left + slope_x.shape[1]]
-    padded_x, padded_y = np.zeros((2, rows, columns))
-    padded_x[inner], padded_y[inner] = slope_x * pitch_mm, slope_y * pitch_mm
-    across, down = sp.kron(sp.eye_array(rows), dx), sp.kron(dy, sp.eye_array(columns))
-    weigh_x, weigh_y = sp.kron(sp.eye_array(rows), wx), sp.kron(wy, sp.eye_array(columns))
-    right = across.T @ weigh_x @ (padded_x @ ix.T).ravel()
-    right += down.T @ weigh_y @ (iy @ padded_y).ravel()
-    matrix = across.T @ weigh_x @ across + down.T @ weigh_y @ down
-    return sparse_linalg.spsolve(matrix.tocsc(), right).reshape(rows, columns)[inner]
-
-
-@pytest.mark.parametrize("shape", [(24, 36), (4, 5), (23, 30), (30, 29), (17, 47)])
-def test_answer_is_that_of_a_direct_sparse_solver(shape: tuple[int, int]) -> None:
-    # Noise is not the slope of anything: only the same least-squares problem gives the same answer.
-    slope_x, slope_y = np.random.default_rng(5).normal(size=(2, *shape))
-    found = integrate_slopes(slope_x, slope_y, pitch_mm=0.03)
-    assert found.depth_mm == pytest.approx(sparse_answer(slope_x, slope_y, 0.03), abs=1e-12)
 
 
 @pytest.mark.parametrize(("stencil", "shift_px"), [(4, 0.0), (2, 0.0), (1, 0.5)])

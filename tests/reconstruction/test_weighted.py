@@ -61,7 +61,7 @@ def test_even_weights_are_the_plain_integration_also_of_noise(seed: int, noise: 
     _, slope_x, slope_y = lopsided()
     noisy = [s + noise * random.normal(size=s.shape) for s in (slope_x, slope_y)]
     for s in noisy:  # next to the border the two have different edge integrals
-        s[:5] = s[-5:] = s[:, :5] = s[:, -5:] = 0.0  # type: ignore[call-overload]
+        s[:5] = s[-5:] = s[:, :5] = s[:, -5:] = 0.0
     maps = single(*noisy, np.ones_like(slope_x))
     solver = PoissonSolver(ROWS, COLUMNS, pitch_mm=PITCH)
     expected = solver.integrate(maps[0], maps[1]).depth_mm

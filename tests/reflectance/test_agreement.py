@@ -59,7 +59,6 @@ def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
     assert status.quality["press_radius_percent"].verdict is Verdict.FAIL
     assert ODD.removesuffix(".png") in status.sentence
     reflectance = project.results[REFLECTANCE].table
-    assert reflectance is not None
     (odd,) = [a for a in reflectance.agreements if a.fault]
     assert odd.name.endswith(ODD)
     assert odd.radius_mm == pytest.approx(4.0, rel=0.08)
@@ -82,7 +81,6 @@ def test_a_misplaced_circle_is_named(computed_project: Callable[[], Project]) ->
     status = recomputed(project)
     assert status.state is not StageState.PASS
     reflectance = project.results[REFLECTANCE].table
-    assert reflectance is not None
     assert [a.name for a in reflectance.agreements if a.fault] == [f"balls/{ODD}"]
 
 

@@ -135,7 +135,6 @@ def test_noise_is_judged_alike(linear: Made, gamma: Made, srgb: Made) -> None:
 
 def test_the_curve_is_the_camera_s_to_a_third_of_a_percent(srgb: Made) -> None:
     found = srgb[1].calibration.response
-    assert found is not None
     encoded = np.linspace(0.0, 1.0, found.curves.shape[1])
     truth = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     assert np.abs(found.curves - truth).max() < 0.0033
@@ -156,8 +155,6 @@ def test_the_response_is_stored_in_the_file_and_changes_the_identity(
     before = gamma[1].calibration
     write_calibration(before, tmp_path / "c.gplcal")
     after = read_calibration(tmp_path / "c.gplcal")
-    assert before.response is not None
-    assert after.response is not None
     np.testing.assert_array_equal(after.response.curves, before.response.curves)
     assert after.identity == before.identity
     assert before.changed(response=None).identity != before.identity
