@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.ball_stage import BALLS, Balls
-from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
+from gelpolight_core.calibration.open_sensor import LENS
 from gelpolight_core.calibration.project import Cancelled, Project
 from gelpolight_core.calibration.recipe import Work
 from gelpolight_core.calibration.status import StageState
@@ -95,19 +95,6 @@ def test_a_name_is_never_given_twice(project: Project) -> None:
     assert project.add_capture("lens", frame) != first
 
 
-def test_an_image_without_a_ball_is_left_out_with_its_reason(project: Project) -> None:
-    bare = project.session.found("background")[0]
-    raw = cv2.imread(str(bare), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    name = project.add_capture("balls", [raw])
-    project.set_ball_radius(name, 3.0)
-    status = project.compute("balls")
-    assert status.state is StageState.WARN
-    assert name in status.sentence
-    assert status.quality["balls_left_out"].value == 1.0
-    project.exclude("balls", name)
-    assert project.compute("balls").quality["balls_left_out"].value == 0.0
-
-
 def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
     project: Project,
 ) -> None:
@@ -118,35 +105,6 @@ def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
     assert project.results.get(LENS) is not None
     assert "radiance" not in project.stale()
     assert project.statuses()["radiance"].state is StageState.STALE
-
-
-def test_a_ball_set_by_hand_is_used_at_its_position(project: Project) -> None:
-    """A circle drawn on the detected one gives the same ball within the accuracy of a hand."""
-    found = project.results[BALLS].presses[0]
-    name = project.results[BALLS].seen[0].file
-    table = project.results[TOP_POSE].table
-    column, row = (round(c) for c in found.indentation.centre)
-    centre = np.array([table.u_px[row, column], table.v_px[row, column]], float)
-    reach = round(found.indentation.contact_radius_px)
-    radius = float(table.u_px[row, column + reach] - centre[0])
-    project.place_ball(name, PlacedCircle(float(centre[0]), float(centre[1]), radius))
-    project.compute("balls")
-    placed = project.results[BALLS].presses[0]
-    assert np.hypot(*(np.array(placed.pose.centre_mm) - found.pose.centre_mm)) < 0.05
-    assert placed.contact_radius_mm == pytest.approx(found.contact_radius_mm, rel=0.03)
-    assert placed.indentation.coverage == 1.0
-
-
-def test_a_spot_set_by_hand_moves_its_led(project: Project) -> None:
-    lights = project.results[LIGHTS].leds
-    u, v = lights.spots.spots[2].centre_px
-    project.place_spot(2, (u + 5.0, v))
-    project.compute("lights")
-    moved = project.results[LIGHTS].leds
-    assert moved.spots.spots[2].centre_px == (u + 5.0, v)
-    assert moved.spots.spots[2].centre_sd_px == 0.5
-    assert moved.led_positions_mm[2, 0] != lights.led_positions_mm[2, 0]
-    np.testing.assert_array_equal(moved.led_positions_mm[:2], lights.led_positions_mm[:2])
 
 
 def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(

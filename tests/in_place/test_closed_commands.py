@@ -80,20 +80,12 @@ def test_a_change_of_the_light_that_is_corrected_is_said(
 def test_a_new_gel_needs_a_background_only(
     calibration: Path, closed_folder: Path, tmp_path: Path
 ) -> None:
+    """Some balls correct it further."""
     background = next((closed_folder / "background").iterdir())
-    new = tmp_path / "new.gplcal"
-    command = ["refresh", str(calibration), "--background", str(background), "-o", str(new)]
-    assert main(command) == 0
-    assert new.is_file()
-
-
-def test_a_new_gel_with_some_balls_is_corrected(
-    calibration: Path, closed_folder: Path, tmp_path: Path
-) -> None:
-    new = tmp_path / "new.gplcal"
-    command = ["refresh", str(calibration), "--session", str(closed_folder), "-o", str(new)]
-    assert main(command) == 0
-    assert read_calibration(new).model == "in-place"
+    for number, given in enumerate((["--background", background], ["--session", closed_folder])):
+        new = tmp_path / f"{number}.gplcal"
+        assert main(["refresh", str(calibration), *map(str, given), "-o", str(new)]) == 0
+        assert read_calibration(new).model == "in-place"
 
 
 def test_one_message_lists_all_that_an_open_calibration_lacks(

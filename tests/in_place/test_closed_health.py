@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,13 +13,12 @@ import pytest
 from numpy.typing import NDArray
 
 from gelpolight_core import measure
-from gelpolight_core.calibration.project import Run, calibrate
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_raw_image
-from gelpolight_core.session.session import read_session
 
 Frame = NDArray[np.uint8]
 Map = NDArray[Any]
@@ -68,7 +66,7 @@ def test_healthy_presses_have_no_fault(reconstructor: Reconstructor, presses: li
 def test_a_change_of_the_light_is_stated_and_corrected(
     reconstructor: Reconstructor, presses: list[Frame], light: tuple[float, ...], key: str
 ) -> None:
-    for frame in presses[:3]:
+    for frame in presses[:2]:
         alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
         found = reconstructor.depth(changed(frame, light), uncertainty=True)
         assert [finding.key for finding in found.findings] == [key]
@@ -84,7 +82,7 @@ def test_a_change_of_the_light_is_stated_and_corrected(
 def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(
     reconstructor: Reconstructor, presses: list[Frame], share: float
 ) -> None:
-    for frame in presses[:3]:
+    for frame in presses[:2]:
         alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
         shaded = changed(frame, vignetting(share, frame.shape))
         found = reconstructor.depth(shaded, uncertainty=True)
@@ -106,7 +104,7 @@ def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(
 def test_what_cannot_be_corrected_is_doubtful_and_named_first(
     reconstructor: Reconstructor, presses: list[Frame], key: str, damage: Callable[[Frame], Frame]
 ) -> None:
-    for frame in presses[:3]:
+    for frame in presses[:2]:
         seen = damage(frame)
         found = reconstructor.depth(seen, uncertainty=True, health=reconstructor.health(seen))
         assert found.doubts[0].key == key
@@ -142,7 +140,7 @@ def test_images_without_light_are_refused(
 def test_colours_in_another_order_are_refused(
     reconstructor: Reconstructor, presses: list[Frame], order: tuple[int, ...]
 ) -> None:
-    for frame in presses:
+    for frame in presses[::4]:
         assert reconstructor.health(frame[..., order]).keys == ("colour_order",)
 
 
@@ -170,28 +168,3 @@ def test_hot_and_dead_pixels_are_named_and_left_out(
     clean, found = reconstructor.depth(presses[0]), reconstructor.depth(frame)
     assert found.doubts
     assert np.abs(found.depth_mm - clean.depth_mm).max() < 0.02 * clean.depth_mm.max()
-
-
-def test_colours_of_a_real_sensor_in_another_order_are_refused(shared_data: Path) -> None:
-    folder = shared_data / "real" / "closed" / "mini-1"
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
-    reconstructor = Reconstructor(calibrate(read_session(folder)).calibration)
-    for path in sorted((folder / "balls").glob("*.png"))[::6]:
-        frame = read_raw_image(path)[0]
-        assert reconstructor.health(frame).keys == ()
-        assert reconstructor.health(frame[..., ::-1]).keys == ("colour_order",)
-        _, data = cv2.imencode(".jpg", frame[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 75])
-        compressed = np.ascontiguousarray(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1])
-        assert "compressed" in reconstructor.health(compressed).keys
-
-
-def test_a_gel_that_drags_its_texture_is_calibrated(shared_data: Path, tmp_path: Path) -> None:
-    folder = shared_data / "cases" / "dragged-texture"
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
-    shutil.copytree(folder, tmp_path / "session")
-    table = calibrate(read_session(tmp_path / "session")).calibration.quality["in_place"]
-    found = {figure.key: figure.value for figure in table.figures}
-    assert found["held_out_normal_deg"] < 2.0
-    assert found["held_out_diameter_percent"] < 1.0

@@ -36,13 +36,6 @@ def held_back(session: Session, count: int) -> tuple[Session, tuple[str, ...]]:
     return replace(session, decisions=replace(session.decisions, excluded=excluded)), names
 
 
-@pytest.fixture(scope="module")
-def held_back_run(closed_session: Session) -> tuple[Run, tuple[str, ...]]:
-    """Return a calibration without two presses, and their names."""
-    session, names = held_back(closed_session, 2)
-    return calibrate(session), names
-
-
 def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(
     closed_session: Session, closed_run: Run
 ) -> None:
@@ -54,20 +47,6 @@ def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(
     few_session = replace(closed_session, decisions=replace(decisions, excluded=few))
     with_drawn = calibrate(few_session).results[BALLS].result.presses[0].ball
     assert with_drawn.x == pytest.approx(detected.x + 2.0, abs=1.0)
-
-
-def test_presses_that_were_not_used_are_measured(
-    held_back_run: tuple[Run, tuple[str, ...]], closed_session: Session
-) -> None:
-    run, names = held_back_run
-    reconstructor = Reconstructor(run.calibration)
-    for name in names:
-        image = closed_session.image(closed_session.folder / "balls" / name)
-        found = reconstructor.depth(image.rgb, uncertainty=True)
-        ball = measure_object(found, shape="ball")
-        wanted = 2.0 * closed_session.ball_radius_mm(name)
-        assert ball.diameter_mm == pytest.approx(wanted, rel=0.08)
-        assert abs(ball.diameter_mm - wanted) < 3.0 * ball.sd["diameter_mm"]
 
 
 def test_normals_and_depth_have_the_signs_and_places_that_are_promised(
@@ -105,17 +84,19 @@ def test_figures_are_those_of_presses_left_out(closed_run: Run) -> None:
 
 
 def test_the_stated_errors_hold_on_presses_that_were_not_used(
-    held_back_run: tuple[Run, tuple[str, ...]],
-    closed_run: Run,
-    closed_session: Session,
+    closed_run: Run, closed_session: Session
 ) -> None:
-    run, names = held_back_run
+    session, names = held_back(closed_session, 2)
+    reconstructor = Reconstructor(calibrate(session).calibration)
     places = {ball[0]: ball[1:] for ball in closed_run.calibration.data.balls}
     within = []
     for name in names:
         x, y, contact, radius = places[name]
         image = closed_session.image(closed_session.folder / "balls" / name)
-        found = Reconstructor(run.calibration).depth(image.rgb, uncertainty=True)
+        found = reconstructor.depth(image.rgb, uncertainty=True)
+        ball, wanted = measure_object(found, shape="ball"), 2.0 * radius
+        assert ball.diameter_mm == pytest.approx(wanted, rel=0.08)
+        assert abs(ball.diameter_mm - wanted) < 3.0 * ball.sd["diameter_mm"]
         across, down = np.meshgrid(found.x_mm - x, found.y_mm - y)
         inside = np.hypot(across, down) < 0.8 * contact
         root = np.sqrt(radius**2 - across[inside] ** 2 - down[inside] ** 2)

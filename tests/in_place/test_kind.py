@@ -50,7 +50,7 @@ def slopes_with(session: Session, scale: float, radius: float) -> Slopes:
 
 
 @settings(
-    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(scale=FACTORS, radius=FACTORS)
 def test_every_scale_and_radius_gives_a_result_or_a_refusal(

@@ -129,18 +129,6 @@ def test_colours_and_slopes_that_no_ball_has_shown_are_flagged() -> None:
     assert set(zip(*np.nonzero(found), strict=True)) == {(3, 4), (3, 5), (3, 6), (8, 10)}
 
 
-def test_a_place_is_seen_where_the_grid_says() -> None:
-    grid = WorkingGrid(ImageSize(1280, 960), 0.02)
-    table = grid.table()
-    nodes = np.array([[grid.x_mm[0], grid.y_mm[0]], [grid.x_mm[-1], grid.y_mm[-1]]])
-    seen = [[table.u_px[0, 0], table.v_px[0, 0]], [table.u_px[-1, -1], table.v_px[-1, -1]]]
-    assert grid.to_pixels(nodes) == pytest.approx(np.array(seen), abs=1e-3)
-    middle = grid.on_nodes(Circle(*grid.to_pixels(np.zeros((1, 2)))[0], 40.0))
-    assert np.interp(middle.x, np.arange(320), grid.x_mm) == pytest.approx(0.0, abs=1e-9)
-    assert np.interp(middle.y, np.arange(240), grid.y_mm) == pytest.approx(0.0, abs=1e-9)
-    assert middle.radius * grid.pitch_mm == pytest.approx(40.0 * 0.02)
-
-
 def test_the_next_ball_is_asked_for_where_the_membrane_is_seen() -> None:
     grid = WorkingGrid(ImageSize(100, 80), 0.1)
     lit = np.ones((80, 100), np.bool_)

@@ -74,7 +74,7 @@ def test_no_fault_is_found_in_good_images_with_and_without_presses(
     known: KnownSensor, frames: dict[str, Map], check: HealthCheck
 ) -> None:
     for name, frame in frames.items():
-        for seed in range(4):
+        for seed in range(2):
             found = check.check(known.noisy(frame, seed=seed), whole=seed % 2 == 0)
             assert not found.findings, (name, seed)
             assert found.light is None, (name, seed)
@@ -181,12 +181,11 @@ def test_the_named_size_of_a_fault_is_its_size(
         assert shifted == pytest.approx(pixels, rel=0.15)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("press", [Ball(4.0, 0.0), Cylinder(8.0, 1.0)])
 def test_an_image_of_another_sensor_of_the_same_design_is_recognised(
-    check: HealthCheck, seed: int, press: Indenter
+    check: HealthCheck, press: Indenter
 ) -> None:
-    other = known_sensor(SensorDesign().scaled(0.5), seed=seed)
+    other = known_sensor(SensorDesign().scaled(0.5), seed=1)
     image = other.noisy(other.pressed(press, x_mm=3.0, samples=1).frame)
     for whole in (False, True):
         assert check.check(image, whole=whole).keys == ("other_sensor",)
@@ -216,7 +215,7 @@ def test_dead_lines_are_found(
     assert any("bad_line" in check.check(row).keys for _ in range(row.shape[0]))
 
 
-@pytest.mark.parametrize("share", [5e-4, 0.002, 0.003, 0.01, 0.03, 0.1])
+@pytest.mark.parametrize("share", [5e-4, 0.003, 0.1])
 @pytest.mark.parametrize("whole", [True, False])
 def test_hot_pixels_are_found_and_the_more_there_are_the_worse(
     known: KnownSensor, frames: dict[str, Map], check: HealthCheck, share: float, whole: bool
@@ -230,8 +229,9 @@ def test_hot_pixels_are_found_and_the_more_there_are_the_worse(
     assert found.meaningless is (found.verdict is Verdict.FAIL) is (share > 0.05)
 
 
-@pytest.mark.parametrize("effort", ["best", "fast"])
-@pytest.mark.parametrize(("share", "value"), [(0.001, 255), (0.01, 255), (0.01, 0), (0.04, 255)])
+@pytest.mark.parametrize(
+    ("effort", "share", "value"), [("best", 0.01, 255), ("fast", 0.01, 0), ("fast", 0.04, 255)]
+)
 def test_hot_and_dead_pixels_are_left_out_of_the_depth(
     known: KnownSensor, frames: dict[str, Map], effort: str, share: float, value: int
 ) -> None:
@@ -256,21 +256,6 @@ def test_saturation_in_a_small_part_of_a_contact_is_no_fault_but_overexposure_is
     assert not check.check(known.noisy(frame)).findings
     assert check._full.sum() > 0.01 * check.samples.count.sum()
     assert "saturated" in check.check(known.noisy(1.5 * frame)).keys
-
-
-def test_hot_pixels_in_groups_are_found(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
-) -> None:
-    """Nothing was said of them: none differs from all its neighbours."""
-    image = known.noisy(frames["cylinder"])
-    hot = np.random.default_rng(0).random(image.shape[:2]) < 0.003
-    hot |= np.roll(hot, 1, 0)
-    hot |= np.roll(hot, 1, 1)
-    image[hot] = 255
-    found = check.check(image)
-    assert found.keys == ("bad_pixels",)
-    assert found.bad.mask[hot].mean() > 0.85
-    assert found.bad.mask[~hot].mean() < 1e-3
 
 
 def test_what_no_texture_shows_is_unknown_and_not_guessed() -> None:
@@ -314,15 +299,6 @@ def test_kinds_of_numbers_and_a_camera_that_is_not_linear_give_the_same_findings
     assert check.check(np.full_like(frames["bare"], np.nan)).meaningless is not None
 
 
-def test_the_paper_models_calibration_is_checked_too(known: KnownSensor) -> None:
-    matt = known_sensor(matt_design(0.25))
-    paper = replace(matt.calibration, model="paper").changed(full=None)
-    check = _check_of(paper)
-    press = matt.pressed(Ball(4.0, 1.0), samples=1).frame
-    assert not check.check(matt.noisy(press)).findings
-    assert check.check(matt.noisy(press * np.float32(0.98))).keys == ("exposure",)
-
-
 def fall_off(share: float, shape: tuple[int, ...]) -> Map:
     """Return the light of a lens that is darker by a share at the left and right edge."""
     down, across = np.mgrid[: shape[0], : shape[1]]
@@ -331,8 +307,7 @@ def fall_off(share: float, shape: tuple[int, ...]) -> Map:
     return np.asarray(1.0 - share * square, np.float32)[..., None]
 
 
-@pytest.mark.parametrize("share", [0.02, 0.05])
-@pytest.mark.parametrize("name", ["cylinder", "ball", "cuboid"])
+@pytest.mark.parametrize(("name", "share"), [("cylinder", 0.05), ("ball", 0.02)])
 def test_light_that_falls_off_towards_the_edge_is_corrected(
     known: KnownSensor, frames: dict[str, Map], name: str, share: float
 ) -> None:

@@ -69,12 +69,12 @@ def test_the_camera_is_found_within_its_stated_uncertainty(lens: LensResult) -> 
     # Four standard deviations in eight figures: by chance only once in two thousand.
     assert (np.abs(values - truth) < 4.0 * sd).all()
     assert lens.focal_sd_px[0] < 1e-3 * CAMERA.fx
-
-
-def test_square_pixels_are_kept_without_evidence_against_them(lens: LensResult) -> None:
-    """A common focal length is known better than two separate ones."""
+    # A common focal length is known better than two separate ones.
     assert lens.square_pixels
-    assert lens.camera.fx == lens.camera.fy
+    assert camera.fx == camera.fy
+    assert lens.rms_px < 0.06
+    assert lens.rms_px < lens.held_out_rms_px < 1.5 * lens.rms_px
+    assert all(view.held_out_rms_px >= 0.9 * view.rms_px for view in lens.views)
 
 
 def test_pixels_that_are_not_square_are_noticed() -> None:
@@ -83,13 +83,6 @@ def test_pixels_that_are_not_square_are_noticed() -> None:
     lens = calibrate_lens([held_view(number, squeezed) for number in range(6)], BOARD)
     assert not lens.square_pixels
     assert lens.camera.fx / lens.camera.fy == pytest.approx(520.0 / 510.0, rel=1e-3)
-
-
-def test_views_held_out_are_explained_as_well_as_those_used(lens: LensResult) -> None:
-    """The held-out error does not come from views used in the fit."""
-    assert lens.rms_px < 0.06
-    assert lens.rms_px < lens.held_out_rms_px < 1.5 * lens.rms_px
-    assert all(view.held_out_rms_px >= 0.9 * view.rms_px for view in lens.views)
 
 
 def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[LinearImage]) -> None:

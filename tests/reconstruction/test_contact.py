@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.checks import small_image_notes, visible_depth_notes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
@@ -23,7 +22,7 @@ from gelpolight_core.studies.known_sensor import (
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 AT_MM = (1.0, -2.0)
-EMPTY_FRAMES = 150
+EMPTY_FRAMES = 60
 
 
 @lru_cache(maxsize=3)
@@ -112,21 +111,6 @@ def test_a_shallow_face_beside_a_deep_one_is_seen() -> None:
     assert face_um(found, (6.0, 0.0)) == pytest.approx(30.0, abs=3.0)
 
 
-@pytest.mark.parametrize("model", ["linear", "bent"])
-def test_with_any_camera_response_nothing_is_solved_while_nothing_is_pressed(model: str) -> None:
-    known = sensor(0.25)
-    calibration, frame = known.calibration, known.noisy(known.bare())
-    if model == "bent":
-        levels = np.linspace(0.0, 1.0, 256)
-        response = CameraResponse(np.tile(levels**1.2, (3, 1)))
-        calibration = calibration.changed(response=response)
-        frame = np.rint(255.0 * (frame / 255.0) ** (1.0 / 1.2)).astype(np.uint8)
-    for effort in EFFORTS:
-        found = Reconstructor(calibration, effort=effort).depth(frame)
-        assert not found.depth_mm.any()
-        assert len(found.trace.done) == 1
-
-
 def test_a_calibration_whose_noise_hides_presses_says_so() -> None:
     known = sensor(0.25)
     deaf = known.calibration.changed(noise=np.full(3, 0.2))
@@ -173,6 +157,7 @@ def test_walls_are_right_or_reported_to_be_too_steep(decay_mm: float, effort: st
     found = Reconstructor(steep.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=12.0))
     assert found.findings or error_um < 15.0
+    assert ("steep_walls" in {note.key for note in found.findings}) or decay_mm > 0.1
 
 
 @lru_cache(maxsize=1)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.image.response import gamma_response
 from gelpolight_core.light.finding import Health, LightGain
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor
 from gelpolight_core.studies.trial import depth_error, rms_um
@@ -25,12 +22,9 @@ TEN_UM = 10.0
 CORRECTION = "light of the image"
 CHANGES = {
     "exposure 3 % longer": (1.03, 1.03, 1.03),
-    "exposure 3 % shorter": (0.97, 0.97, 0.97),
     "exposure 0.2 % longer": (1.002, 1.002, 1.002),
-    "red LED 2 % brighter": (1.02, 1.0, 1.0),
     "all LEDs otherwise": (0.98, 1.02, 1.01),
     "half the exposure": (0.5, 0.5, 0.5),
-    "a fifth more light": (1.2, 1.2, 1.2),
     "red LED 40 % weaker": (0.6, 1.0, 1.0),
 }
 
@@ -119,25 +113,6 @@ def test_light_as_at_calibration_changes_nothing(known: KnownSensor, press: Know
             found = reconstructor.depth(known.noisy(press.frame, seed=seed), normals=False)
             assert found.health.light is None
             assert CORRECTION in found.trace.left_out
-
-
-def test_with_a_camera_that_is_not_linear_the_light_is_corrected_too(
-    known: KnownSensor, press: KnownPress
-) -> None:
-    camera = replace(known.sensor.design.camera, response="gamma", gamma=2.2)
-    bent = known.calibration.changed(response=gamma_response(2.2))
-    for effort in ("best", "fast"):
-        reconstructor = Reconstructor(bent, effort=effort)
-        depths = []
-        for share in (1.0, 1.03):
-            random = np.random.default_rng(0)
-            for frame in (press.frame, known.bare()):
-                encoded = exposed(frame.astype(np.float64) * share, camera, random, averaged=1)
-                depths.append(reconstructor.depth(encoded, normals=False))
-        pressed, bare, pressed_brighter, bare_brighter = depths
-        assert abs(error_um(pressed_brighter, press) - error_um(pressed, press)) < 0.3 * TEN_UM
-        assert not bare.depth_mm.any()
-        assert not bare_brighter.depth_mm.any()
 
 
 def test_room_light_stays_a_fault(known: KnownSensor, press: KnownPress) -> None:

@@ -16,7 +16,6 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder
-from gelpolight_core.simulation.indenters import press as pressed
 from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
 
 Frame = NDArray[np.unsignedinteger]
@@ -105,21 +104,6 @@ def test_half_scale_is_near_to_the_best(
     assert np.median(np.degrees(np.arcsin(np.clip(across[plateau], 0.0, 1.0)))) < 1.0
     same = (planned.flags & Flag.OUTSIDE) == (best.flags & Flag.OUTSIDE)
     assert same.all()
-
-
-@pytest.mark.parametrize(("decay_mm", "output"), [(0.7, False), (0.1, True)])
-@pytest.mark.parametrize("effort", EFFORTS)
-def test_walls_that_light_does_not_decide_are_reported_at_every_effort(
-    effort: str,
-    decay_mm: float,
-    output: bool,
-    known: KnownSensor,
-) -> None:
-    """Walls of 57 degrees, and of 84."""
-    surface = pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, decay_mm=decay_mm)
-    image = known.noisy(known.showing(surface, samples=1).frame)
-    notes = Reconstructor(known.calibration, effort=effort).depth(image).findings
-    assert any(note.key == "steep_walls" for note in notes) is output
 
 
 def test_a_trace_says_what_was_done_and_what_the_membrane_does_not_need(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -17,13 +14,6 @@ from numpy.typing import NDArray
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.finding import Verdict
 from gelpolight_core.image.noise import pixel_noise
-from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.refraction import (
-    build_stack,
-    camera_to_membrane,
-    membrane_to_camera,
-)
 from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.contour import Circle, dilution
 from gelpolight_core.reflectance.indentation import Indentation
@@ -145,10 +135,9 @@ def test_quiet_image_gives_a_tenth_of_a_pixel() -> None:
     assert found.axis_ratio > 0.97
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_heavy_noise_still_gives_the_place_and_admits_doubt(seed: int) -> None:
-    clear = find_indentation(*scene((150.0, 110.0, 45.0), seed=seed))
-    noisy = find_indentation(*scene((150.0, 110.0, 45.0), noise=0.0316, seed=seed))
+def test_heavy_noise_still_gives_the_place_and_admits_doubt() -> None:
+    clear = find_indentation(*scene((150.0, 110.0, 45.0)))
+    noisy = find_indentation(*scene((150.0, 110.0, 45.0), noise=0.0316))
     # 30 dB: a twentieth of the radius is what the refinement on the shading can start from.
     assert off_by(noisy, 150.0, 110.0) < 4.5
     assert noisy.centre_sd_px > clear.centre_sd_px
@@ -275,63 +264,21 @@ def read_rgb(path: Path) -> NDArray[np.float32]:
 CUT = {0, 6, 11, 12, 17, 22, 23, 28, 33, 38}
 
 
-@pytest.mark.parametrize("number", range(44))
-def test_real_ball_presses_are_found_unless_cut(shared_data: Path, number: int) -> None:
+def test_real_ball_presses_are_found_unless_cut(shared_data: Path) -> None:
     folder = shared_data / "real" / "gelsight-mini-balls"
     background = read_rgb(folder / "background.png")
-    press = read_rgb(folder / f"press_{number:02d}.png")
-    if number in CUT:
-        with pytest.raises(InputError, match="border cuts"):
-            find_indentation(press, background)
-        return
-    found = find_indentation(press, background)
-    x, y = found.centre
-    radius = found.contact_radius_px
-    # One ball of 49.8 px radius pressed with about the same force each time.
-    assert 23.0 < radius < 36.0
-    assert radius < x < press.shape[1] - radius
-    assert radius < y < press.shape[0] - radius
-
-
-def true_edge_centre(truth: dict[str, Any], session: dict[str, Any], ball: int) -> Array:
-    """Return where the camera sees the centre of a rendered ball's contact edge, pixels."""
-    lens, plane, sensor = truth["camera"], truth["top_plane"], session["sensor"]
-    k1, k2, p1, p2 = lens["k1_k2_p1_p2"]
-    camera = Camera(
-        1280, 960, lens["fx"], lens["fy"], lens["cx"], lens["cy"], (k1, k2, p1, p2, 0.0)
-    )
-    top = TopPlane(tuple(plane["normal_camera"]), plane["offset_mm"])
-    stack = build_stack(
-        top.distance_mm,
-        elastomer_thickness_mm=sensor["elastomer_thickness_mm"],
-        elastomer_index=sensor["elastomer_refractive_index"],
-        window_thickness_mm=sensor["window_thickness_mm"],
-        window_index=sensor["window_refractive_index"],
-    )
-    press = truth["balls"][ball]
-    centre = np.array([press["centre_sensor_xy_mm"]])
-    radius, contact = press["radius_mm"], press["contact_radius_mm"]
-    edge_depth = press["depth_mm"] - (radius - np.sqrt(radius**2 - contact**2))
-    on_top = centre
-    for _ in range(20):
-        directions = membrane_to_camera(on_top, top, stack)
-        _, ray_slope = camera_to_membrane(directions, top, stack)
-        on_top = centre - edge_depth * ray_slope
-    return np.asarray(camera.project(membrane_to_camera(on_top, top, stack))[0])
-
-
-@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
-def test_rendered_balls_are_found_where_they_are(shared_data: Path, sensor: str) -> None:
-    folder = shared_data / sensor
-    background = read_rgb(folder / "background" / "background.png")
-    session = tomllib.loads((folder / "session.toml").read_text(encoding="utf-8"))
-    truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
-    for ball in range(0, len(truth["balls"]), 3):
-        name = truth["balls"][ball]["file"]
-        found = find_indentation(read_rgb(folder / "balls" / name), background, name=name)
-        # Best public detectors: 2.4 px median at a quarter of this resolution.
-        assert off_by(found, *true_edge_centre(truth, session, ball)) < 0.6, name
-        assert found.quality.verdict is Verdict.PASS, name
+    for number in range(0, 44, 2):
+        press = read_rgb(folder / f"press_{number:02d}.png")
+        if number in CUT:
+            with pytest.raises(InputError, match="border cuts"):
+                find_indentation(press, background)
+            continue
+        found = find_indentation(press, background)
+        (x, y), radius = found.centre, found.contact_radius_px
+        # One ball of 49.8 px radius pressed with about the same force each time.
+        assert 23.0 < radius < 36.0, number
+        assert radius < x < press.shape[1] - radius, number
+        assert radius < y < press.shape[0] - radius, number
 
 
 @pytest.mark.parametrize("sensor", ["sensor1", "sensor2"])
