@@ -25,19 +25,13 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import run_report
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.session import Session, read_session
-
-
-def with_balls(session: Session, count: int) -> Session:
-    """Return a session of which only the first balls are used."""
-    left_out = frozenset(f"balls/{path.name}" for path in session.files("balls")[count:])
-    return replace(session, decisions=replace(session.decisions, excluded=left_out))
+from gelpolight_core.session.session import read_session
 
 
 @pytest.fixture(scope="module")
 def curved_run(curved_session: Path) -> Run:
     """Return its calibration with all results; not to be changed."""
-    return calibrate(with_balls(read_session(curved_session), 4))
+    return calibrate(read_session(curved_session))
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +117,7 @@ def test_a_cap_that_is_stated_flat_fails_with_its_height(
     toml = folder / "session.toml"
     text = toml.read_text()
     toml.write_text(text.replace("apex_height_mm = 2.0", "apex_height_mm = 0.0"))
-    session, results = with_balls(read_session(folder), 3), curved_run.results
+    session, results = read_session(folder), curved_run.results
     for stage in FULL.of(session)[FULL.of(session).index(TOP_POSE) :]:
         results = FULL.run(stage, session, results)
     found = assemble(FULL, session, results).calibration.quality["joint"]["membrane_height_mm"]
