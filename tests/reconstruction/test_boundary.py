@@ -72,10 +72,16 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
     return rms_um(depth_error(found, press.truth, radius_mm=SEEN_MM))
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
 @pytest.mark.parametrize(
-    "name",
-    ["cylinder 6 at 11", "cylinder 12 at 11", "edge 0.23", "edge 0.5", "half plane", "quadrant"],
+    ("name", "effort"),
+    [
+        ("cylinder 6 at 11", "fast"),
+        ("cylinder 12 at 11", "best"),
+        ("edge 0.23", "fast"),
+        ("edge 0.5", "best"),
+        ("half plane", "fast"),
+        ("quadrant", "best"),
+    ],
 )
 def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str) -> None:
     """Held at depth 0 all around, or freed by brightness, these are 80 to 480 um off."""
@@ -87,8 +93,7 @@ def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str)
     assert not (found.flags & int(Flag.UNANCHORED)).any()
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("depth_mm", [0.05, 0.1])
+@pytest.mark.parametrize(("effort", "depth_mm"), [("fast", 0.1), ("best", 0.05)])
 def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(
     effort: str, depth_mm: float
 ) -> None:
@@ -130,8 +135,7 @@ def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_ancho
     assert np.median(found.depth_model_sd_mm[inside]) > 0.5 * DEPTH_MM
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("x_mm", [10.5, 12.0])
+@pytest.mark.parametrize(("effort", "x_mm"), [("fast", 12.0), ("best", 10.5)])
 def test_what_the_boundary_cuts_off_is_not_measured(x_mm: float, effort: str) -> None:
     press = scene(f"cylinder 12 at {x_mm:g}")
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)

@@ -38,9 +38,10 @@ def face_um(found: object, at_mm: tuple[float, float]) -> float:
     return float(1e3 * np.median(found.depth_mm[middle]))
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("noisy", [False, True], ids=["clean", "noisy"])
-@pytest.mark.parametrize("depth_um", [10.0, 20.0])
+@pytest.mark.parametrize(
+    ("depth_um", "noisy", "effort"),
+    [(10.0, False, "best"), (10.0, True, "fast"), (20.0, True, "best")],
+)
 def test_shallow_faces_are_seen(depth_um: float, noisy: bool, effort: str) -> None:
     """By single blocks of pixels all of these read 0."""
     known = sensor(0.5)
@@ -170,8 +171,7 @@ def wide_press(focal_px: float) -> tuple[KnownSensor, KnownPress]:
     return known, known.pressed(Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("focal_px", [150.0, 80.0, 40.0])
+@pytest.mark.parametrize(("effort", "focal_px"), [("best", 150.0), ("fast", 80.0), ("best", 40.0)])
 def test_wide_lenses_are_right_or_reported_to_see_too_little(focal_px: float, effort: str) -> None:
     """Rays up to 47, 63 and 76 degrees: wide pixels."""
     known, press = wide_press(focal_px)

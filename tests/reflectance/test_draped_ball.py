@@ -83,28 +83,22 @@ def test_upright_rays_see_the_simulators_drape(pose: BallPose, decay: float, see
     np.testing.assert_array_equal(on_ball[clear], (r < b)[clear])
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(poses, decays, st.floats(-0.25, 0.25), st.floats(-0.25, 0.25))
-def test_leaning_rays_end_where_a_ray_march_ends(
+def test_leaning_rays_end_where_a_ray_march_ends_with_normals_square_to_the_surface(
     pose: BallPose, decay: float, ray_slope_x: float, ray_slope_y: float
 ) -> None:
-    points = field(pose, 2.0 * decay + pose.radius_mm, 15, 1)
+    points = field(pose, 2.0 * decay + pose.radius_mm, 100, 1)
     ray_slope = np.tile([ray_slope_x, ray_slope_y], (len(points), 1))
-    surface, _, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
-    expected = [marched_depth(p, w, pose, decay) for p, w in zip(points, ray_slope, strict=True)]
+    surface, normals, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
+    expected = [
+        marched_depth(p, w, pose, decay) for p, w in zip(points[:15], ray_slope[:15], strict=True)
+    ]
     # Six rounds, each shrinking the error by ray slope times slope (at most 0.35): below 1 um.
-    np.testing.assert_allclose(-surface[:, 2], expected, atol=1e-3)
+    np.testing.assert_allclose(-surface[:15, 2], expected, atol=1e-3)
     np.testing.assert_allclose(
         surface[:, :2], points - surface[:, 2:] * ray_slope, atol=1e-12
     )  # on its own ray
-
-
-@settings(max_examples=30, deadline=None)
-@given(poses, decays, st.floats(-0.25, 0.25))
-def test_normals_are_square_to_the_surface(pose: BallPose, decay: float, lean: float) -> None:
-    points = field(pose, 2.0 * decay + pose.radius_mm, 100, 2)
-    ray_slope = np.tile([lean, -0.5 * lean], (len(points), 1))
-    surface, normals, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
     place, step = surface[:, :2], 1e-4
     ball = Ball(pose.radius_mm, pose.depth_mm)
     b = contact_radius(ball.profile, ball.reach_mm, decay)
