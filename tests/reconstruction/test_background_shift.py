@@ -72,14 +72,14 @@ def test_leds_that_changed_are_reported_by_channel(
 
 
 def test_a_membrane_that_moved_in_the_image_is_reported(
-    small_calibration: Calibration, small_session: Path
+    virtual_calibration: Calibration, virtual_session: Path
 ) -> None:
-    bare = read_image(next((small_session / "background").iterdir())).rgb
-    shift = background_shift(moved(bare, 3), small_calibration)
+    bare = read_image(next((virtual_session / "background").iterdir())).rgb
+    shift = background_shift(moved(bare, 3), virtual_calibration)
     assert shift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
     assert shift.quality["drift_shift_px"].verdict is Verdict.FAIL
     with pytest.raises(InputError, match="the membrane has moved by"):
-        zeroed(small_calibration, [moved(bare, 3)], operator="me", made="now")
+        zeroed(virtual_calibration, [moved(bare, 3)], operator="me", made="now")
 
 
 def test_a_press_is_called_a_touch_and_never_taken_for_the_background(

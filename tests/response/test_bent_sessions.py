@@ -21,7 +21,7 @@ from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 
-SCALE = 0.25
+SCALE = 0.3
 PRESS = "presses/cylinder_s6_d100.png"
 DEFAULT = SensorDesign()
 
