@@ -14,7 +14,6 @@ from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.open_sensor import BACKGROUND
-from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import read_session
@@ -35,9 +34,7 @@ def spoilt(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return folder
 
 
-def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
-    spoilt: Path, small_project: Project
-) -> None:
+def test_a_dead_column_is_found_and_left_out_of_background_and_presses(spoilt, small_project):
     session, before = read_session(spoilt), small_project.results
     results = FULL.run(BACKGROUND, session, before)
     found = results[BACKGROUND]
@@ -56,9 +53,7 @@ def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
             assert np.quantile(off, 0.9999) < 0.05
 
 
-def test_places_outside_the_image_are_a_damaged_file(
-    tmp_path: Path,
-) -> None:
+def test_places_outside_the_image_are_a_damaged_file(tmp_path):
     huge = BadPixels(np.array([[5000, 5]], np.int32), 6000, 6000)
     write_calibration(scene.calibration().changed(bad=huge), tmp_path / "bad.gplcal")
     with pytest.raises(InputError, match="damaged"):

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 import shutil
-from pathlib import Path
 
 import pytest
 
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
-from gelpolight_core.calibration.project import Project, assemble
-from gelpolight_core.calibration.recipe import Stage
+from gelpolight_core.calibration.project import assemble
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.causes import best_cause
 from gelpolight_core.finding import QualityTable, judge
@@ -29,8 +27,8 @@ from gelpolight_core.session.session import read_session
     ],
 )
 def test_the_number_that_is_wrong_is_the_first_cause(
-    small_project: Project, tmp_path: Path, cause: str, first: Stage, number: str, factor: float
-) -> None:
+    small_project, tmp_path, cause, first, number, factor
+):
     folder = tmp_path / "session"
     shutil.copytree(small_project.session.folder, folder)
     for ball in sorted((folder / "balls").iterdir())[3:]:
@@ -46,7 +44,7 @@ def test_the_number_that_is_wrong_is_the_first_cause(
     assert found.key == cause
 
 
-def test_findings_that_two_causes_explain_equally_well_name_none() -> None:
+def test_findings_that_two_causes_explain_equally_well_name_none():
     poor = [
         judge(key, key, 2.0, warn=1.0) for key in ("ball_height_error_percent", "depth_sd_percent")
     ]

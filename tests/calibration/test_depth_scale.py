@@ -14,10 +14,9 @@ from gelpolight_core.calibration.depth_scale import (
 from gelpolight_core.calibration.jackknife import jackknife_covariance
 from gelpolight_core.optics.refraction import LayerStack, build_stack
 from gelpolight_core.reflectance.membrane import Membrane
-from gelpolight_core.sensor_calibration import Calibration
 
 
-def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wider_parameters_leave_depths_as_much_less_sure(monkeypatch):
     monkeypatch.setattr(depth_scale, "NODES", 64)  # a deviation needs fewer than a depth
     calibration = scene.full_calibration(Membrane(1.0, 0.2, 0.5, 0.3))
     full = calibration.data.full
@@ -48,7 +47,7 @@ def stack(glass: bool) -> LayerStack:
     )
 
 
-def test_focal_length_and_distance_err_together_and_leave_the_scale() -> None:
+def test_focal_length_and_distance_err_together_and_leave_the_scale():
     focal_sd = 1e-3
     alone = 39.0 * focal_sd
     assert lateral_scale_sd(stack(False), alone, focal_sd) < 1e-9
@@ -61,7 +60,7 @@ def test_focal_length_and_distance_err_together_and_leave_the_scale() -> None:
     assert own == pytest.approx(1e-3, rel=1e-3)
 
 
-def test_leaving_presses_out_shows_errors_that_a_press_has_as_a_whole() -> None:
+def test_leaving_presses_out_shows_errors_that_a_press_has_as_a_whole():
     """A line fit to groups of points with common errors: scatter of repeats and stated sd."""
     random = np.random.default_rng(3)
     groups, points = 12, 50
@@ -84,7 +83,7 @@ def test_leaving_presses_out_shows_errors_that_a_press_has_as_a_whole() -> None:
     assert np.sqrt(np.mean(naive)) < 0.3 * seen
 
 
-def test_a_lone_press_is_known_no_better_than_its_own_pixels_say() -> None:
+def test_a_lone_press_is_known_no_better_than_its_own_pixels_say():
     random = np.random.default_rng(4)
     rows = np.stack([np.ones(40), random.uniform(size=40), np.zeros(40)], axis=1)
     errors = random.normal(size=40)
@@ -101,7 +100,7 @@ def test_a_lone_press_is_known_no_better_than_its_own_pixels_say() -> None:
         np.testing.assert_allclose(covariance, excess * inverse, rtol=1e-9)
 
 
-def test_a_calibration_says_how_sure_its_heights_are(small_calibration: Calibration) -> None:
+def test_a_calibration_says_how_sure_its_heights_are(small_calibration):
     full = small_calibration.data.full
     figure = small_calibration.quality["joint"]["depth_sd_percent"]
     assert figure.value == pytest.approx(100.0 * full.scale_sd.depth)

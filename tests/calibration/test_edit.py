@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scene
@@ -34,7 +32,7 @@ def membrane_of(calibration: Calibration) -> Membrane:
     return calibration.data.full.membrane
 
 
-def test_the_papers_model_uses_the_curve_as_it_is_drawn() -> None:
+def test_the_papers_model_uses_the_curve_as_it_is_drawn():
     plain, after = scene.calibration(), drawn(scene.full_calibration(MEMBRANE))
     np.testing.assert_array_equal(after.data.reflectance.values[1], BENT)
     np.testing.assert_array_equal(after.data.reflectance.cosines[1], NODES)
@@ -44,7 +42,7 @@ def test_the_papers_model_uses_the_curve_as_it_is_drawn() -> None:
         )
 
 
-def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
+def test_the_full_models_diffuse_share_changes_as_the_curve_did():
     before = membrane_of(scene.full_calibration(MEMBRANE))
     after = membrane_of(drawn(scene.full_calibration(MEMBRANE)))
     cosine = np.linspace(0.05, 1.0, 50)
@@ -59,7 +57,7 @@ def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
     assert (after.gloss, after.roughness, after.interreflection) == (0.2, 0.5, 0.3)
 
 
-def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
+def test_what_was_changed_is_on_record_and_in_the_file(tmp_path):
     before = scene.full_calibration(MEMBRANE)
     after = drawn(before)
     assert after.identity != before.identity
@@ -73,7 +71,7 @@ def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
     assert read.identity == after.identity
 
 
-def test_an_undone_edit_gives_nearly_the_old_membrane() -> None:
+def test_an_undone_edit_gives_nearly_the_old_membrane():
     before = scene.full_calibration(MEMBRANE)
     table = before.data.reflectance
     back = edited(drawn(before), {1: (table.cosines[1], table.values[1])}, operator="x", made=WHEN)
@@ -87,9 +85,7 @@ def test_an_undone_edit_gives_nearly_the_old_membrane() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(0.001, 1.0), min_size=3, max_size=12), st.floats(0.0, 0.2))
-def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(
-    steps: list[float], floor: float
-) -> None:
+def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(steps, floor):
     values = floor + np.cumsum([0.0, *steps])
     nodes = np.linspace(0.0, 1.0, values.size)
     after = edited(scene.full_calibration(MEMBRANE), {0: (nodes, values)}, operator="x", made=WHEN)
@@ -113,9 +109,7 @@ def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(
         ([0.0], [1.0]),
     ],
 )
-def test_a_curve_that_cannot_be_inverted_is_refused(
-    nodes: list[float], values: list[float]
-) -> None:
+def test_a_curve_that_cannot_be_inverted_is_refused(nodes, values):
     curve = (np.array(nodes), np.array(values))
     with pytest.raises(InputError, match="green"):
         edited(scene.full_calibration(MEMBRANE), {1: curve}, operator="x", made=WHEN)

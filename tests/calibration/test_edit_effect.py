@@ -7,11 +7,11 @@ import pytest
 
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit_effect import ball_effect
-from gelpolight_core.calibration.project import Project, assemble
+from gelpolight_core.calibration.project import assemble
 from gelpolight_core.calibration.recipes import FULL
 
 
-def test_a_wrong_table_changes_the_press(small_project: Project) -> None:
+def test_a_wrong_table_changes_the_press(small_project):
     run = assemble(FULL, small_project.session, small_project.results)
     effect = ball_effect(run)
     table = run.results[REFLECTANCE].table.table

@@ -52,7 +52,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("make", [scene.calibration, everything])
-def test_every_number_comes_back(make: Any, tmp_path: Path) -> None:
+def test_every_number_comes_back(make, tmp_path):
     before = make()
     write_calibration(before, tmp_path / "c.gplcal")
     after = read_calibration(tmp_path / "c.gplcal")
@@ -65,9 +65,7 @@ def test_every_number_comes_back(make: Any, tmp_path: Path) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.data())
-def test_a_truncated_or_altered_file_is_refused_or_the_same(
-    whole: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
+def test_a_truncated_or_altered_file_is_refused_or_the_same(whole, tmp_path_factory, data):
     content = bytearray(whole.read_bytes())
     place = data.draw(st.integers(0, len(content) - 1))
     if data.draw(st.booleans()):
@@ -152,9 +150,7 @@ FALLING[1, 100] = FALLING[1, 90]
     ],
     ids=lambda change: str(change)[:60],
 )
-def test_a_forged_value_without_meaning_is_refused(
-    whole: Path, tmp_path: Path, change: dict[str, Any]
-) -> None:
+def test_a_forged_value_without_meaning_is_refused(whole, tmp_path, change):
     """For the value itself, not only because the identity does not follow."""
     with pytest.raises(InputError) as refusal:
         read_calibration(forged(whole, tmp_path / "forged.gplcal", change))
@@ -162,7 +158,7 @@ def test_a_forged_value_without_meaning_is_refused(
 
 
 @pytest.mark.parametrize("name", ["led_positions_mm", "led_sd_mm", "background"])
-def test_arrays_that_are_not_finite_are_refused(whole: Path, tmp_path: Path, name: str) -> None:
+def test_arrays_that_are_not_finite_are_refused(whole, tmp_path, name):
     for value in (np.nan, -np.inf):
         array = np.array(getattr(everything().data.full, name))
         array.flat[array.size // 2] = value
@@ -172,7 +168,7 @@ def test_arrays_that_are_not_finite_are_refused(whole: Path, tmp_path: Path, nam
             )
 
 
-def test_a_newer_version_and_a_forged_identity_are_refused(whole: Path, tmp_path: Path) -> None:
+def test_a_newer_version_and_a_forged_identity_are_refused(whole, tmp_path):
     path = tmp_path / "f.gplcal"
     for change, what in (({"version": 99}, "version 99"), ({LED_HEIGHT: 13.8}, "identity")):
         with pytest.raises(InputError, match=what):
@@ -184,7 +180,7 @@ def test_a_newer_version_and_a_forged_identity_are_refused(whole: Path, tmp_path
 LED_HEIGHT = "data/sensor/led_height_mm"
 
 
-def test_a_full_model_of_version_1_is_read(tmp_path: Path) -> None:
+def test_a_full_model_of_version_1_is_read(tmp_path):
     """Version 1 had no curves, no membrane deviations and no choice between membranes."""
     usual = read_calibration(OLDER).data.full
     older = {
@@ -204,13 +200,13 @@ def test_a_full_model_of_version_1_is_read(tmp_path: Path) -> None:
     assert read.provenance.edits == ()
 
 
-def test_a_file_from_before_lengths_had_a_deviation_is_read(tmp_path: Path) -> None:
+def test_a_file_from_before_lengths_had_a_deviation_is_read(tmp_path):
     old = read_calibration(forged(OLDER, tmp_path / "old.gplcal", {"full/scale_sd": GONE}))
     assert old.data.full.scale_sd is None
     assert old.identity == read_calibration(OLDER).identity
 
 
-def test_interreflection_of_an_older_file_makes_heights_less_certain(tmp_path: Path) -> None:
+def test_interreflection_of_an_older_file_makes_heights_less_certain(tmp_path):
     today = {"full/membrane/interreflection": 0.3}
     now, read = (
         read_calibration(forged(OLDER, tmp_path / "o.gplcal", change)).data.full
@@ -220,7 +216,7 @@ def test_interreflection_of_an_older_file_makes_heights_less_certain(tmp_path: P
     assert read.scale_sd.depth == pytest.approx(np.hypot(now.scale_sd.depth, 0.03))
 
 
-def test_the_identity_is_that_of_the_numbers_and_not_of_operator_and_time() -> None:
+def test_the_identity_is_that_of_the_numbers_and_not_of_operator_and_time():
     one = everything()
     full = one.data.full
     later = replace(one.provenance, created="2031-01-01T00:00:00+00:00", operator="another")
@@ -236,7 +232,7 @@ def test_the_identity_is_that_of_the_numbers_and_not_of_operator_and_time() -> N
     assert len({other.identity for other in (one, *others)}) == 1 + len(others)
 
 
-def test_the_summary_says_what_the_calibration_says(whole: Path) -> None:
+def test_the_summary_says_what_the_calibration_says(whole):
     """The sensor library reads only manifests."""
     summary, calibration = read_summary(whole), everything()
     assert summary.identity == calibration.identity
@@ -248,7 +244,7 @@ def test_the_summary_says_what_the_calibration_says(whole: Path) -> None:
     assert summary.image_size == (calibration.camera.width, calibration.camera.height)
 
 
-def test_a_list_of_calibrations_loads_no_numerical_library() -> None:
+def test_a_list_of_calibrations_loads_no_numerical_library():
     """The window opens before the libraries are loaded."""
     program = (
         "import sys, app.workspace.workspace;"
@@ -261,7 +257,7 @@ def test_a_list_of_calibrations_loads_no_numerical_library() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_a_damaged_array_is_found_before_it_is_copied(whole: Path, tmp_path: Path) -> None:
+def test_a_damaged_array_is_found_before_it_is_copied(whole, tmp_path):
     refuse_damaged_arrays(whole)
     path = forged(whole, tmp_path / "d.gplcal", {"arrays/data.crosstalk/sha256": "0" * 64})
     with pytest.raises(InputError, match="crosstalk"):

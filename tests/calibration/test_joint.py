@@ -203,7 +203,7 @@ def refined(
     return refine_jointly(presses, pixels, MIRROR, SLAB, NO_MAP)
 
 
-def test_leds_that_are_not_at_the_housings_height_are_found() -> None:
+def test_leds_that_are_not_at_the_housings_height_are_found():
     """With gloss and decay length of the membrane, and the places of the balls."""
     known = truth(gloss=0.3, roughness=0.45, decay_mm=0.6)
     # Little noise: with the usual 1 %, held-out presses hardly distinguish LEDs that are 0.2 mm off
@@ -239,7 +239,7 @@ def test_leds_that_are_not_at_the_housings_height_are_found() -> None:
     assert 1 / 2.5 < np.sqrt(np.mean(share**2)) < 2.5
 
 
-def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share() -> None:
+def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share():
     known = truth(interreflection=0.3, decay_mm=0.8)
     result = refined(known, seed=1)
     assert result.full.membrane.gloss < 0.08
@@ -248,7 +248,7 @@ def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share() -> None
     assert result.full.membrane.exponent == pytest.approx(1.0, abs=0.03)
 
 
-def test_a_matt_membrane_that_is_not_lamberts_is_a_curve() -> None:
+def test_a_matt_membrane_that_is_not_lamberts_is_a_curve():
     known = truth(grazing=0.35)
     result = refined(known, noise=0.003, seed=2)
     assert result.full.membrane_kept == "one-dimensional"
@@ -263,7 +263,7 @@ def test_a_matt_membrane_that_is_not_lamberts_is_a_curve() -> None:
     assert (np.ptp(ratio, axis=0) / ratio.mean(axis=0) < 0.04).all()
 
 
-def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors() -> None:
+def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors():
     """Even for meaningless images, the better alternative is kept."""
     random, known = np.random.default_rng(0), truth()
     presses = [found_press(pose, random) for pose in BALLS[:4]]
@@ -283,7 +283,7 @@ def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors() ->
         assert after <= before
 
 
-def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
+def test_one_press_that_is_not_a_ball_does_not_decide():
     random = np.random.default_rng(9)
     known = truth(decay_mm=0.6)
     presses = [found_press(pose, random) for pose in BALLS[:6]]
@@ -298,7 +298,7 @@ def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
         assert np.hypot(*np.subtract(result.balls[index].centre_mm, BALLS[index].centre_mm)) < 0.03
 
 
-def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> None:
+def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane():
     known, odd = truth(gloss=0.5, roughness=0.35, decay_mm=0.6), 3
     random = np.random.default_rng(0)
     presses = [found_press(pose, random) for pose in BALLS[:6]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,9 +45,7 @@ DARK = Stage(
 RECIPE = replace(PAPER, stages=(RESPONSE, DARK, *PAPER.stages[1:]))
 
 
-def test_a_new_stage_is_computed_judged_and_made_stale(
-    computed_project: Callable[[], Project],
-) -> None:
+def test_a_new_stage_is_computed_judged_and_made_stale(computed_project):
     session = computed_project().session.folder
     with pytest.raises(InputError, match="no images of: dark"):
         calibrate(read_session(session), RECIPE)

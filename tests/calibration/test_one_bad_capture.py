@@ -12,7 +12,6 @@ import pytest
 from app.calibrate.balls import judge_ball
 from app.calibrate.boards import judge_top_view, judge_view
 from gelpolight_core.calibration.open_sensor import LENS
-from gelpolight_core.calibration.project import Project
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.finding import Finding, Verdict
 
@@ -34,9 +33,7 @@ def spoil(folder: Path, usual: tuple[int, int]) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("stage", SEVERAL)
-def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
-    stage: str, computed_project: Callable[[], Project]
-) -> None:
+def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(stage, computed_project):
     project = computed_project()
     folder = project.session.folder / project.recipe[stage].folder
     camera = project.results[LENS].camera if project.results.get(LENS) else None

@@ -18,7 +18,6 @@ from gelpolight_core.calibration.project import Cancelled, Project
 from gelpolight_core.calibration.recipe import Work
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
@@ -30,9 +29,7 @@ def project(computed_project: Callable[[], Project]) -> Project:
     return computed_project()
 
 
-def test_step_by_step_gives_the_same_calibration_as_all_at_once(
-    small_project: Project, small_calibration: Calibration
-) -> None:
+def test_step_by_step_gives_the_same_calibration_as_all_at_once(small_project, small_calibration):
     made = small_project.finish().calibration
     np.testing.assert_array_equal(made.data.radiance, small_calibration.data.radiance)
     np.testing.assert_array_equal(made.data.factors, small_calibration.data.factors)
@@ -45,9 +42,7 @@ def test_step_by_step_gives_the_same_calibration_as_all_at_once(
     assert made.data.full.membrane == small_calibration.data.full.membrane
 
 
-def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(
-    project: Project,
-) -> None:
+def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(project):
     project.exclude("balls", project.session.found("balls")[0].name)
     states = {stage: status.state for stage, status in project.statuses().items()}
     late = {"balls", "reflectance", "joint"}
@@ -62,7 +57,7 @@ def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(
     assert read_session(project.session.folder).sensor.led_height_mm == 15.0
 
 
-def test_captures_and_decisions_are_on_disk_at_once(project: Project) -> None:
+def test_captures_and_decisions_are_on_disk_at_once(project):
     frames = [np.full((240, 320, 3), value, np.uint8) for value in (10, 13)]
     name = project.add_capture("balls", frames)
     project.set_ball_radius(name, 2.5)
@@ -75,9 +70,7 @@ def test_captures_and_decisions_are_on_disk_at_once(project: Project) -> None:
     assert np.all(raw == round(11.5 * 257))
 
 
-def test_a_new_capture_of_a_single_view_replaces_the_former(
-    project: Project,
-) -> None:
+def test_a_new_capture_of_a_single_view_replaces_the_former(project):
     before = project.session.captured("mirror")
     name = project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)])
     assert [p.name for p in project.session.found("mirror")] == [name]
@@ -86,9 +79,7 @@ def test_a_new_capture_of_a_single_view_replaces_the_former(
     assert project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)]) != name
 
 
-def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
-    project: Project,
-) -> None:
+def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(project):
     project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)])
     status = project.compute("lights")
     assert status.state is StageState.FAIL
@@ -98,9 +89,7 @@ def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
     assert project.statuses()["radiance"].state is StageState.STALE
 
 
-def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
-    project: Project,
-) -> None:
+def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(project):
     project.set_ball_radius(project.session.found("balls")[0].name, 2.9)
 
     def stop(_share: float) -> None:
@@ -112,9 +101,7 @@ def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
     assert project.compute("balls").state is not StageState.STALE
 
 
-def test_an_unfinished_session_says_which_stage_is_open(
-    small_session: Path, tmp_path: Path
-) -> None:
+def test_an_unfinished_session_says_which_stage_is_open(small_session, tmp_path):
     session = read_session(small_session)
     create_session(replace(session, folder=tmp_path / "new"))
     project = Project(tmp_path / "new")
@@ -131,9 +118,7 @@ def test_an_unfinished_session_says_which_stage_is_open(
         create_session(replace(session, folder=tmp_path / "new"))
 
 
-def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
-    project: Project,
-) -> None:
+def test_what_somebody_else_wrote_into_the_session_is_not_written_over(project):
     path = project.session.folder / "session.toml"
     path.write_text(path.read_text().replace("led_height_mm = 13.7", "led_height_mm = 13.9"))
     written = path.read_bytes()
@@ -148,9 +133,7 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
     assert read_session(path.parent).sensor.led_height_mm == 13.9
 
 
-def test_a_single_view_that_cannot_replace_the_former_is_not_stored(
-    project: Project,
-) -> None:
+def test_a_single_view_that_cannot_replace_the_former_is_not_stored(project):
     """Two used images would be averaged."""
     project.exclude("balls", project.session.found("balls")[0].name)
     decisions = project.session.folder / "decisions.toml"
@@ -161,9 +144,7 @@ def test_a_single_view_that_cannot_replace_the_former_is_not_stored(
     assert read_session(project.session.folder).captured("whiteboard") == before
 
 
-def test_an_import_that_the_disk_ends_leaves_nothing_behind(
-    project: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_import_that_the_disk_ends_leaves_nothing_behind(project, tmp_path, monkeypatch):
     before, files = project.session, []
     press = cv2.imread(str(before.found("balls")[0]))
     for number in range(3):
@@ -188,9 +169,7 @@ def test_an_import_that_the_disk_ends_leaves_nothing_behind(
     assert len(project.import_files("balls", files, radius_mm=2.5)) == 3
 
 
-def test_a_press_captured_during_a_computation_belongs_to_the_next_one(
-    project: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_press_captured_during_a_computation_belongs_to_the_next_one(project, monkeypatch):
     captured: list[str] = []
 
     def slow(work: Work) -> Balls:

@@ -28,7 +28,7 @@ def clipped(calibration: Calibration, *, top: float) -> tuple[np.ndarray, np.nda
     return true, shown
 
 
-def test_light_beyond_saturation_is_found_from_what_is_around(calibration: Calibration) -> None:
+def test_light_beyond_saturation_is_found_from_what_is_around(calibration):
     true, shown = clipped(calibration, top=1.1)
     lost = (shown >= SATURATED).any(axis=-1) & calibration.table.valid
     assert lost.sum() > 20

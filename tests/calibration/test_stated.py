@@ -57,7 +57,7 @@ def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> B
         ("membrane", 1.5, "a cap 1."),
     ],
 )
-def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> None:
+def test_what_is_stated_wrong_is_named(key, stated, named):
     known = truth(
         gloss=0.3, roughness=0.45, decay_mm=0.6, coating=(stated - 1.0) * (key == "coating")
     )
@@ -87,7 +87,7 @@ def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> N
     assert (figure.verdict is Verdict.PASS) == (not key)
 
 
-def test_two_lengths_that_explain_the_presses_equally_well_are_both_named() -> None:
+def test_two_lengths_that_explain_the_presses_equally_well_are_both_named():
     found = (("layers", 0.98, 100.0), ("led_height", 1.1, 100.5), ("radius", 1.05, 104.0))
     stated = [Stated(key, value, 0.005, left) for key, value, left in found]
     (figure,) = judge_stated(stated, SENSOR, STACK, FIELD_MM)

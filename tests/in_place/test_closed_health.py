@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -47,7 +46,7 @@ def vignetting(share: float, shape: tuple[int, ...]) -> Map:
     return (1.0 - 0.5 * share * size)[..., None]
 
 
-def test_healthy_presses_have_no_fault(reconstructor: Reconstructor, presses: list[Frame]) -> None:
+def test_healthy_presses_have_no_fault(reconstructor, presses):
     for frame in presses:
         found = reconstructor.health(frame)
         assert found.keys == ()
@@ -63,9 +62,7 @@ def test_healthy_presses_have_no_fault(reconstructor: Reconstructor, presses: li
         ((1.0, 1.0, 1.2), "led_weak"),
     ],
 )
-def test_a_change_of_the_light_is_stated_and_corrected(
-    reconstructor: Reconstructor, presses: list[Frame], light: tuple[float, ...], key: str
-) -> None:
+def test_a_change_of_the_light_is_stated_and_corrected(reconstructor, presses, light, key):
     for frame in presses[:2]:
         alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
         found = reconstructor.depth(changed(frame, light), uncertainty=True)
@@ -79,9 +76,7 @@ def test_a_change_of_the_light_is_stated_and_corrected(
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1])
-def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(
-    reconstructor: Reconstructor, presses: list[Frame], share: float
-) -> None:
+def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(reconstructor, presses, share):
     for frame in presses[:2]:
         alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
         shaded = changed(frame, vignetting(share, frame.shape))
@@ -101,9 +96,7 @@ def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(
         ("camera_moved", lambda frame: np.roll(frame, 6, axis=1)),
     ],
 )
-def test_what_cannot_be_corrected_is_doubtful_and_named_first(
-    reconstructor: Reconstructor, presses: list[Frame], key: str, damage: Callable[[Frame], Frame]
-) -> None:
+def test_what_cannot_be_corrected_is_doubtful_and_named_first(reconstructor, presses, key, damage):
     for frame in presses[:2]:
         seen = damage(frame)
         found = reconstructor.depth(seen, uncertainty=True, health=reconstructor.health(seen))
@@ -114,9 +107,7 @@ def test_what_cannot_be_corrected_is_doubtful_and_named_first(
             assert error.found.startswith(found.doubts[0].text)
 
 
-def test_a_calibration_of_an_earlier_program_judges_and_corrects_as_before(
-    closed_run: Run, presses: list[Frame]
-) -> None:
+def test_a_calibration_of_an_earlier_program_judges_and_corrects_as_before(closed_run, presses):
     model = replace(closed_run.calibration.data.in_place, press_light=None)
     earlier = Reconstructor(closed_run.calibration.changed(in_place=model))
     health = earlier.health(changed(presses[0], (0.8, 0.9, 1.0)))
@@ -127,9 +118,7 @@ def test_a_calibration_of_an_earlier_program_judges_and_corrects_as_before(
 @pytest.mark.parametrize(
     ("key", "share"), [("dark", (0.02, 0.02, 0.02)), ("led_off", (1.0, 1.0, 0.0))]
 )
-def test_images_without_light_are_refused(
-    reconstructor: Reconstructor, presses: list[Frame], key: str, share: tuple[float, ...]
-) -> None:
+def test_images_without_light_are_refused(reconstructor, presses, key, share):
     frame = np.rint(presses[0] * np.array(share)).astype(np.uint8)
     assert reconstructor.health(frame).keys == (key,)
     with pytest.raises(InputError):
@@ -137,16 +126,12 @@ def test_images_without_light_are_refused(
 
 
 @pytest.mark.parametrize("order", [(2, 1, 0), (1, 2, 0), (0, 2, 1)])
-def test_colours_in_another_order_are_refused(
-    reconstructor: Reconstructor, presses: list[Frame], order: tuple[int, ...]
-) -> None:
+def test_colours_in_another_order_are_refused(reconstructor, presses, order):
     for frame in presses[::4]:
         assert reconstructor.health(frame[..., order]).keys == ("colour_order",)
 
 
-def test_a_compressed_image_is_named(
-    reconstructor: Reconstructor, presses: list[Frame], tmp_path: Path
-) -> None:
+def test_a_compressed_image_is_named(reconstructor, presses, tmp_path):
     assert reconstructor.calibration.data.grain is not None
     for quality in (50, 90):
         path = str(tmp_path / f"{quality}.jpg")
@@ -159,9 +144,7 @@ def test_a_compressed_image_is_named(
 
 
 @pytest.mark.parametrize("value", [0, 255])
-def test_hot_and_dead_pixels_are_named_and_left_out(
-    reconstructor: Reconstructor, presses: list[Frame], value: int
-) -> None:
+def test_hot_and_dead_pixels_are_named_and_left_out(reconstructor, presses, value):
     frame = presses[0].copy()
     frame[np.random.default_rng(0).random(frame.shape[:2]) < 0.01] = value
     assert "bad_pixels" in reconstructor.health(frame).keys

@@ -23,7 +23,7 @@ def real_session(shared_data: Path, name: str) -> Session:
     return session
 
 
-def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None:
+def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data):
     session = real_session(shared_data, "mini-1")
     with (session.folder / "labels.csv").open() as stream:
         labels = [row for row in csv.DictReader(stream) if row["x_px"]]
@@ -55,7 +55,7 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None
     assert np.mean(errors) < 2.8
 
 
-def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data: Path) -> None:
+def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data):
     session = real_session(shared_data, "wedge-1")
     some = [path.name for path in session.files("balls")]
     excluded = frozenset(f"balls/{name}" for number, name in enumerate(some) if number % 4)

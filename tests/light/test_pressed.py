@@ -52,9 +52,7 @@ WHOLE = {
 
 
 @pytest.mark.parametrize("name", WHOLE)
-def test_a_press_of_the_whole_field_is_named_as_such(
-    known: KnownSensor, sensor: Reconstructor, name: str
-) -> None:
+def test_a_press_of_the_whole_field_is_named_as_such(known, sensor, name):
     frame = known.noisy(known.showing(shape(WHOLE[name]), samples=1).frame)
     for found in (sensor.health(frame), sensor.solver.check(frame)):
         assert found.keys == ("all_pressed",)
@@ -75,15 +73,13 @@ CHANGES: dict[str, Callable[[Map], Map]] = {
 
 @pytest.mark.parametrize("name", CHANGES)
 @pytest.mark.parametrize("press", [Ball(4.0, 0.0), Cylinder(8.0, 0.5)])
-def test_a_change_of_the_light_is_not_taken_for_a_press(
-    known: KnownSensor, sensor: Reconstructor, press: Ball | Cylinder, name: str
-) -> None:
+def test_a_change_of_the_light_is_not_taken_for_a_press(known, sensor, press, name):
     frame = known.pressed(press, x_mm=2.0, samples=1).frame
     found = sensor.health(known.noisy(CHANGES[name](frame)))
     assert ("exposure" if name == "darker" else name) in found.keys
     assert "all_pressed" not in found.keys
 
 
-def test_another_membrane_is_not_taken_for_a_press(sensor: Reconstructor) -> None:
+def test_another_membrane_is_not_taken_for_a_press(sensor):
     other = known_sensor(SensorDesign().scaled(0.5), seed=1)
     assert "all_pressed" not in sensor.health(other.noisy(other.bare())).keys

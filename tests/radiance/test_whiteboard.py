@@ -34,13 +34,13 @@ def measured(rgb: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, RadianceR
     return result.radiance / (scale * radiance * fall_off) - 1.0, result
 
 
-def test_the_intensity_is_the_image_over_the_cosine() -> None:
+def test_the_intensity_is_the_image_over_the_cosine():
     error, result = measured(whiteboard())
     assert result.usable[scene.table().valid].mean() > 0.85
     assert np.abs(error[result.usable]).max() < 0.005
 
 
-def test_dust_and_scratches_do_not_darken_the_light() -> None:
+def test_dust_and_scratches_do_not_darken_the_light():
     rgb = whiteboard()
     rgb[100:104, 60:260] *= 0.6
     rgb[60:66, 200:206] *= 0.3
@@ -48,7 +48,7 @@ def test_dust_and_scratches_do_not_darken_the_light() -> None:
     assert np.abs(error[result.usable]).max() < 0.02
 
 
-def test_saturated_areas_are_filled_by_the_law_of_light() -> None:
+def test_saturated_areas_are_filled_by_the_law_of_light():
     scale = np.float32(1.0 / (0.8 * whiteboard().max()))
     error, result = measured(np.minimum(whiteboard() * scale, 1.0), float(scale))
     lost = result.saturated & result.usable
@@ -64,20 +64,20 @@ def test_saturated_areas_are_filled_by_the_law_of_light() -> None:
         (np.minimum(whiteboard() * 8, 1).astype(np.float32), "saturated"),
     ],
 )
-def test_a_whiteboard_that_cannot_be_used_is_refused(rgb: np.ndarray, what: str) -> None:
+def test_a_whiteboard_that_cannot_be_used_is_refused(rgb, what):
     with pytest.raises(InputError, match=what):
         calibrate_radiance(LinearImage("whiteboard.png", rgb), scene.table(), scene.LEDS)
 
 
 @pytest.mark.parametrize("order", [[1, 0, 2], [2, 1, 0], [1, 2, 0]])
-def test_leds_swapped_between_mirror_and_whiteboard_are_refused(order: list[int]) -> None:
+def test_leds_swapped_between_mirror_and_whiteboard_are_refused(order):
     image = LinearImage("whiteboard.png", whiteboard())
     with pytest.raises(InputError, match="is lit from the position of the"):
         calibrate_radiance(image, scene.table(), scene.LEDS[order])
 
 
 @pytest.mark.parametrize("decibel", [40.0, 35.0, 30.0])
-def test_noise_is_not_called_dust_and_a_speck_is(decibel: float) -> None:
+def test_noise_is_not_called_dust_and_a_speck_is(decibel):
     """Read noise is equal everywhere, so it is relatively largest where there is least light."""
     noise = 10.0 ** (-decibel / 20.0) * np.random.default_rng(4).standard_normal((240, 320, 3))
     clean, dirty = whiteboard(), whiteboard()

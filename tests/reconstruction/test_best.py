@@ -35,8 +35,8 @@ def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> Solved:
     [("cylinder_s5_d100", 1.5), ("cuboid_s4_d100", 1.5), ("cuboid_s6_d100", 2.5)],
 )
 def test_the_full_model_is_nearer_to_the_truth_than_the_papers(
-    virtual_session: Path, virtual_calibration: Calibration, name: str, height_percent: float
-) -> None:
+    virtual_session, virtual_calibration, name, height_percent
+):
     """Half of what the paper's 3 % leaves; wide walls add 1 % of height for each 0.01 of gloss."""
     truth = read_true_depth(virtual_session / "truth" / f"{name}.npz")
 
@@ -52,7 +52,7 @@ def test_the_full_model_is_nearer_to_the_truth_than_the_papers(
     assert full.rms_um < 0.7 * score("paper").rms_um
 
 
-def test_an_image_of_the_bare_membrane_is_flat(small_calibration: Calibration) -> None:
+def test_an_image_of_the_bare_membrane_is_flat(small_calibration):
     """Another frame than the calibration's, with its own noise."""
     sensor = VirtualSensor(SensorDesign().scaled(0.25), 0)
     frame = sensor.frame(BareMembrane(), averaged=1, stream="another")
@@ -64,8 +64,8 @@ def test_an_image_of_the_bare_membrane_is_flat(small_calibration: Calibration) -
 
 
 def test_the_refined_leds_are_nearer_to_the_truth_than_the_mirrors(
-    virtual_session: Path, virtual_calibration: Calibration
-) -> None:
+    virtual_session, virtual_calibration
+):
     """The housing states one height; the LEDs scatter about it by up to 0.2 mm."""
     full = virtual_calibration.data.full
     leds = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in SensorDesign().leds])
@@ -78,7 +78,7 @@ def test_the_refined_leds_are_nearer_to_the_truth_than_the_mirrors(
     assert full.held_out[1] <= full.held_out[0] or full.kept == "mirror"
 
 
-def test_normals_belong_to_the_depth(small_session: Path, small_calibration: Calibration) -> None:
+def test_normals_belong_to_the_depth(small_session, small_calibration):
     heightmap = Reconstructor(small_calibration).depth(press(small_session))
     assert heightmap.model == "full"
     np.testing.assert_allclose(np.linalg.norm(heightmap.normals, axis=-1), 1.0, atol=1e-5)
@@ -94,18 +94,14 @@ def test_normals_belong_to_the_depth(small_session: Path, small_calibration: Cal
     assert np.median(np.abs(found[..., 1] - slope_y)[gentle]) < 0.02
 
 
-def test_threads_do_not_change_the_depth(
-    small_session: Path, small_calibration: Calibration
-) -> None:
+def test_threads_do_not_change_the_depth(small_session, small_calibration):
     rgb = press(small_session)
     one, two = (solve(rgb, small_calibration, workers=n) for n in (1, 2))
     np.testing.assert_array_equal(one.depth_mm, two.depth_mm)
     np.testing.assert_array_equal(one.flags, two.flags)
 
 
-def test_a_spoilt_pixel_on_the_ground_leaves_the_plateau_alone(
-    small_session: Path, small_calibration: Calibration
-) -> None:
+def test_a_spoilt_pixel_on_the_ground_leaves_the_plateau_alone(small_session, small_calibration):
     rgb = press(small_session)
     before = solve(rgb, small_calibration)
     top = before.depth_mm > 0.95

@@ -83,7 +83,7 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
         ("quadrant", "best"),
     ],
 )
-def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str) -> None:
+def test_a_flat_face_across_the_boundary_keeps_its_depth(name, effort):
     """Held at depth 0 all around, or freed by brightness, these are 80 to 480 um off."""
     press = scene(name)
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
@@ -94,9 +94,7 @@ def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str)
 
 
 @pytest.mark.parametrize(("effort", "depth_mm"), [("fast", 0.1), ("best", 0.05)])
-def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(
-    effort: str, depth_mm: float
-) -> None:
+def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(effort, depth_mm):
     """Only its edge changes the light: the region around the edge ends on the face.
 
     Half of the field is a little brighter: this is the face, and no change of exposure.
@@ -110,7 +108,7 @@ def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(
         assert not found.health.findings
 
 
-def test_the_stated_deviation_covers_what_a_far_face_is_off_by() -> None:
+def test_the_stated_deviation_covers_what_a_far_face_is_off_by():
     press = scene("edge 0.5")
     found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
     assert found.depth_sd_mm is not None
@@ -125,7 +123,7 @@ def test_the_stated_deviation_covers_what_a_far_face_is_off_by() -> None:
     assert np.mean(off < 3.0 * sd[face]) > 0.95
 
 
-def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_anchor() -> None:
+def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_anchor():
     press = scene("ring 8")
     found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
     assert error_um(found, press) < 10.0
@@ -136,14 +134,14 @@ def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_ancho
 
 
 @pytest.mark.parametrize(("effort", "x_mm"), [("fast", 12.0), ("best", 10.5)])
-def test_what_the_boundary_cuts_off_is_not_measured(x_mm: float, effort: str) -> None:
+def test_what_the_boundary_cuts_off_is_not_measured(x_mm, effort):
     press = scene(f"cylinder 12 at {x_mm:g}")
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
     with pytest.raises(InputError, match="cut by the border"):
         measure_object(found, shape="cylinder")
 
 
-def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
+def test_the_papers_model_says_that_it_holds_the_boundary_down():
     press = scene("cylinder 12 at 10.5")
     paper = Reconstructor(sensor().calibration, model="paper")
     found = paper.depth(press.frame)
@@ -154,7 +152,7 @@ def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
     assert not paper.depth(central.frame).findings
 
 
-def test_a_face_without_an_anchor_is_doubtful() -> None:
+def test_a_face_without_an_anchor_is_doubtful():
     """A block in the middle of a field whose boundary is pressed all around."""
     press = sensor().pressed(Cylinder(5.0, DEPTH_MM), samples=1)
     found = Reconstructor(sensor().calibration).depth(press.frame)

@@ -48,7 +48,7 @@ def sampled(
 
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 999), st.sampled_from([np.uint8, np.uint16]), st.booleans())
-def test_a_node_sees_the_pixels_about_it(seed: int, kind: type, wide: bool) -> None:
+def test_a_node_sees_the_pixels_about_it(seed, kind, wide):
     """Bilinear, at the coarser scales in an image that was averaged over 2 x 2 pixels."""
     random = np.random.default_rng(seed)
     top = np.iinfo(kind).max
@@ -69,7 +69,7 @@ def test_a_node_sees_the_pixels_about_it(seed: int, kind: type, wide: bool) -> N
     assert not found.marks.any()
 
 
-def test_a_strong_lobe_does_not_lead_a_solve_astray() -> None:
+def test_a_strong_lobe_does_not_lead_a_solve_astray():
     """Brightness under a lobe is the same at two slopes; only one of them fits all three lights."""
     membrane = Membrane(1.0, 0.53, 0.35)
     leds = np.array([[-5.35, 11.29, -9.74], [-10.84, -4.1, -9.86], [5.18, -1.04, -9.83]])

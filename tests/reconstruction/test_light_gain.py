@@ -49,9 +49,7 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
 @pytest.mark.parametrize(
     ("model", "effort"), [("full", "best"), ("full", "fast"), ("paper", "best")]
 )
-def test_a_change_of_light_costs_less_than_ten_micrometres(
-    known: KnownSensor, press: KnownPress, model: str, effort: str
-) -> None:
+def test_a_change_of_light_costs_less_than_ten_micrometres(known, press, model, effort):
     reconstructor = Reconstructor(known.calibration, model=model, effort=effort)
     usual = error_um(reconstructor.depth(known.noisy(press.frame), normals=False), press)
     for name, shares in CHANGES.items():
@@ -63,9 +61,7 @@ def test_a_change_of_light_costs_less_than_ten_micrometres(
         assert reconstructor.needs(frame).done[0] == CORRECTION
 
 
-def test_a_corrected_image_is_measured_well_and_says_what_was_done(
-    known: KnownSensor, press: KnownPress
-) -> None:
+def test_a_corrected_image_is_measured_well_and_says_what_was_done(known, press):
     reconstructor = Reconstructor(known.calibration)
     still, changed = (
         reconstructor.depth(known.noisy(press.frame * np.float32(share)), uncertainty=True)
@@ -84,9 +80,7 @@ def test_a_corrected_image_is_measured_well_and_says_what_was_done(
     assert np.nanmean(left[1]) == pytest.approx(np.nanmean(left[0]), rel=0.2)
 
 
-def test_the_error_of_a_corrected_light_is_part_of_every_deviation(
-    known: KnownSensor, press: KnownPress
-) -> None:
+def test_the_error_of_a_corrected_light_is_part_of_every_deviation(known, press):
     """What each channel's gain does to the height, if it is off by its standard deviation."""
     reconstructor, off, frame = Reconstructor(known.calibration), 0.005, known.noisy(press.frame)
 
@@ -106,7 +100,7 @@ def test_the_error_of_a_corrected_light_is_part_of_every_deviation(
     assert exact.noise_sd["height_mm"] < 0.2 * usual.noise_sd["height_mm"]
 
 
-def test_light_as_at_calibration_changes_nothing(known: KnownSensor, press: KnownPress) -> None:
+def test_light_as_at_calibration_changes_nothing(known, press):
     for model in ("full", "paper"):
         reconstructor = Reconstructor(known.calibration, model=model)
         for seed in range(3):
@@ -115,7 +109,7 @@ def test_light_as_at_calibration_changes_nothing(known: KnownSensor, press: Know
             assert CORRECTION in found.trace.left_out
 
 
-def test_room_light_stays_a_fault(known: KnownSensor, press: KnownPress) -> None:
+def test_room_light_stays_a_fault(known, press):
     lit = press.frame * np.float32(1.02) + np.float32(0.002)
     found = Reconstructor(known.calibration).health(known.noisy(lit))
     assert [fault.key for fault in found.faults] == ["room_light"]

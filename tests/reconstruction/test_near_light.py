@@ -115,7 +115,7 @@ def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
     ],
     ids=["matt", "exponent", "glossy", "light from around", "curves", "glossy curves"],
 )
-def test_known_normals_are_found(membrane: Membrane) -> None:
+def test_known_normals_are_found(membrane):
     field, depth, normals = scene_of(membrane)
     found = solved(field, depth, membrane)
     error = angle_deg(found.normals, normals)
@@ -126,7 +126,7 @@ def test_known_normals_are_found(membrane: Membrane) -> None:
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-5)
 
 
-def test_slopes_follow_the_rays_from_node_to_node() -> None:
+def test_slopes_follow_the_rays_from_node_to_node():
     field, depth, _ = scene_of(MATT)
     found = solved(field, depth, MATT)
     slope_y, slope_x = np.gradient(depth, PITCH)
@@ -137,7 +137,7 @@ def test_slopes_follow_the_rays_from_node_to_node() -> None:
 
 
 @pytest.mark.parametrize("membrane", [MATT, GLOSSY], ids=["matt", "glossy"])
-def test_the_stated_deviation_is_what_noise_does(membrane: Membrane) -> None:
+def test_the_stated_deviation_is_what_noise_does(membrane):
     field, depth, _ = scene_of(membrane)
     noise = 0.01
     ratio = np.ascontiguousarray(np.moveaxis(field.ratio, -1, 0))
@@ -163,9 +163,7 @@ def test_the_stated_deviation_is_what_noise_does(membrane: Membrane) -> None:
 
 @pytest.mark.parametrize("membrane", [MATT, GLOSSY], ids=["matt", "glossy"])
 @pytest.mark.parametrize("channel", [0, 1, 2])
-def test_a_wall_turned_away_from_one_light_is_found_by_the_other_two(
-    membrane: Membrane, channel: int
-) -> None:
+def test_a_wall_turned_away_from_one_light_is_found_by_the_other_two(membrane, channel):
     """Steep walls that do not see one light: nothing of it is left in the image."""
     field, depth, _ = scene_of(membrane)
     led = LEDS[channel]
@@ -189,7 +187,7 @@ def test_a_wall_turned_away_from_one_light_is_found_by_the_other_two(
 
 
 @pytest.mark.parametrize("channel", [0, 1, 2])
-def test_a_saturated_channel_is_missing_not_one(channel: int) -> None:
+def test_a_saturated_channel_is_missing_not_one(channel):
     """Walls turned towards a light saturate it; its cut value must not bend the normal."""
     field, depth, normals = scene_of(MATT)
     saturated = field.saturated.copy()
@@ -209,7 +207,7 @@ def test_a_saturated_channel_is_missing_not_one(channel: int) -> None:
     assert angle_deg(found.normals, normals)[kept].max() < 0.1
 
 
-def test_an_all_black_image_is_flat_flagged_and_hardly_counts() -> None:
+def test_an_all_black_image_is_flat_flagged_and_hardly_counts():
     field, depth, _ = scene_of(GLOSSY)
     found = solved(replace(field, ratio=0.0 * field.ratio), depth, GLOSSY)
     assert ((found.flags & int(Flag.DARK)) != 0).all()
@@ -219,7 +217,7 @@ def test_an_all_black_image_is_flat_flagged_and_hardly_counts() -> None:
     assert not found.slope_y.any()
 
 
-def test_outside_is_firm_flat_ground_and_a_hole_inside_is_led_by_what_is_around() -> None:
+def test_outside_is_firm_flat_ground_and_a_hole_inside_is_led_by_what_is_around():
     field, depth, normals = scene_of(MATT)
     inside = (POINTS[..., 0] - 1.0) ** 2 + POINTS[..., 1] ** 2 < 9.0
     hole = (POINTS[..., 0] - 1.5) ** 2 + (POINTS[..., 1] - 0.5) ** 2 < 0.2
@@ -232,7 +230,7 @@ def test_outside_is_firm_flat_ground_and_a_hole_inside_is_led_by_what_is_around(
     assert angle_deg(found.normals, normals)[inside & ~hole].max() < 0.1
 
 
-def test_walls_steeper_than_can_be_seen_are_held_and_flagged() -> None:
+def test_walls_steeper_than_can_be_seen_are_held_and_flagged():
     field, depth, _ = scene_of(MATT)
     ratio = np.zeros_like(field.ratio)
     ratio[..., 1] = ratio[..., 2] = 3.0  # brighter than any wall
@@ -243,7 +241,7 @@ def test_walls_steeper_than_can_be_seen_are_held_and_flagged() -> None:
     assert np.isfinite(found.slope_x).all()
 
 
-def test_a_channel_seen_at_a_cosine_that_no_ball_showed_is_flagged() -> None:
+def test_a_channel_seen_at_a_cosine_that_no_ball_showed_is_flagged():
     field, depth, normals = scene_of(MATT)
     place = np.concatenate([POINTS + depth[..., None] * DRIFT, -depth[..., None]], axis=-1)
     away = LEDS[1] - place

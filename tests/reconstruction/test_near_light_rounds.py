@@ -88,7 +88,7 @@ def rms(found: Array, expected: Array) -> float:
     return float(np.sqrt(np.mean((found - expected) ** 2)))
 
 
-def test_an_ordinary_press_is_not_damped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_ordinary_press_is_not_damped(monkeypatch):
     """Not a bit of its depth changes, nor the number of rounds."""
     field, full, depth = dent(1.5, 2.0, 13.7)
     found, changes, stopped = solved(field, full)
@@ -103,8 +103,8 @@ def test_an_ordinary_press_is_not_damped(monkeypatch: pytest.MonkeyPatch) -> Non
     ("depth_mm", "width_mm", "led_height_mm"), [(1.5, 3.5, 5.0), (2.5, 3.5, 7.0)]
 )
 def test_under_low_lights_damped_rounds_stay_near_where_others_leap_away(
-    depth_mm: float, width_mm: float, led_height_mm: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    depth_mm, width_mm, led_height_mm, monkeypatch
+):
     field, full, depth = dent(depth_mm, width_mm, led_height_mm)
     found, _, stopped = solved(field, full)
     assert stopped != "done"
@@ -114,7 +114,7 @@ def test_under_low_lights_damped_rounds_stay_near_where_others_leap_away(
     assert found.max() < led_height_mm
 
 
-def test_a_deep_press_that_was_damped_and_settled_is_right_and_says_so() -> None:
+def test_a_deep_press_that_was_damped_and_settled_is_right_and_says_so():
     field, full, depth = dent(3.0, 3.5, 13.7)
     found, changes, stopped = solved(field, full)
     assert stopped == "damped"

@@ -45,7 +45,7 @@ def uneven_scene(rows: int, columns: int, pitch_mm: float):
 
 
 @pytest.mark.parametrize("stencil", [4, 2, 1])
-def test_error_falls_with_the_pitch_as_the_stencil_promises(stencil: int) -> None:
+def test_error_falls_with_the_pitch_as_the_stencil_promises(stencil):
     errors = []
     for size in (100, 200, 400):
         depth, slope_x, slope_y = uneven_scene(size, size, 10.0 / size)
@@ -62,9 +62,7 @@ def test_error_falls_with_the_pitch_as_the_stencil_promises(stencil: int) -> Non
 @example(41, 1, 1, 0.1)
 @example(31, 43, 2, 0.02)
 @settings(deadline=None, max_examples=150)
-def test_depth_whose_slopes_are_polynomials_comes_back_exactly(
-    rows: int, columns: int, seed: int, pitch_mm: float
-) -> None:
+def test_depth_whose_slopes_are_polynomials_comes_back_exactly(rows, columns, seed, pitch_mm):
     # The depth is 0 on the outline of the pixels; its slopes are cubic (lower on a grid too small
     # for four slopes), which the stencil integrates without error, at the border and the padding
     # too: what is left is rounding.
@@ -91,7 +89,7 @@ def test_depth_whose_slopes_are_polynomials_comes_back_exactly(
 
 
 @pytest.mark.parametrize("fault", [np.nan, np.inf, -np.inf])
-def test_a_fault_in_one_pixel_leaves_the_rest_of_the_map(fault: float) -> None:
+def test_a_fault_in_one_pixel_leaves_the_rest_of_the_map(fault):
     depth, slope_x, slope_y = uneven_scene(120, 160, 0.1)
     broken_x, broken_y = slope_x.copy(), slope_y.copy()
     broken_x[50, 60] = broken_y[50, 60] = broken_y[0, 159] = fault
@@ -106,7 +104,7 @@ def test_a_fault_in_one_pixel_leaves_the_rest_of_the_map(fault: float) -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_an_absurd_slope_is_clipped_and_counted(dtype: type) -> None:
+def test_an_absurd_slope_is_clipped_and_counted(dtype):
     slope_x, slope_y = np.zeros((2, 90, 120), dtype=dtype)
     slope_x[40, 50], slope_y[41, 50] = 1e4, -1e4
     found = integrate_slopes(slope_x, slope_y, pitch_mm=0.02)
@@ -130,7 +128,7 @@ def test_an_absurd_slope_is_clipped_and_counted(dtype: type) -> None:
         {"slope_limit": 0.0},
     ],
 )
-def test_a_solver_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+def test_a_solver_that_cannot_be_is_refused(wrong):
     good: dict[str, object] = {"rows": 4, "columns": 5, "pitch_mm": 0.1}
     options = good | wrong
     with pytest.raises(ValueError, match=r"\d"):

@@ -46,9 +46,7 @@ def frame(known: KnownSensor) -> Frame:
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
-def test_without_a_contact_nothing_is_solved_at_any_effort(
-    effort: str, known: KnownSensor, bare: Frame
-) -> None:
+def test_without_a_contact_nothing_is_solved_at_any_effort(effort, known, bare):
     heightmap = Reconstructor(known.calibration, effort=effort).depth(bare)
     assert heightmap.trace.done == ("contact detection",)
     assert "integration" in heightmap.trace.left_out
@@ -68,13 +66,8 @@ def test_without_a_contact_nothing_is_solved_at_any_effort(
     st.booleans(),
 )
 def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
-    effort: str,
-    balanced: Reconstructor,
-    known: KnownSensor,
-    centre_mm: tuple[float, float],
-    depth_mm: float,
-    round_end: bool,
-) -> None:
+    effort, balanced, known, centre_mm, depth_mm, round_end
+):
     indenter = Ball(3.0, depth_mm) if round_end else Cylinder(3.0, depth_mm)
     press = known.pressed(indenter, x_mm=centre_mm[0], y_mm=centre_mm[1], samples=1)
     image = known.noisy(press.frame)
@@ -87,9 +80,7 @@ def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
 
 
 @pytest.mark.parametrize("name", PRESSES)
-def test_half_scale_is_near_to_the_best(
-    name: str, balanced: Reconstructor, known: KnownSensor
-) -> None:
+def test_half_scale_is_near_to_the_best(name, balanced, known):
     """In an image of half the size, whose nodes are twice as far apart as a camera's."""
     image = known.noisy(known.pressed(PRESSES[name], x_mm=-1.3, y_mm=0.6, samples=2).frame)
     best = Reconstructor(known.calibration).depth(image)
@@ -106,9 +97,7 @@ def test_half_scale_is_near_to_the_best(
     assert same.all()
 
 
-def test_a_trace_says_what_was_done_and_what_the_membrane_does_not_need(
-    frame: Frame, known: KnownSensor
-) -> None:
+def test_a_trace_says_what_was_done_and_what_the_membrane_does_not_need(frame, known):
     for effort in EFFORTS:
         trace = Reconstructor(known.calibration, effort=effort).depth(frame, normals=False).trace
         assert trace.effort == effort
@@ -118,9 +107,7 @@ def test_a_trace_says_what_was_done_and_what_the_membrane_does_not_need(
 
 
 @pytest.mark.parametrize("model", ["paper", "full"])
-def test_what_a_frame_needs_is_known_without_reconstructing_it(
-    model: str, frame: Frame, bare: Frame, known: KnownSensor
-) -> None:
+def test_what_a_frame_needs_is_known_without_reconstructing_it(model, frame, bare, known):
     reconstruct = Reconstructor(known.calibration, model=model)
     for image in (frame, bare):
         needed, found = reconstruct.needs(image), reconstruct.depth(image).trace
@@ -129,14 +116,14 @@ def test_what_a_frame_needs_is_known_without_reconstructing_it(
         assert set(needed.left_out) <= set(found.left_out)
 
 
-def test_a_result_is_not_touched_by_the_next_frames(frame: Frame, balanced: Reconstructor) -> None:
+def test_a_result_is_not_touched_by_the_next_frames(frame, balanced):
     first = balanced.depth(frame)
     kept = first.depth_mm.copy()
     balanced.depth(frame[::-1, ::-1].copy())
     np.testing.assert_array_equal(first.depth_mm, kept)
 
 
-def test_several_threads_may_ask_at_once(frame: Frame, balanced: Reconstructor) -> None:
+def test_several_threads_may_ask_at_once(frame, balanced):
     expected = balanced.depth(frame).depth_mm
     frames = [frame, frame[::-1].copy()] * 4
     with ThreadPoolExecutor(4) as pool:
@@ -145,7 +132,7 @@ def test_several_threads_may_ask_at_once(frame: Frame, balanced: Reconstructor) 
         np.testing.assert_array_equal(heightmap.depth_mm, expected)
 
 
-def test_standard_deviations_are_those_of_the_best_answer(frame: Frame, known: KnownSensor) -> None:
+def test_standard_deviations_are_those_of_the_best_answer(frame, known):
     stated = Reconstructor(known.calibration, effort="fast").depth(frame, uncertainty=True)
     best = Reconstructor(known.calibration).depth(frame)
     np.testing.assert_array_equal(stated.depth_mm, best.depth_mm)

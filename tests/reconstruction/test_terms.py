@@ -42,17 +42,15 @@ def scored(result: Solved, calibration: Calibration, session: Path) -> DepthScor
     return score_depth(result.depth_mm, grid.x_mm, grid.y_mm, truth, height_mm=1.5, radius_mm=12.0)
 
 
-def test_all_terms_on_is_the_default_to_the_last_bit(
-    rgb: Map, whole: Solved, small_calibration: Calibration
-) -> None:
+def test_all_terms_on_is_the_default_to_the_last_bit(rgb, whole, small_calibration):
     default = Reconstructor(small_calibration).depth(rgb)
     for name in ("depth_mm", "normals", "flags"):
         np.testing.assert_array_equal(getattr(default, name), getattr(whole, name))
 
 
 def test_light_frozen_at_the_flat_membrane_makes_the_press_too_high(
-    rgb: Map, whole: Solved, small_calibration: Calibration, small_session: Path
-) -> None:
+    rgb, whole, small_calibration, small_session
+):
     """PHYSICS: nearer light is brighter, by several percent of a depth of 1.5 mm."""
     frozen = solved(rgb, small_calibration, near_light_rounds=0)
     (rounds,) = (step.reason for step in frozen.trace.steps if "quarter scale" in step.name)

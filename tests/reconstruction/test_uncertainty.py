@@ -96,7 +96,7 @@ def repeats(
 
 
 @pytest.mark.parametrize("region", ["flat", "cap", "wall"])
-def test_depth_and_slopes_scatter_by_what_is_stated(repeats: Repeats, region: str) -> None:
+def test_depth_and_slopes_scatter_by_what_is_stated(repeats, region):
     here = repeats.regions()[region]
     assert here.sum() > 125
     pairs = (
@@ -107,7 +107,7 @@ def test_depth_and_slopes_scatter_by_what_is_stated(repeats: Repeats, region: st
         assert 1.0 / HONEST < np.median(stated[here] / seen[here]) < HONEST
 
 
-def test_measured_sizes_scatter_by_what_is_stated(repeats: Repeats) -> None:
+def test_measured_sizes_scatter_by_what_is_stated(repeats):
     stated = repeats.measured[0].noise_sd
     height = np.std([m.height_mm for m in repeats.measured], ddof=1)
     assert 1.0 / HONEST < stated["height_mm"] / height < HONEST
@@ -119,7 +119,7 @@ def test_measured_sizes_scatter_by_what_is_stated(repeats: Repeats) -> None:
     assert repeats.measured[0].size_sd_mm > 2.0 * diameter
 
 
-def test_the_whole_deviation_covers_noise_and_calibration(repeats: Repeats) -> None:
+def test_the_whole_deviation_covers_noise_and_calibration(repeats):
     first = repeats.measured[0]
     scale = repeats.stated.depth_scale_sd
     # Walls steeper than the balls of the calibration add to it.
@@ -132,9 +132,7 @@ def test_the_whole_deviation_covers_noise_and_calibration(repeats: Repeats) -> N
     assert abs(first.size_mm - 5.0) < 3.0 * first.size_sd_mm
 
 
-def test_beside_the_solved_region_nothing_scatters_and_what_is_left_out_is_stated(
-    repeats: Repeats,
-) -> None:
+def test_beside_the_solved_region_nothing_scatters_and_what_is_left_out_is_stated(repeats):
     """There the depth is 0 in every repeat; true is what the drape still has."""
     stated = repeats.stated
     x, y = np.meshgrid(stated.x_mm, stated.y_mm)
@@ -153,13 +151,13 @@ def test_beside_the_solved_region_nothing_scatters_and_what_is_left_out_is_state
     assert np.sqrt(np.mean(true_slope**2)) < np.median(stated.slope_model_sd[beside])
 
 
-def test_the_models_own_error_is_where_the_membrane_is_pressed(repeats: Repeats) -> None:
+def test_the_models_own_error_is_where_the_membrane_is_pressed(repeats):
     model = repeats.stated.slope_model_sd
     parts = repeats.regions()
     assert np.median(model[parts["wall"]]) > 5.0 * np.median(model[parts["flat"]])
 
 
-def test_an_image_without_information_has_finite_deviations(small_calibration: Calibration) -> None:
+def test_an_image_without_information_has_finite_deviations(small_calibration):
     camera = small_calibration.camera
     for value in (0.0, 1.0, np.nan):
         rgb = np.full((camera.height, camera.width, 3), value, np.float32)
@@ -168,7 +166,7 @@ def test_an_image_without_information_has_finite_deviations(small_calibration: C
             assert np.isfinite(getattr(found, name)).all(), name
 
 
-def test_a_wall_is_known_to_its_node() -> None:
+def test_a_wall_is_known_to_its_node():
     """The depth of a step that lies anywhere within a node scatters as stated beside it."""
     pitch, slope = 0.1, 2.0
     x = pitch * np.arange(40.0)

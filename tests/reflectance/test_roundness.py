@@ -33,16 +33,16 @@ def judged(*, stretch: float) -> Finding:
     return figure
 
 
-def test_round_contacts_pass() -> None:
+def test_round_contacts_pass():
     assert judged(stretch=0.0).verdict is Verdict.PASS
 
 
 @pytest.mark.parametrize("stretch", [0.03, -0.03])
-def test_contacts_that_are_stretched_towards_the_edge_are_found(stretch: float) -> None:
+def test_contacts_that_are_stretched_towards_the_edge_are_found(stretch):
     figure = judged(stretch=stretch)
     assert figure.verdict is Verdict.WARN
     assert figure.value == pytest.approx(3.0, abs=0.5)
 
 
-def test_few_presses_are_not_judged() -> None:
+def test_few_presses_are_not_judged():
     assert judge_roundness([], SimpleNamespace(grid=MembraneGrid(*[np.arange(3.0)] * 2, 1.0))) == ()
