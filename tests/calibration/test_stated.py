@@ -11,22 +11,38 @@ from test_joint import (
     MIRROR,
     NO_MAP,
     SLAB,
+    Truth,
     found_press,
     pixels_of,
+    shaded,
     truth,
 )
 
+from gelpolight_core.calibration.ball_pixels import BallPixels
 from gelpolight_core.calibration.joint import Stated, refine_jointly
+from gelpolight_core.calibration.joint_problem import RISE_SHARE
 from gelpolight_core.calibration.refinement import judge_stated
 from gelpolight_core.causes import best_cause
 from gelpolight_core.finding import QualityTable, Verdict
 from gelpolight_core.optics.refraction import LayerStack
+from gelpolight_core.reflectance.ball import BallPose
+from gelpolight_core.reflectance.draped_ball import draped_ball
 from gelpolight_core.session.session import SensorData
+from gelpolight_core.surface import Surface
 
 BRIGHT = 0.75 * MIRROR[:, :2]
 SENSOR = SensorData("A", 13.7, 14.0, 1.41, 0.0, 1.49, 26.0)
 STACK = LayerStack((25.0, 14.0), (1.0, 1.41))
 FIELD_MM = 19.0
+
+
+def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> BallPixels:
+    """Return what the rays of a press see of one in a dome, as those of a flat membrane."""
+    dome = Surface(diameter_mm=FIELD_MM, rise_mm=rise_mm)
+    at = flat.on(dome).points_mm
+    seen, normals, _ = draped_ball(at, flat.ray_slope, pose, decay_mm=known.decay_mm, surface=dome)
+    at_rest = shaded(known, dome.points(at), dome.normals(at), flat.view)
+    return replace(flat, ratio=shaded(known, seen, normals, flat.view) / at_rest)
 
 
 @pytest.mark.parametrize(
@@ -38,6 +54,7 @@ FIELD_MM = 19.0
         ("square", 1.04, "the squares of the board"),
         ("led_height", 0.7, "the LED height (19."),
         ("coating", 1.3, "has 8"),
+        ("membrane", 1.5, "a cap 1."),
     ],
 )
 def test_what_is_stated_wrong_is_named(key, stated, named):
@@ -53,6 +70,10 @@ def test_what_is_stated_wrong_is_named(key, stated, named):
         pixels = [replace(p, radius_mm=stated * p.radius_mm) for p in pixels]
     if key in ("layers", "square"):
         pixels = [replace(p, points_mm=stated * p.points_mm) for p in pixels]
+    if key == "membrane":
+        rise_mm = (stated - 1.0) * RISE_SHARE * FIELD_MM
+        pairs = zip(pixels, balls, strict=True)
+        pixels = [on_dome(p, pose, known, rise_mm) for p, pose in pairs]
     if key == "square":
         leds[:, :2] += (stated - 1.0) * BRIGHT
     if key == "led_height":
