@@ -176,12 +176,12 @@ def virtual_session(made_once: MadeOnce) -> Path:
 
 @pytest.fixture(scope="session")
 def curved_session(made_once: MadeOnce) -> Path:
-    """Return the session of a virtual sensor with a curved membrane, at a quarter of its size."""
-    return _simulated(made_once, "curved-session", balls=6, scale=0.25, apex_height_mm=2.0)
+    """Return a quarter-size session of a sensor with a curved membrane, with one press."""
+    return _simulated(made_once, "curved-session", balls=6, scale=0.25, curved=True)
 
 
 def _simulated(
-    made_once: MadeOnce, name: str, *, balls: int, scale: float, apex_height_mm: float = 0.0
+    made_once: MadeOnce, name: str, *, balls: int, scale: float, curved: bool = False
 ) -> Path:
     """Return a session with some of the design's balls; a calibration's cost grows with them."""
     from gelpolight_core.design.sensor_design import SensorDesign
@@ -189,8 +189,10 @@ def _simulated(
 
     def make(folder: Path) -> Path:
         design = SensorDesign()
-        membrane = replace(design.membrane, apex_height_mm=apex_height_mm)
-        fewer = replace(design, balls=design.balls[:balls], membrane=membrane)
+        fewer = replace(design, balls=design.balls[:balls])
+        if curved:
+            cap = replace(design.membrane, apex_height_mm=2.0)
+            fewer = replace(fewer, membrane=cap, presses=design.presses[2:3])
         simulate_session(fewer, folder / "session", scale=scale)
         return folder / "session"
 

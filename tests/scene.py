@@ -14,8 +14,16 @@ from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.table import cosine_table
-from gelpolight_core.sensor_calibration import Calibration, OpenSensor, Provenance, sensor_stack
+from gelpolight_core.sensor_calibration import (
+    Calibration,
+    FullModel,
+    OpenSensor,
+    Provenance,
+    ScaleSd,
+    sensor_stack,
+)
 from gelpolight_core.session.session import SensorData
 
 CAMERA = Camera(320, 240, 345.0, 345.0, 161.3, 118.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
@@ -59,6 +67,29 @@ def calibration() -> Calibration:
     quality = {"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))}
     made = Provenance("2026-01-02T03:04:05+00:00", "someone", "0.1.0", "s", {"a": "b"})
     return Calibration("paper", data, quality, made)
+
+
+CURVES = tuple(tuple((np.linspace(0.0, 1.0, CURVE_NODES) ** n).tolist()) for n in (1.0, 1.1, 0.9))
+
+
+def full_calibration(membrane: Membrane | None = None) -> Calibration:
+    """Return the same with a full model of unusual numbers, also in what is optional."""
+    plain = calibration()
+    full = FullModel(
+        led_positions_mm=plain.data.led_positions_mm + np.array([0.1, -0.03, -0.2]),
+        led_sd_mm=np.array([[0.01, 0.02, 0.05], [0.015, 0.01, 0.04], [0.01, 0.01, 0.06]]),
+        membrane=membrane or Membrane(1.03, 0.21, 0.47, 0.31, CURVES),
+        background=(0.9 * plain.data.radiance).astype(np.float32),
+        decay_mm=0.68,
+        misfit=0.0123,
+        held_out=(0.031, 0.0134),
+        kept="refined",
+        membrane_sd={"exponent": 0.0, "gloss": 0.012},
+        membrane_held_out=(0.0134, 0.0129),
+        membrane_kept="one-dimensional",
+        scale_sd=ScaleSd(depth=0.0061, lateral=0.0002),
+    )
+    return replace(plain, model="full").changed(full=full)
 
 
 def failed(cal: Calibration) -> Calibration:

@@ -9,12 +9,13 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.project import Run, assemble
@@ -26,45 +27,43 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Sensor:
     """A rendered session, its truth and our calibration of it."""
 
     folder: Path
-    truth: dict  # type: ignore[type-arg]
+    truth: dict
     run: Run
+
+
+def calibrated(folder: Path, results: Results, balls: slice) -> Sensor:
+    """Calibrate a rendered session from its images, with some of its balls, after its optics."""
+    session = read_session(folder)
+    names = {path.name for path in session.files("balls")}
+    used = {path.name for path in session.files("balls")[balls]}
+    excluded = frozenset(f"balls/{name}" for name in names - used)
+    session = replace(session, decisions=replace(session.decisions, excluded=excluded))
+    for stage in FULL.stages[3:]:
+        results = FULL.run(stage, session, results)
+    truth = json.loads((folder / "truth.json").read_text())
+    return Sensor(folder, truth, assemble(FULL, session, results))
 
 
 @pytest.fixture(scope="module", params=["sensor-A", "sensor-B"])
 def sensor(
-    request: pytest.FixtureRequest,
-    shared_data: Path,
-    rendered_optics: Callable[[str], Results],
+    request: pytest.FixtureRequest, shared_data: Path, rendered_optics: Callable[[str], Results]
 ) -> Sensor:
-    """Calibrate a rendered session from its images alone."""
-    folder = shared_data / request.param
-    truth = json.loads((folder / "truth.json").read_text())
-    session, results = read_session(folder), rendered_optics(request.param)
-    for stage in FULL.stages[3:]:
-        results = FULL.run(stage, session, results)
-    return Sensor(folder, truth, assemble(FULL, session, results))
+    """Return a sensor calibrated with every second ball."""
+    name = request.param
+    return calibrated(shared_data / name, rendered_optics(name), slice(None, None, 2))
 
 
-def test_lens_plane_lights_and_balls_are_where_they_are(sensor: Sensor) -> None:
+def test_lights_and_balls_are_where_they_are(sensor: Sensor) -> None:
     c, truth = sensor.run.calibration, sensor.truth
-    assert c.camera.fx == pytest.approx(truth["camera"]["fx"], rel=1e-3)
-    assert c.data.plane.distance_mm == pytest.approx(truth["top_plane"]["offset_mm"], rel=1e-3)
-    normal = np.array(truth["top_plane"]["normal_camera"])
-    cosine = normal @ c.data.plane.normal_camera / np.linalg.norm(normal)
-    assert np.degrees(np.arccos(min(cosine, 1.0))) < 0.05
     leds = np.array([truth["leds"][k]["camera_mm"] for k in "RGB"])
-    error = c.data.plane.to_sensor(
-        c.data.plane.to_camera(c.data.led_positions_mm)
-    ) - c.data.plane.to_sensor(leds)
-    assert np.hypot(error[:, 0], error[:, 1]).max() < 0.15
-    assert np.linalg.norm(error, axis=1).max() < 0.35
-    assert c.data.full is not None
     refined = np.linalg.norm(c.data.plane.to_camera(c.data.full.led_positions_mm) - leds, axis=1)
     assert refined.max() < 0.15
     centres = {b["file"]: b["centre_sensor_xy_mm"] for b in truth["balls"]}
@@ -108,15 +107,13 @@ BARS = {
 }
 
 
-@pytest.mark.parametrize("model", ["paper", "full"])
-def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor, model: str) -> None:
+def mean_errors(sensor: Sensor, model: str, presses: slice) -> Array:
+    """Return the mean absolute errors of some presses in the order of the bars."""
     reconstruct = Reconstructor(sensor.run.calibration, model=model)
     errors = []
     with (sensor.folder / "presses" / "truth.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    if model == "paper":  # its bars are wide, and half of the presses tell as much
-        rows = rows[::2]
-    for row in rows:
+    for row in rows[presses]:
         image = read_image(sensor.folder / "presses" / row["file"])
         health = reconstruct.health(image.rgb)
         assert not health.findings, row["file"]
@@ -134,4 +131,9 @@ def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor, mod
         )
     mean = np.abs(errors).mean(axis=0)
     print(f"\n{sensor.folder.name} {model}: " + "  ".join(f"{e:.2f}" for e in mean))
-    assert (mean < BARS[sensor.folder.name, model]).all(), mean
+    return mean
+
+
+def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor) -> None:
+    """Of one press; all of them, and the paper's model, are in tests/long."""
+    assert (mean_errors(sensor, "full", slice(1)) < BARS[sensor.folder.name, "full"]).all()

@@ -35,20 +35,7 @@ for name in names:
     importlib.import_module(name)
 print(len(names))
 """
-WINDOWS_AND_VIEWS = ["PySide6", "pyqtgraph", "pyvista", "pyvistaqt", "vtk", "vtkmodules"]
-
-
-def import_all_without(package: str, blocked: list[str]) -> int:
-    """Import all modules of `package` in a Python of its own; return how many there are."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", IMPORT_ALL_WITHOUT, package, *blocked],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return int(done.stdout)
+NOT_THERE = ["app", "PySide6", "pyqtgraph", "pyvista", "pyvistaqt", "vtk", "vtkmodules"]
 
 
 def pins(lock: Path) -> dict[str, str]:
@@ -58,18 +45,12 @@ def pins(lock: Path) -> dict[str, str]:
 
 def test_the_core_works_in_a_notebook_without_the_desktop_program() -> None:
     """Scripts and clusters have no Qt and no VTK."""
-    assert import_all_without("gelpolight_core", ["app", *WINDOWS_AND_VIEWS]) > 0
-
-
-def test_the_command_line_works_on_a_machine_without_a_screen() -> None:
-    """Calibrating over a remote shell needs no window library."""
-    assert import_all_without("app.command_line", WINDOWS_AND_VIEWS) > 0
-
-
-def test_a_blocked_module_would_be_noticed() -> None:
-    """The two tests above can fail."""
-    with pytest.raises(AssertionError, match="numpy"):
-        import_all_without("gelpolight_core", ["numpy"])
+    command = [sys.executable, "-W", "error", "-c", IMPORT_ALL_WITHOUT, "gelpolight_core"]
+    done = subprocess.run(
+        [*command, *NOT_THERE], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 0
 
 
 def test_the_release_note_and_the_citation_are_of_this_version() -> None:
@@ -89,14 +70,8 @@ def test_every_locked_library_is_pinned_and_has_a_hash(lock: Path) -> None:
     assert entries
     for entry in entries:
         assert re.match(r"[\w.-]+==\S+ .*--hash=sha256:[0-9a-f]{64}( |$)", entry), entry
-
-
-@pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
-def test_the_lock_files_name_no_address_and_no_folder(lock: Path) -> None:
-    """A mirror or an offline folder of wheels serves as well as the public registry."""
-    for line in lock.read_text("utf-8").splitlines():
-        if not line.startswith("# "):
-            assert not re.search(r"://|/|@|--(?!hash)", line), line
+        # A mirror or an offline folder of wheels serves as well as the public registry.
+        assert not re.search(r"://|/|@|--(?!hash)", entry), entry
 
 
 def requirements(*extras: str, core: bool = True) -> list[str]:
@@ -149,14 +124,6 @@ def test_only_the_headless_opencv_is_installed() -> None:
     """Its sibling brings a Qt of its own, which crashes beside PySide6."""
     opencv = {name for name in pins(DEV_LOCK) if name.startswith("opencv")}
     assert opencv == {"opencv-contrib-python-headless"}
-
-
-def test_commits_are_checked_as_by_the_test_command() -> None:
-    """What passes before a commit passes in the tests, too."""
-    hooks = (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
-    commands = re.findall(r"entry: (.+)$", hooks, flags=re.MULTILINE)
-    tested = re.findall(r'^check "[\w ]+" (\.venv.+?)(?: >.*)?$', TESTS.read_text(), re.MULTILINE)
-    assert set(commands) == set(tested)
 
 
 def test_python_calls_no_part_of_a_compiled_loop() -> None:

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import numpy as np
 
 from gelpolight_core import masks
-
-CORE = Path(masks.__file__).parent
 
 
 def test_the_two_uppermost_numbers_of_eight_bits_are_saturated() -> None:
@@ -25,16 +20,3 @@ def test_a_node_is_usable_in_view_with_light_and_reflectance_in_all_channels() -
     np.testing.assert_array_equal(
         masks.usable(valid, light, factors), [[True, False, False, False]]
     )
-
-
-def test_no_other_module_of_the_core_has_a_limit_of_its_own_for_saturation() -> None:
-    """The virtual sensor has light code of its own, and height maps a flag of that name."""
-    own = re.compile(r"^SATURATED\s*=|>=?\s*0\.99\d?\b.*satur|satur.*>=?\s*0\.99", re.MULTILINE)
-    found = [
-        str(path.relative_to(CORE))
-        for path in CORE.rglob("*.py")
-        if path.name != "masks.py"
-        and "simulation" not in path.parts
-        and own.search(path.read_text())
-    ]
-    assert not found

@@ -8,25 +8,24 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import scene
 
 from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.calibration.ball_stage import BALLS
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.open_sensor import BACKGROUND
-from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 
-COLUMN = 333
+COLUMN = 166
 
 
 @pytest.fixture(scope="module")
-def spoilt(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the virtual session as a camera with a dead column would have made it."""
+def spoilt(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the small session as a camera with a dead column would have made it."""
     folder = tmp_path_factory.mktemp("spoilt") / "session"
-    shutil.copytree(virtual_session, folder)
+    shutil.copytree(small_session, folder)
     for stage in ("whiteboard", "background", "balls"):
         for path in (folder / stage).iterdir():
             image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
@@ -35,49 +34,27 @@ def spoilt(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     return folder
 
 
-def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
-    spoilt: Path, virtual_results: Results
-) -> None:
-    session = read_session(spoilt)
-    results = FULL.run(BACKGROUND, session, virtual_results)
+def test_a_dead_column_is_found_and_left_out_of_background_and_presses(spoilt, small_project):
+    session, before = read_session(spoilt), small_project.results
+    results = FULL.run(BACKGROUND, session, before)
     found = results[BACKGROUND]
     assert {int(c) for c in found.bad.pixels[:, 1]} == {COLUMN}
     assert len(found.bad.pixels) == found.bad.height
     assert "bad_pixels_percent" in [f.key for f in found.quality.figures]
     # The captures are those of another camera: the fingerprints of earlier stages differ.
-    good = virtual_results[BACKGROUND].light
+    good = before[BACKGROUND].light
     inside = good.min(axis=2) > 0.1
     assert np.abs(found.light[inside] / good[inside] - 1.0).max() < 0.12
     balls = FULL.run(BALLS, session, results)[BALLS].seen
-    for ball, before in zip(balls, virtual_results[BALLS].seen, strict=True):
-        assert (ball.press is None) == (before.press is None)
-        if ball.image is not None and before.image is not None:
-            off = np.abs(ball.image - before.image)[inside]
+    for ball, usual in zip(balls, before[BALLS].seen, strict=True):
+        assert (ball.press is None) == (usual.press is None)
+        if ball.image is not None and usual.image is not None:
+            off = np.abs(ball.image - usual.image)[inside]
             assert np.quantile(off, 0.9999) < 0.05
 
 
-def test_the_map_is_kept_in_the_file_and_files_without_one_are_read(
-    small_calibration: Calibration, tmp_path: Path
-) -> None:
-    camera = small_calibration.camera
-    bad = BadPixels(np.array([[3, 5], [3, 6]], np.int32), camera.height, camera.width)
-    kept = small_calibration.changed(bad=bad)
-    write_calibration(kept, tmp_path / "kept.gplcal")
-    again = read_calibration(tmp_path / "kept.gplcal")
-    assert again.data.bad is not None
-    assert np.array_equal(again.data.bad.pixels, bad.pixels)
-    assert again.identity == kept.identity != small_calibration.identity
-    write_calibration(small_calibration, tmp_path / "without.gplcal")
-    without = read_calibration(tmp_path / "without.gplcal")
-    assert without.data.bad is None
-    assert not without.data.bad_pixels.pixels.size
-    assert without.identity == small_calibration.identity
-
-
-def test_places_outside_the_image_are_a_damaged_file(
-    small_calibration: Calibration, tmp_path: Path
-) -> None:
+def test_places_outside_the_image_are_a_damaged_file(tmp_path):
     huge = BadPixels(np.array([[5000, 5]], np.int32), 6000, 6000)
-    write_calibration(small_calibration.changed(bad=huge), tmp_path / "bad.gplcal")
+    write_calibration(scene.calibration().changed(bad=huge), tmp_path / "bad.gplcal")
     with pytest.raises(InputError, match="damaged"):
         read_calibration(tmp_path / "bad.gplcal")

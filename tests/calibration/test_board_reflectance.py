@@ -23,17 +23,17 @@ def beside(reflectance: float) -> BesideBoard:
     return BesideBoard(points, view, np.full((len(x), 3), reflectance))
 
 
-def test_a_matt_membrane_reflects_what_it_shows_beside_the_board() -> None:
+def test_a_matt_membrane_reflects_what_it_shows_beside_the_board():
     assert beside(0.6).reflectance(LEDS, Membrane()) == pytest.approx(0.6, rel=1e-6)
 
 
-def test_a_lobe_that_the_camera_hardly_sees_leaves_more_reflectance() -> None:
+def test_a_lobe_that_the_camera_hardly_sees_leaves_more_reflectance():
     """Far from the mirror images of the lights, half of the light goes elsewhere."""
     glossy = beside(0.4).reflectance(LEDS, Membrane(gloss=0.5, roughness=0.2))
     assert 0.6 < glossy < 0.8
 
 
-def test_it_is_expected_unless_balls_show_something_else_altogether() -> None:
+def test_it_is_expected_unless_balls_show_something_else_altogether():
     board, matt = beside(0.8), Membrane()
     expected = board.expected(LEDS, matt, (0.7, 0.05))
     assert expected == pytest.approx((BOARD_REFLECTANCE * 0.8, BOARD_SD * 0.8))

@@ -4,43 +4,47 @@ from __future__ import annotations
 
 import re
 import shutil
-from pathlib import Path
 
 import pytest
 
-from gelpolight_core.calibration.project import calibrate
+from gelpolight_core.calibration.ball_stage import BALLS
+from gelpolight_core.calibration.open_sensor import LIGHTS, TOP_POSE
+from gelpolight_core.calibration.project import assemble
+from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.causes import best_cause
 from gelpolight_core.finding import QualityTable, judge
 from gelpolight_core.session.session import read_session
 
 
 @pytest.mark.parametrize(
-    ("cause", "number", "factor"),
+    ("cause", "first", "number", "factor"),
     [
-        ("led_height", r"(led_height_mm = )([\d.]+)", 5.0 / 13.7),
-        ("refractive_index", r"(elastomer_refractive_index = )([\d.]+)", 1.0 / 1.41),
-        ("thickness", r"(elastomer_thickness_mm = )([\d.]+)", 0.5),
-        ("working_diameter", r"(working_diameter_mm = )([\d.]+)", 40.0 / 26.0),
-        ("ball_radius", r"(default = |\.png\" = )([\d.]+)", 2.0),
+        ("led_height", LIGHTS, r"(led_height_mm = )([\d.]+)", 5.0 / 13.7),
+        ("refractive_index", TOP_POSE, r"(elastomer_refractive_index = )([\d.]+)", 1.0 / 1.41),
+        ("thickness", TOP_POSE, r"(elastomer_thickness_mm = )([\d.]+)", 0.5),
+        ("working_diameter", TOP_POSE, r"(working_diameter_mm = )([\d.]+)", 40.0 / 26.0),
+        ("ball_radius", BALLS, r"(default = |\.png\" = )([\d.]+)", 2.0),
     ],
 )
 def test_the_number_that_is_wrong_is_the_first_cause(
-    small_session: Path, tmp_path: Path, cause: str, number: str, factor: float
-) -> None:
+    small_project, tmp_path, cause, first, number, factor
+):
     folder = tmp_path / "session"
-    shutil.copytree(small_session, folder)
+    shutil.copytree(small_project.session.folder, folder)
     for ball in sorted((folder / "balls").iterdir())[3:]:
         ball.unlink()
     path = folder / "session.toml"
     text, count = re.subn(number, lambda m: f"{m[1]}{float(m[2]) * factor:.4f}", path.read_text())
     assert count
     path.write_text(text)
-    found = best_cause(calibrate(read_session(folder)).calibration.quality)
-    assert found is not None
+    session, results = read_session(folder), small_project.results
+    for stage in FULL.stages[FULL.stages.index(first) :]:
+        results = FULL.run(stage, session, results)
+    found = best_cause(assemble(FULL, session, results).calibration.quality)
     assert found.key == cause
 
 
-def test_findings_that_two_causes_explain_equally_well_name_none() -> None:
+def test_findings_that_two_causes_explain_equally_well_name_none():
     poor = [
         judge(key, key, 2.0, warn=1.0) for key in ("ball_height_error_percent", "depth_sd_percent")
     ]

@@ -20,7 +20,7 @@ def jacobian(likeness: float) -> np.ndarray:
     return slopes
 
 
-def test_the_directions_are_those_of_the_scaled_jacobian_beside_the_balls() -> None:
+def test_the_directions_are_those_of_the_scaled_jacobian_beside_the_balls():
     slopes = jacobian(0.9)
     found = Determined.of(slopes.T @ slopes, PARAMETERS)
     shared, balls = slopes[:, :4], slopes[:, 4:]
@@ -35,7 +35,7 @@ def test_the_directions_are_those_of_the_scaled_jacobian_beside_the_balls() -> N
 
 
 @pytest.mark.parametrize(("sd", "verdict"), [(0.01, Verdict.PASS), (0.1, Verdict.WARN)])
-def test_a_direction_warns_only_where_it_makes_heights_wrong(sd: float, verdict: Verdict) -> None:
+def test_a_direction_warns_only_where_it_makes_heights_wrong(sd, verdict):
     slopes = jacobian(0.999)
     found = Determined.of(slopes.T @ slopes, PARAMETERS)
     covariance, gradient = np.zeros((14, 14)), np.zeros(14)
@@ -49,7 +49,7 @@ def test_a_direction_warns_only_where_it_makes_heights_wrong(sd: float, verdict:
     assert direction.verdict is verdict
 
 
-def test_what_no_press_shows_is_named_and_does_not_break_the_figures() -> None:
+def test_what_no_press_shows_is_named_and_does_not_break_the_figures():
     slopes = jacobian(0.0)
     slopes[:, 0] = 0.0
     found = Determined.of(slopes.T @ slopes, PARAMETERS)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scene
@@ -17,27 +14,13 @@ from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.sensor_calibration import Calibration
 
 Array = NDArray[np.float64]
 NODES = np.linspace(0.0, 1.0, 9)
 BENT = 1.2 * NODES**1.3 + 0.02
 WHEN = "2026-05-06T07:08:09+00:00"
-
-
-def full_calibration(membrane: Membrane | None = None) -> Calibration:
-    plain = scene.calibration()
-    full = FullModel(
-        led_positions_mm=plain.data.led_positions_mm,
-        led_sd_mm=np.full((3, 3), 0.01),
-        membrane=membrane or Membrane(1.02, 0.2, 0.5, 0.3),
-        background=plain.data.radiance,
-        decay_mm=0.7,
-        misfit=0.01,
-        held_out=(0.03, 0.02),
-        kept="refined",
-    )
-    return replace(plain, model="full").changed(full=full)
+MEMBRANE = Membrane(1.02, 0.2, 0.5, 0.3)
 
 
 def drawn(calibration: Calibration, **more: str) -> Calibration:
@@ -46,12 +29,11 @@ def drawn(calibration: Calibration, **more: str) -> Calibration:
 
 
 def membrane_of(calibration: Calibration) -> Membrane:
-    assert calibration.data.full is not None
     return calibration.data.full.membrane
 
 
-def test_the_papers_model_uses_the_curve_as_it_is_drawn() -> None:
-    plain, after = scene.calibration(), drawn(full_calibration())
+def test_the_papers_model_uses_the_curve_as_it_is_drawn():
+    plain, after = scene.calibration(), drawn(scene.full_calibration(MEMBRANE))
     np.testing.assert_array_equal(after.data.reflectance.values[1], BENT)
     np.testing.assert_array_equal(after.data.reflectance.cosines[1], NODES)
     for k in (0, 2):
@@ -60,9 +42,9 @@ def test_the_papers_model_uses_the_curve_as_it_is_drawn() -> None:
         )
 
 
-def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
-    before = membrane_of(full_calibration())
-    after = membrane_of(drawn(full_calibration()))
+def test_the_full_models_diffuse_share_changes_as_the_curve_did():
+    before = membrane_of(scene.full_calibration(MEMBRANE))
+    after = membrane_of(drawn(scene.full_calibration(MEMBRANE)))
     cosine = np.linspace(0.05, 1.0, 50)
     share = after.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
     old = before.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
@@ -75,8 +57,8 @@ def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
     assert (after.gloss, after.roughness, after.interreflection) == (0.2, 0.5, 0.3)
 
 
-def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
-    before = full_calibration()
+def test_what_was_changed_is_on_record_and_in_the_file(tmp_path):
+    before = scene.full_calibration(MEMBRANE)
     after = drawn(before)
     assert after.identity != before.identity
     (edit,) = after.provenance.edits
@@ -89,8 +71,8 @@ def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
     assert read.identity == after.identity
 
 
-def test_an_undone_edit_gives_nearly_the_old_membrane() -> None:
-    before = full_calibration()
+def test_an_undone_edit_gives_nearly_the_old_membrane():
+    before = scene.full_calibration(MEMBRANE)
     table = before.data.reflectance
     back = edited(drawn(before), {1: (table.cosines[1], table.values[1])}, operator="x", made=WHEN)
     even = np.repeat(np.linspace(0.02, 1.0, 200)[:, None], 3, axis=1)
@@ -103,12 +85,10 @@ def test_an_undone_edit_gives_nearly_the_old_membrane() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(0.001, 1.0), min_size=3, max_size=12), st.floats(0.0, 0.2))
-def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(
-    steps: list[float], floor: float
-) -> None:
+def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(steps, floor):
     values = floor + np.cumsum([0.0, *steps])
     nodes = np.linspace(0.0, 1.0, values.size)
-    after = edited(full_calibration(), {0: (nodes, values)}, operator="x", made=WHEN)
+    after = edited(scene.full_calibration(MEMBRANE), {0: (nodes, values)}, operator="x", made=WHEN)
     curves = membrane_of(after).curves
     assert (np.diff(curves, axis=1) > 0.0).all()
     assert np.isfinite(curves).all()
@@ -129,9 +109,7 @@ def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(
         ([0.0], [1.0]),
     ],
 )
-def test_a_curve_that_cannot_be_inverted_is_refused(
-    nodes: list[float], values: list[float]
-) -> None:
+def test_a_curve_that_cannot_be_inverted_is_refused(nodes, values):
     curve = (np.array(nodes), np.array(values))
     with pytest.raises(InputError, match="green"):
-        edited(full_calibration(), {1: curve}, operator="x", made=WHEN)
+        edited(scene.full_calibration(MEMBRANE), {1: curve}, operator="x", made=WHEN)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from gelpolight_core.calibration.ball_stage import REFLECTANCE
 from gelpolight_core.calibration.edit_effect import ball_effect
-from gelpolight_core.calibration.project import Run
+from gelpolight_core.calibration.project import assemble
+from gelpolight_core.calibration.recipes import FULL
 
 
-def test_a_wrong_table_changes_the_press(virtual_run: Run, virtual_session: Path) -> None:
-    effect = ball_effect(virtual_run)
-    table = virtual_run.results[REFLECTANCE].table.table
-    name = virtual_run.results[REFLECTANCE].table.presses[0].name
+def test_a_wrong_table_changes_the_press(small_project):
+    run = assemble(FULL, small_project.session, small_project.results)
+    effect = ball_effect(run)
+    table = run.results[REFLECTANCE].table.table
+    name = run.results[REFLECTANCE].table.presses[0].name
     curve = table.cosines[0], table.values[0]
     bent = curve[1] * (1.0 - 0.2 * np.exp(-(((curve[0] - 0.4) / 0.2) ** 2)))  # on the ball's side
     before, after = effect({0: curve}, name), effect({0: (curve[0], bent)}, name)

@@ -47,7 +47,7 @@ def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
 
 
 @pytest.mark.parametrize("curves", [False, True])
-def test_slopes_are_those_of_moving_every_parameter_alone(curves: bool) -> None:
+def test_slopes_are_those_of_moving_every_parameter_alone(curves):
     found, x = problem(curves=curves)
     alone = np.stack([(found.all(x + d) - found.all(x)) / STEP for d in STEP * np.eye(x.size)], 1)
     slopes = found.jacobian(x)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
-from gelpolight_core.calibration.project import Project, assemble, calibrate
+from gelpolight_core.calibration.project import assemble, calibrate
 from gelpolight_core.calibration.recipes import FULL
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
@@ -26,13 +26,13 @@ def session(small_session: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(small_session, tmp_path / "session", ignore=ignored))
 
 
-def test_a_copied_image_is_refused_for_every_caller(session: Path) -> None:
+def test_a_copied_image_is_refused_for_every_caller(session):
     shutil.copy(session / "background" / "background.png", session / "whiteboard/whiteboard.png")
     with pytest.raises(InputError, match="copy of"):
         calibrate(read_session(session))
 
 
-def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
+def test_a_whiteboard_too_dim_for_the_balls_is_named(session):
     """A tenth of the light: the board is detected, but hardly any ball press."""
     path = session / "whiteboard" / "whiteboard.png"
     image = cv2.imread(str(path))
@@ -43,23 +43,19 @@ def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
     assert "whiteboard" in quality["balls"]["balls_left_out"].remedy
 
 
-def test_the_grain_of_the_ball_presses_is_in_the_calibration(small_project: Project) -> None:
+def test_the_grain_of_the_ball_presses_is_in_the_calibration(small_project):
     calibration = assemble(FULL, small_project.session, small_project.results).calibration
     grain = calibration.data.grain
-    assert grain is not None
     assert grain.ratio == pytest.approx(1.0, abs=0.1)
     reconstructor = Reconstructor(calibration)
     for path in small_project.session.files("balls"):
         seen = cv2.imread(str(path))
-        assert seen is not None
         found = reconstructor.health(np.ascontiguousarray(seen[..., ::-1]))
         assert "compressed" not in found.keys
         assert "compressed" not in found.unknown
 
 
-def test_names_that_are_not_text_make_a_calibration_that_can_be_read(
-    small_project: Project, tmp_path: Path
-) -> None:
+def test_names_that_are_not_text_make_a_calibration_that_can_be_read(small_project, tmp_path):
     folder = tmp_path / os.fsdecode(b"caf\xe9")
     try:
         shutil.copytree(small_project.session.folder, folder)

@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 
 from gelpolight_core.calibration.ball_stage import BALLS, Balls
-from gelpolight_core.calibration.open_sensor import LENS, LIGHTS, TOP_POSE
+from gelpolight_core.calibration.open_sensor import LENS
 from gelpolight_core.calibration.project import Cancelled, Project
 from gelpolight_core.calibration.recipe import Work
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
@@ -30,45 +29,35 @@ def project(computed_project: Callable[[], Project]) -> Project:
     return computed_project()
 
 
-def test_step_by_step_gives_the_same_calibration_as_all_at_once(
-    small_project: Project, small_calibration: Calibration
-) -> None:
+def test_step_by_step_gives_the_same_calibration_as_all_at_once(small_project, small_calibration):
     made = small_project.finish().calibration
     np.testing.assert_array_equal(made.data.radiance, small_calibration.data.radiance)
     np.testing.assert_array_equal(made.data.factors, small_calibration.data.factors)
     np.testing.assert_array_equal(
         made.data.led_positions_mm, small_calibration.data.led_positions_mm
     )
-    assert made.data.full is not None
-    assert small_calibration.data.full is not None
     np.testing.assert_array_equal(
         made.data.full.led_positions_mm, small_calibration.data.full.led_positions_mm
     )
     assert made.data.full.membrane == small_calibration.data.full.membrane
 
 
-def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(
-    project: Project,
-) -> None:
+def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(project):
     project.exclude("balls", project.session.found("balls")[0].name)
     states = {stage: status.state for stage, status in project.statuses().items()}
     late = {"balls", "reflectance", "joint"}
     assert {s for s, state in states.items() if state is StageState.STALE} == late
     assert project.stale() == ("balls", "reflectance", "joint")
     assert "excluded" in project.statuses()["balls"].sentence
-
-
-def test_another_led_height_makes_all_after_the_lights_stale(project: Project) -> None:
     sensor = replace(project.session.sensor, led_height_mm=15.0)
     project.describe(replace(project.session, sensor=sensor))
     stale = set(project.stale())
-    assert "lights" in stale
-    assert "joint" in stale
+    assert {"lights", "joint"} < stale
     assert "top_pose" not in stale
     assert read_session(project.session.folder).sensor.led_height_mm == 15.0
 
 
-def test_captures_and_decisions_are_on_disk_at_once(project: Project) -> None:
+def test_captures_and_decisions_are_on_disk_at_once(project):
     frames = [np.full((240, 320, 3), value, np.uint8) for value in (10, 13)]
     name = project.add_capture("balls", frames)
     project.set_ball_radius(name, 2.5)
@@ -81,38 +70,16 @@ def test_captures_and_decisions_are_on_disk_at_once(project: Project) -> None:
     assert np.all(raw == round(11.5 * 257))
 
 
-def test_a_new_capture_of_a_single_view_replaces_the_former(
-    project: Project,
-) -> None:
+def test_a_new_capture_of_a_single_view_replaces_the_former(project):
     before = project.session.captured("mirror")
     name = project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)])
     assert [p.name for p in project.session.found("mirror")] == [name]
     assert all(path.is_file() for path in before)
+    project.exclude("lights", name)
+    assert project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)]) != name
 
 
-def test_a_name_is_never_given_twice(project: Project) -> None:
-    frame = [np.zeros((240, 320, 3), np.uint8)]
-    first = project.add_capture("lens", frame)
-    project.exclude("lens", first)
-    assert project.add_capture("lens", frame) != first
-
-
-def test_an_image_without_a_ball_is_left_out_with_its_reason(project: Project) -> None:
-    bare = project.session.found("background")[0]
-    raw = cv2.imread(str(bare), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    name = project.add_capture("balls", [raw])
-    project.set_ball_radius(name, 3.0)
-    status = project.compute("balls")
-    assert status.state is StageState.WARN
-    assert name in status.sentence
-    assert status.quality["balls_left_out"].value == 1.0
-    project.exclude("balls", name)
-    assert project.compute("balls").quality["balls_left_out"].value == 0.0
-
-
-def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
-    project: Project,
-) -> None:
+def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(project):
     project.add_capture("lights", [np.zeros((240, 320, 3), np.uint8)])
     status = project.compute("lights")
     assert status.state is StageState.FAIL
@@ -122,38 +89,7 @@ def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
     assert project.statuses()["radiance"].state is StageState.STALE
 
 
-def test_a_ball_set_by_hand_is_used_at_its_position(project: Project) -> None:
-    """A circle drawn on the detected one gives the same ball within the accuracy of a hand."""
-    found = project.results[BALLS].presses[0]
-    name = project.results[BALLS].seen[0].file
-    table = project.results[TOP_POSE].table
-    column, row = (round(c) for c in found.indentation.centre)
-    centre = np.array([table.u_px[row, column], table.v_px[row, column]], float)
-    reach = round(found.indentation.contact_radius_px)
-    radius = float(table.u_px[row, column + reach] - centre[0])
-    project.place_ball(name, PlacedCircle(float(centre[0]), float(centre[1]), radius))
-    project.compute("balls")
-    placed = project.results[BALLS].presses[0]
-    assert np.hypot(*(np.array(placed.pose.centre_mm) - found.pose.centre_mm)) < 0.05
-    assert placed.contact_radius_mm == pytest.approx(found.contact_radius_mm, rel=0.03)
-    assert placed.indentation.coverage == 1.0
-
-
-def test_a_spot_set_by_hand_moves_its_led(project: Project) -> None:
-    lights = project.results[LIGHTS].leds
-    u, v = lights.spots.spots[2].centre_px
-    project.place_spot(2, (u + 5.0, v))
-    project.compute("lights")
-    moved = project.results[LIGHTS].leds
-    assert moved.spots.spots[2].centre_px == (u + 5.0, v)
-    assert moved.spots.spots[2].centre_sd_px == 0.5
-    assert moved.led_positions_mm[2, 0] != lights.led_positions_mm[2, 0]
-    np.testing.assert_array_equal(moved.led_positions_mm[:2], lights.led_positions_mm[:2])
-
-
-def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
-    project: Project,
-) -> None:
+def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(project):
     project.set_ball_radius(project.session.found("balls")[0].name, 2.9)
 
     def stop(_share: float) -> None:
@@ -165,9 +101,7 @@ def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
     assert project.compute("balls").state is not StageState.STALE
 
 
-def test_an_unfinished_session_says_which_stage_is_open(
-    small_session: Path, tmp_path: Path
-) -> None:
+def test_an_unfinished_session_says_which_stage_is_open(small_session, tmp_path):
     session = read_session(small_session)
     create_session(replace(session, folder=tmp_path / "new"))
     project = Project(tmp_path / "new")
@@ -184,9 +118,7 @@ def test_an_unfinished_session_says_which_stage_is_open(
         create_session(replace(session, folder=tmp_path / "new"))
 
 
-def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
-    project: Project,
-) -> None:
+def test_what_somebody_else_wrote_into_the_session_is_not_written_over(project):
     path = project.session.folder / "session.toml"
     path.write_text(path.read_text().replace("led_height_mm = 13.7", "led_height_mm = 13.9"))
     written = path.read_bytes()
@@ -201,9 +133,7 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
     assert read_session(path.parent).sensor.led_height_mm == 13.9
 
 
-def test_a_single_view_that_cannot_replace_the_former_is_not_stored(
-    project: Project,
-) -> None:
+def test_a_single_view_that_cannot_replace_the_former_is_not_stored(project):
     """Two used images would be averaged."""
     project.exclude("balls", project.session.found("balls")[0].name)
     decisions = project.session.folder / "decisions.toml"
@@ -214,9 +144,7 @@ def test_a_single_view_that_cannot_replace_the_former_is_not_stored(
     assert read_session(project.session.folder).captured("whiteboard") == before
 
 
-def test_an_import_that_the_disk_ends_leaves_nothing_behind(
-    project: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_import_that_the_disk_ends_leaves_nothing_behind(project, tmp_path, monkeypatch):
     before, files = project.session, []
     press = cv2.imread(str(before.found("balls")[0]))
     for number in range(3):
@@ -241,9 +169,7 @@ def test_an_import_that_the_disk_ends_leaves_nothing_behind(
     assert len(project.import_files("balls", files, radius_mm=2.5)) == 3
 
 
-def test_a_press_captured_during_a_computation_belongs_to_the_next_one(
-    project: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_press_captured_during_a_computation_belongs_to_the_next_one(project, monkeypatch):
     captured: list[str] = []
 
     def slow(work: Work) -> Balls:

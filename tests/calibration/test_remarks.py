@@ -28,7 +28,7 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("key", ["elastomer", "accepted"])
-def test_it_is_written_later_without_changing_the_calibration(file: Path, key: str) -> None:
+def test_it_is_written_later_without_changing_the_calibration(file, key):
     before = read_calibration(file)
     with zipfile.ZipFile(file) as archive:
         assert key not in json.loads(archive.read(MANIFEST))
@@ -42,14 +42,14 @@ def test_it_is_written_later_without_changing_the_calibration(file: Path, key: s
 
 
 @pytest.mark.parametrize("name", ["x" * 201, "gel\x00"])
-def test_a_text_that_cannot_be_shown_is_refused(file: Path, name: str) -> None:
+def test_a_text_that_cannot_be_shown_is_refused(file, name):
     with pytest.raises(InputError, match="plain text"):
         write_remark(file, "elastomer", name)
     assert read_summary(file).elastomer == ""
 
 
 @pytest.mark.parametrize("elastomer", ["gel 7", ""])
-def test_a_session_states_it_and_its_calibration_keeps_it(tmp_path: Path, elastomer: str) -> None:
+def test_a_session_states_it_and_its_calibration_keeps_it(tmp_path, elastomer):
     sensor, board = scene.calibration().data.sensor, BoardSpec((9, 6), 3.0)
     stated = (
         Session(tmp_path / "open", sensor, board, board, {}, 3.0, elastomer=elastomer),

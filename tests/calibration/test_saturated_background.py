@@ -20,7 +20,6 @@ def calibration() -> Calibration:
 
 def clipped(calibration: Calibration, *, top: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the true background, brighter so that a part exceeds 1, and what a camera shows."""
-    assert calibration.data.full is not None
     true = calibration.data.full.background * np.float32(
         top / calibration.data.full.background.max()
     )
@@ -29,7 +28,7 @@ def clipped(calibration: Calibration, *, top: float) -> tuple[np.ndarray, np.nda
     return true, shown
 
 
-def test_light_beyond_saturation_is_found_from_what_is_around(calibration: Calibration) -> None:
+def test_light_beyond_saturation_is_found_from_what_is_around(calibration):
     true, shown = clipped(calibration, top=1.1)
     lost = (shown >= SATURATED).any(axis=-1) & calibration.table.valid
     assert lost.sum() > 20

@@ -57,13 +57,13 @@ def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> B
         ("membrane", 1.5, "a cap 1."),
     ],
 )
-def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> None:
+def test_what_is_stated_wrong_is_named(key, stated, named):
     known = truth(
         gloss=0.3, roughness=0.45, decay_mm=0.6, coating=(stated - 1.0) * (key == "coating")
     )
-    random, leds = np.random.default_rng(0), MIRROR.copy()
-    presses = [found_press(pose, random) for pose in BALLS]
-    pixels = [pixels_of(pose, known, 0.003, random) for pose in BALLS]
+    balls, random, leds = BALLS[:5], np.random.default_rng(0), MIRROR.copy()
+    presses = [found_press(pose, random) for pose in balls]
+    pixels = [pixels_of(pose, known, 0.003, random) for pose in balls]
     if key == "radius":
         of_balls = [replace(p.pose, radius_mm=stated * p.pose.radius_mm) for p in presses]
         presses = [replace(p, pose=pose) for p, pose in zip(presses, of_balls, strict=True)]
@@ -72,7 +72,7 @@ def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> N
         pixels = [replace(p, points_mm=stated * p.points_mm) for p in pixels]
     if key == "membrane":
         rise_mm = (stated - 1.0) * RISE_SHARE * FIELD_MM
-        pairs = zip(pixels, BALLS, strict=True)
+        pairs = zip(pixels, balls, strict=True)
         pixels = [on_dome(p, pose, known, rise_mm) for p, pose in pairs]
     if key == "square":
         leds[:, :2] += (stated - 1.0) * BRIGHT
@@ -83,12 +83,11 @@ def test_what_is_stated_wrong_is_named(key: str, stated: float, named: str) -> N
     cause = best_cause({"joint": QualityTable((figure,))})
     if key:
         assert joint.stated[0].key == key
-        assert cause is not None
         assert named in cause.remedy
     assert (figure.verdict is Verdict.PASS) == (not key)
 
 
-def test_two_lengths_that_explain_the_presses_equally_well_are_both_named() -> None:
+def test_two_lengths_that_explain_the_presses_equally_well_are_both_named():
     found = (("layers", 0.98, 100.0), ("led_height", 1.1, 100.5), ("radius", 1.05, 104.0))
     stated = [Stated(key, value, 0.005, left) for key, value, left in found]
     (figure,) = judge_stated(stated, SENSOR, STACK, FIELD_MM)

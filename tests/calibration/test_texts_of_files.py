@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.manifest import read_quality
 from gelpolight_core.finding import Verdict
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import Text, current_language, tr, use_language
 
 
@@ -24,9 +22,7 @@ def _same_language() -> Iterator[None]:
     use_language(before)
 
 
-def test_every_text_of_a_calibration_file_can_be_translated(
-    small_calibration: Calibration, tmp_path: Path
-) -> None:
+def test_every_text_of_a_calibration_file_can_be_translated(small_calibration, tmp_path):
     """Also the advice that the technician needs when a figure fails; with values it is English."""
     quality = small_calibration.quality
     for table in quality.values():
@@ -50,7 +46,7 @@ def test_every_text_of_a_calibration_file_can_be_translated(
         assert one.remedy != other.remedy or not one.remedy or one.key == "views_left_out"
 
 
-def test_plain_texts_of_older_files_are_read(small_calibration: Calibration) -> None:
+def test_plain_texts_of_older_files_are_read(small_calibration):
     rows = json.loads(json.dumps(small_calibration.quality["lens"].as_rows()))
     assert read_quality(rows) == small_calibration.quality["lens"]
     use_language("de")

@@ -11,7 +11,7 @@ from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.table import cosine_table
 
 
-def test_specks_and_slow_changes_are_factors_and_dead_areas_are_not_used() -> None:
+def test_specks_and_slow_changes_are_factors_and_dead_areas_are_not_used():
     table = scene.table()
     points = table.grid.points_mm()
     cosines, radiance = scene.flat_light(points)

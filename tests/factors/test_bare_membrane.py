@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -20,15 +19,12 @@ def with_background(project: Project, source: Path) -> StageStatus:
     """Replace the background of the session by another image, with new noise."""
     (old,) = project.session.found("background")
     image = cv2.imread(str(source), cv2.IMREAD_UNCHANGED)
-    assert image is not None
     noise = np.random.default_rng(2).normal(0.0, 0.6, image.shape)
     assert cv2.imwrite(str(old), np.clip(np.round(image + noise), 0, 255).astype(np.uint8))
     return project.compute("background")
 
 
-def test_the_bare_membrane_passes_and_its_figures_are_shown(
-    computed_project: Callable[[], Project],
-) -> None:
+def test_the_bare_membrane_passes_and_its_figures_are_shown(computed_project):
     project = computed_project()
     status = with_background(project, project.session.found("background")[0])
     assert status.state is StageState.PASS
@@ -36,9 +32,7 @@ def test_the_bare_membrane_passes_and_its_figures_are_shown(
 
 
 @pytest.mark.parametrize("what", ["cylinder", "ball", "whiteboard"])
-def test_what_the_live_hint_sees_the_stage_fails(
-    what: str, computed_project: Callable[[], Project], small_session: Path
-) -> None:
+def test_what_the_live_hint_sees_the_stage_fails(what, computed_project, small_session):
     project = computed_project()
     session = project.session
     source = {

@@ -45,7 +45,6 @@ def test_an_image_is_read_by_its_content_whatever_its_name(
 ) -> None:
     data = encoded(ending, *options)
     form = format_of(data)
-    assert form is not None
     assert form.name == name
     assert (40, 24) in set(form.sizes(data))
     assert (form.loss(data) > 0.0) is lossy

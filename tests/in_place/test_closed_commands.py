@@ -18,7 +18,6 @@ from gelpolight_core.calibration.in_place import BALLS
 from gelpolight_core.calibration.project import Run
 from gelpolight_core.errors import InputError
 from gelpolight_core.report.build import run_report
-from gelpolight_core.session.session import Session
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +28,7 @@ def calibration(closed_run: Run, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return path
 
 
-def test_a_closed_session_becomes_a_calibration_by_itself(
-    closed_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_closed_session_becomes_a_calibration_by_itself(closed_folder, tmp_path, capsys):
     path, report = tmp_path / "closed.gplcal", tmp_path / "closed.json"
     assert main(["calibrate", str(closed_folder), "-o", str(path), "--json", str(report)]) == 0
     output = capsys.readouterr().out
@@ -44,9 +41,7 @@ def test_a_closed_session_becomes_a_calibration_by_itself(
     assert "mm/px" in capsys.readouterr().out
 
 
-def test_images_are_reconstructed_measured_and_timed(
-    calibration: Path, closed_folder: Path, tmp_path: Path
-) -> None:
+def test_images_are_reconstructed_measured_and_timed(calibration, closed_folder, tmp_path):
     image = sorted((closed_folder / "balls").iterdir())[0]
     out = tmp_path / "out"
     assert main(["reconstruct", str(calibration), str(image), "-o", str(out), "--uncertainty"]) == 0
@@ -66,8 +61,8 @@ def test_images_are_reconstructed_measured_and_timed(
 
 
 def test_a_change_of_the_light_that_is_corrected_is_said(
-    calibration: Path, closed_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    calibration, closed_folder, tmp_path, capsys
+):
     image, darker = sorted((closed_folder / "balls").iterdir())[0], tmp_path / "darker.png"
     pixels = cv2.imread(str(image), cv2.IMREAD_UNCHANGED)
     assert cv2.imwrite(str(darker), np.rint(0.8 * pixels).astype(np.uint8))
@@ -77,28 +72,16 @@ def test_a_change_of_the_light_that_is_corrected_is_said(
     assert "darker than at calibration" in output and "corrected for this" in output
 
 
-def test_a_new_gel_needs_a_background_only(
-    calibration: Path, closed_folder: Path, tmp_path: Path
-) -> None:
+def test_a_new_gel_needs_a_background_only(calibration, closed_folder, tmp_path):
+    """Some balls correct it further."""
     background = next((closed_folder / "background").iterdir())
-    new = tmp_path / "new.gplcal"
-    command = ["refresh", str(calibration), "--background", str(background), "-o", str(new)]
-    assert main(command) == 0
-    assert new.is_file()
+    for number, given in enumerate((["--background", background], ["--session", closed_folder])):
+        new = tmp_path / f"{number}.gplcal"
+        assert main(["refresh", str(calibration), *map(str, given), "-o", str(new)]) == 0
+        assert read_calibration(new).model == "in-place"
 
 
-def test_a_new_gel_with_some_balls_is_corrected(
-    calibration: Path, closed_folder: Path, tmp_path: Path
-) -> None:
-    new = tmp_path / "new.gplcal"
-    command = ["refresh", str(calibration), "--session", str(closed_folder), "-o", str(new)]
-    assert main(command) == 0
-    assert read_calibration(new).model == "in-place"
-
-
-def test_one_message_lists_all_that_an_open_calibration_lacks(
-    small_session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_message_lists_all_that_an_open_calibration_lacks(small_session, tmp_path, capsys):
     folder = tmp_path / "session"
     shutil.copytree(small_session, folder)
     for stage in ("checkerboard", "top_pose", "mirror", "whiteboard"):
@@ -117,8 +100,8 @@ def test_one_message_lists_all_that_an_open_calibration_lacks(
 
 
 def test_objects_with_walls_are_doubtful_because_balls_have_none(
-    calibration: Path, small_session: Path, tmp_path: Path
-) -> None:
+    calibration, small_session, tmp_path
+):
     image = small_session / "presses" / "cylinder_s5_d100.png"
     measured = tmp_path / "cylinder.json"
     command = ["measure", str(calibration), str(image), "--shape", "cylinder"]
@@ -129,8 +112,8 @@ def test_objects_with_walls_are_doubtful_because_balls_have_none(
 
 
 def test_reports_show_presses_and_what_is_not_known(
-    calibration: Path, closed_run: Run, closed_session: Session, tmp_path: Path
-) -> None:
+    calibration, closed_run, closed_session, tmp_path
+):
     path = tmp_path / "report.pdf"
     assert main(["report", str(calibration), "-o", str(path)]) == 0
     facts = dict(report_data(path)["facts"])

@@ -40,8 +40,8 @@ def closed_dome(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     [("cylinder_s5_d100", 5.0), ("cylinder_s7_d100", 7.0), ("cuboid_s6_d100", 6.0)],
 )
 def test_sizes_and_heights_of_faces_in_a_closed_dome_are_true(
-    shared_data: Path, closed_dome: Calibration, name: str, size_mm: float
-) -> None:
+    shared_data, closed_dome, name, size_mm
+):
     image = read_image(shared_data / "sensor-K" / "presses" / f"{name}.png")
     pressed = Reconstructor(closed_dome).depth(image, uncertainty=True)
     assert pressed.at_rest == closed_dome.data.in_place.grid.surface

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,13 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 from gelpolight_core import measure
-from gelpolight_core.calibration.project import Run, calibrate
+from gelpolight_core.calibration.project import Run
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import linear_image
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.images import read_raw_image
-from gelpolight_core.session.session import read_session
 
 Frame = NDArray[np.uint8]
 Map = NDArray[Any]
@@ -49,11 +46,10 @@ def vignetting(share: float, shape: tuple[int, ...]) -> Map:
     return (1.0 - 0.5 * share * size)[..., None]
 
 
-def test_healthy_presses_have_no_fault(reconstructor: Reconstructor, presses: list[Frame]) -> None:
+def test_healthy_presses_have_no_fault(reconstructor, presses):
     for frame in presses:
         found = reconstructor.health(frame)
         assert found.keys == ()
-        assert found.light is not None
         assert found.light.share == pytest.approx(np.ones(3), abs=0.002)
 
 
@@ -66,10 +62,8 @@ def test_healthy_presses_have_no_fault(reconstructor: Reconstructor, presses: li
         ((1.0, 1.0, 1.2), "led_weak"),
     ],
 )
-def test_a_change_of_the_light_is_stated_and_corrected(
-    reconstructor: Reconstructor, presses: list[Frame], light: tuple[float, ...], key: str
-) -> None:
-    for frame in presses[:3]:
+def test_a_change_of_the_light_is_stated_and_corrected(reconstructor, presses, light, key):
+    for frame in presses[:2]:
         alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
         found = reconstructor.depth(changed(frame, light), uncertainty=True)
         assert [finding.key for finding in found.findings] == [key]
@@ -82,10 +76,8 @@ def test_a_change_of_the_light_is_stated_and_corrected(
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1])
-def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(
-    reconstructor: Reconstructor, presses: list[Frame], share: float
-) -> None:
-    for frame in presses[:3]:
+def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(reconstructor, presses, share):
+    for frame in presses[:2]:
         alone = measure(reconstructor.depth(frame, uncertainty=True), shape="ball")
         shaded = changed(frame, vignetting(share, frame.shape))
         found = reconstructor.depth(shaded, uncertainty=True)
@@ -104,10 +96,8 @@ def test_vignetting_of_a_closed_sensor_is_corrected_or_doubtful(
         ("camera_moved", lambda frame: np.roll(frame, 6, axis=1)),
     ],
 )
-def test_what_cannot_be_corrected_is_doubtful_and_named_first(
-    reconstructor: Reconstructor, presses: list[Frame], key: str, damage: Callable[[Frame], Frame]
-) -> None:
-    for frame in presses[:3]:
+def test_what_cannot_be_corrected_is_doubtful_and_named_first(reconstructor, presses, key, damage):
+    for frame in presses[:2]:
         seen = damage(frame)
         found = reconstructor.depth(seen, uncertainty=True, health=reconstructor.health(seen))
         assert found.doubts[0].key == key
@@ -117,23 +107,18 @@ def test_what_cannot_be_corrected_is_doubtful_and_named_first(
             assert error.found.startswith(found.doubts[0].text)
 
 
-def test_a_calibration_of_an_earlier_program_judges_and_corrects_as_before(
-    closed_run: Run, presses: list[Frame]
-) -> None:
+def test_a_calibration_of_an_earlier_program_judges_and_corrects_as_before(closed_run, presses):
     model = replace(closed_run.calibration.data.in_place, press_light=None)
     earlier = Reconstructor(closed_run.calibration.changed(in_place=model))
     health = earlier.health(changed(presses[0], (0.8, 0.9, 1.0)))
     assert health.keys == () and "exposure" in health.unknown
-    assert health.light is not None
     assert health.light.share == pytest.approx([0.8, 0.9, 1.0], abs=0.002)
 
 
 @pytest.mark.parametrize(
     ("key", "share"), [("dark", (0.02, 0.02, 0.02)), ("led_off", (1.0, 1.0, 0.0))]
 )
-def test_images_without_light_are_refused(
-    reconstructor: Reconstructor, presses: list[Frame], key: str, share: tuple[float, ...]
-) -> None:
+def test_images_without_light_are_refused(reconstructor, presses, key, share):
     frame = np.rint(presses[0] * np.array(share)).astype(np.uint8)
     assert reconstructor.health(frame).keys == (key,)
     with pytest.raises(InputError):
@@ -141,22 +126,17 @@ def test_images_without_light_are_refused(
 
 
 @pytest.mark.parametrize("order", [(2, 1, 0), (1, 2, 0), (0, 2, 1)])
-def test_colours_in_another_order_are_refused(
-    reconstructor: Reconstructor, presses: list[Frame], order: tuple[int, ...]
-) -> None:
-    for frame in presses:
+def test_colours_in_another_order_are_refused(reconstructor, presses, order):
+    for frame in presses[::4]:
         assert reconstructor.health(frame[..., order]).keys == ("colour_order",)
 
 
-def test_a_compressed_image_is_named(
-    reconstructor: Reconstructor, presses: list[Frame], tmp_path: Path
-) -> None:
+def test_a_compressed_image_is_named(reconstructor, presses, tmp_path):
     assert reconstructor.calibration.data.grain is not None
     for quality in (50, 90):
         path = str(tmp_path / f"{quality}.jpg")
         cv2.imwrite(path, presses[0][..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
         seen = cv2.imread(path)
-        assert seen is not None
         found = reconstructor.health(np.ascontiguousarray(seen[..., ::-1]))
         assert found.keys == ("compressed",)
         assert found.faults
@@ -164,37 +144,10 @@ def test_a_compressed_image_is_named(
 
 
 @pytest.mark.parametrize("value", [0, 255])
-def test_hot_and_dead_pixels_are_named_and_left_out(
-    reconstructor: Reconstructor, presses: list[Frame], value: int
-) -> None:
+def test_hot_and_dead_pixels_are_named_and_left_out(reconstructor, presses, value):
     frame = presses[0].copy()
     frame[np.random.default_rng(0).random(frame.shape[:2]) < 0.01] = value
     assert "bad_pixels" in reconstructor.health(frame).keys
     clean, found = reconstructor.depth(presses[0]), reconstructor.depth(frame)
     assert found.doubts
     assert np.abs(found.depth_mm - clean.depth_mm).max() < 0.02 * clean.depth_mm.max()
-
-
-def test_colours_of_a_real_sensor_in_another_order_are_refused(shared_data: Path) -> None:
-    folder = shared_data / "real" / "closed" / "mini-1"
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
-    reconstructor = Reconstructor(calibrate(read_session(folder)).calibration)
-    for path in sorted((folder / "balls").glob("*.png"))[::6]:
-        frame = read_raw_image(path)[0]
-        assert reconstructor.health(frame).keys == ()
-        assert reconstructor.health(frame[..., ::-1]).keys == ("colour_order",)
-        _, data = cv2.imencode(".jpg", frame[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 75])
-        compressed = np.ascontiguousarray(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1])
-        assert "compressed" in reconstructor.health(compressed).keys
-
-
-def test_a_gel_that_drags_its_texture_is_calibrated(shared_data: Path, tmp_path: Path) -> None:
-    folder = shared_data / "cases" / "dragged-texture"
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
-    shutil.copytree(folder, tmp_path / "session")
-    table = calibrate(read_session(tmp_path / "session")).calibration.quality["in_place"]
-    found = {figure.key: figure.value for figure in table.figures}
-    assert found["held_out_normal_deg"] < 2.0
-    assert found["held_out_diameter_percent"] < 1.0

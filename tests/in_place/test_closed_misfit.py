@@ -40,7 +40,6 @@ def direct(run: Run, frame: Frame, height_map: HeightMap) -> tuple[np.ndarray, n
 
     The misfit is the least change of colour that makes the slopes agree.
     """
-    assert height_map.health is not None
     light = height_map.health.light
     gain = None if light is None else light.share
     seen = run.calibration.data.in_place.change(frame.astype(np.float32) / 255.0, gain)
@@ -63,9 +62,7 @@ def direct(run: Run, frame: Frame, height_map: HeightMap) -> tuple[np.ndarray, n
     return angle_deg[usable], np.sqrt((least**2).mean(axis=1))[usable]
 
 
-def test_the_misfit_is_that_of_a_direct_computation(
-    closed_run: Run, reconstructor: Reconstructor, press: Frame
-) -> None:
+def test_the_misfit_is_that_of_a_direct_computation(closed_run, reconstructor, press):
     """It was 0 for any image once: the depth's gradient was compared with itself."""
     noise = np.random.default_rng(0).integers(0, 256, press.shape).astype(np.uint8)
     angles, misfits = {}, {}
@@ -83,9 +80,7 @@ def test_the_misfit_is_that_of_a_direct_computation(
     assert 0.0 < 10.0 * misfits["press"] < min(misfits["noise"], misfits["inverted"])
 
 
-def test_the_image_of_a_surface_has_its_slopes(
-    closed_run: Run, reconstructor: Reconstructor, press: Frame
-) -> None:
+def test_the_image_of_a_surface_has_its_slopes(closed_run, reconstructor, press):
     height_map = reconstructor.depth(press)
     image = reconstructor.predict(height_map)
     known = np.isfinite(image).all(axis=-1)
@@ -96,9 +91,7 @@ def test_the_image_of_a_surface_has_its_slopes(
     assert np.abs(expected).max() > 0.3
 
 
-def test_a_flat_surface_of_a_closed_sensor_looks_like_the_background(
-    reconstructor: Reconstructor, press: Frame
-) -> None:
+def test_a_flat_surface_of_a_closed_sensor_looks_like_the_background(reconstructor, press):
     height_map = reconstructor.depth(press, normals=False)
     height_map.depth_mm[:] = 0.0
     image = reconstructor.predict(height_map, step=3)

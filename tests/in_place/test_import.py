@@ -51,12 +51,9 @@ def refusal(folder: Path, out: Path, capsys: pytest.CaptureFixture[str], *option
     return capsys.readouterr().err
 
 
-def test_a_catalog_keeps_sizes_images_and_labels(
-    catalog: Path, images: list[Path], tmp_path: Path
-) -> None:
+def test_a_catalog_keeps_sizes_images_and_labels(catalog, images, tmp_path):
     session = imported(catalog, tmp_path / "s", "--preset", "gelsight-mini", "--serial", "m")
     assert session.serial == "m"
-    assert session.in_place is not None
     assert session.in_place.stated_scale == pytest.approx(0.0634)
     assert session.in_place.mm_per_px_sd == pytest.approx(0.0013)
     first, second = session.files("balls")
@@ -65,9 +62,7 @@ def test_a_catalog_keeps_sizes_images_and_labels(
     assert session.decisions.balls[second.name] == PlacedCircle(101.0, 90.0, 30.0)
 
 
-def test_a_raster_takes_one_frame_of_each_place_and_states_its_scale(
-    images: list[Path], tmp_path: Path
-) -> None:
+def test_a_raster_takes_one_frame_of_each_place_and_states_its_scale(images, tmp_path):
     folder = tmp_path / "raster"
     for name in ("annotations", "blank_images", "probe_images"):
         (folder / name).mkdir(parents=True)
@@ -82,16 +77,13 @@ def test_a_raster_takes_one_frame_of_each_place_and_states_its_scale(
         json.dumps({"px_per_mm": 20.0, "probe_radius_mm": 2.0})
     )
     session = imported(folder, tmp_path / "s")
-    assert session.in_place is not None
     assert session.in_place.stated_scale == pytest.approx(0.05)
     names = [path.name for path in session.files("balls")]
     assert [session.ball_radius_mm(name) for name in names] == [2.0, 2.0]
     assert not session.decisions.balls
 
 
-def test_a_table_of_circles_needs_ball_and_background(
-    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_of_circles_needs_ball_and_background(images, tmp_path, capsys):
     folder = tmp_path / "circles"
     (folder / "images").mkdir(parents=True)
     shutil.copy(images[1], folder / "images" / "0001.png")
@@ -116,9 +108,7 @@ def test_a_table_of_circles_needs_ball_and_background(
         ("6.000mm/0", "too few values"),
     ],
 )
-def test_a_wrong_line_is_named(
-    catalog: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, output: str
-) -> None:
+def test_a_wrong_line_is_named(catalog, tmp_path, capsys, line, output):
     table = catalog / "catalog.csv"
     table.write_text(table.read_text() + line + "\n")
     message = refusal(catalog, tmp_path / "s", capsys, "--preset", "gelsight-mini")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -36,16 +35,7 @@ def held_back(session: Session, count: int) -> tuple[Session, tuple[str, ...]]:
     return replace(session, decisions=replace(session.decisions, excluded=excluded)), names
 
 
-@pytest.fixture(scope="module")
-def held_back_run(closed_session: Session) -> tuple[Run, tuple[str, ...]]:
-    """Return a calibration without two presses, and their names."""
-    session, names = held_back(closed_session, 2)
-    return calibrate(session), names
-
-
-def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(
-    closed_session: Session, closed_run: Run
-) -> None:
+def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(closed_session, closed_run):
     first, *_ = closed_session.files("balls")
     detected = closed_run.results[BALLS].result.presses[0].ball
     drawn = PlacedCircle(detected.x + 2.0, detected.y, detected.contact)
@@ -56,28 +46,11 @@ def test_a_circle_drawn_by_hand_is_where_the_calibration_starts(
     assert with_drawn.x == pytest.approx(detected.x + 2.0, abs=1.0)
 
 
-def test_presses_that_were_not_used_are_measured(
-    held_back_run: tuple[Run, tuple[str, ...]], closed_session: Session
-) -> None:
-    run, names = held_back_run
-    reconstructor = Reconstructor(run.calibration)
-    for name in names:
-        image = closed_session.image(closed_session.folder / "balls" / name)
-        found = reconstructor.depth(image.rgb, uncertainty=True)
-        ball = measure_object(found, shape="ball")
-        wanted = 2.0 * closed_session.ball_radius_mm(name)
-        assert ball.diameter_mm == pytest.approx(wanted, rel=0.08)
-        assert abs(ball.diameter_mm - wanted) < 3.0 * ball.sd["diameter_mm"]
-
-
-def test_normals_and_depth_have_the_signs_and_places_that_are_promised(
-    closed_run: Run, closed_session: Session
-) -> None:
+def test_normals_and_depth_have_the_signs_and_places_that_are_promised(closed_run, closed_session):
     name, x, y, contact, radius = closed_run.calibration.data.balls[0]
     image = closed_session.image(closed_session.folder / "balls" / name)
     found = Reconstructor(closed_run.calibration).depth(image.rgb)
     height, width = image.rgb.shape[:2]
-    assert closed_session.in_place is not None and found.normals is not None
     scale = closed_session.in_place.stated_scale
     assert isinstance(scale, float)
     assert found.x_mm == pytest.approx((np.arange(width) - 0.5 * (width - 1)) * scale)
@@ -92,7 +65,7 @@ def test_normals_and_depth_have_the_signs_and_places_that_are_promised(
     assert np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).mean() < 2.0
 
 
-def test_figures_are_those_of_presses_left_out(closed_run: Run) -> None:
+def test_figures_are_those_of_presses_left_out(closed_run):
     figures = {f.key: f for t in closed_run.calibration.quality.values() for f in t.figures}
     assert figures["held_out_normal_deg"].value < 2.0
     assert figures["held_out_cap_percent"].value < 6.0
@@ -105,19 +78,18 @@ def test_figures_are_those_of_presses_left_out(closed_run: Run) -> None:
     assert gain is not None and 0.0 <= gain < 1.0
 
 
-def test_the_stated_errors_hold_on_presses_that_were_not_used(
-    held_back_run: tuple[Run, tuple[str, ...]],
-    closed_run: Run,
-    closed_session: Session,
-) -> None:
-    run, names = held_back_run
+def test_the_stated_errors_hold_on_presses_that_were_not_used(closed_run, closed_session):
+    session, names = held_back(closed_session, 2)
+    reconstructor = Reconstructor(calibrate(session).calibration)
     places = {ball[0]: ball[1:] for ball in closed_run.calibration.data.balls}
     within = []
     for name in names:
         x, y, contact, radius = places[name]
         image = closed_session.image(closed_session.folder / "balls" / name)
-        found = Reconstructor(run.calibration).depth(image.rgb, uncertainty=True)
-        assert found.normals is not None and found.slope_model_sd is not None
+        found = reconstructor.depth(image.rgb, uncertainty=True)
+        ball, wanted = measure_object(found, shape="ball"), 2.0 * radius
+        assert ball.diameter_mm == pytest.approx(wanted, rel=0.08)
+        assert abs(ball.diameter_mm - wanted) < 3.0 * ball.sd["diameter_mm"]
         across, down = np.meshgrid(found.x_mm - x, found.y_mm - y)
         inside = np.hypot(across, down) < 0.8 * contact
         root = np.sqrt(radius**2 - across[inside] ** 2 - down[inside] ** 2)
@@ -127,7 +99,7 @@ def test_the_stated_errors_hold_on_presses_that_were_not_used(
     assert np.concatenate(within).mean() > 0.9
 
 
-def test_balls_of_other_sizes_are_within_their_deviations(closed_run: Run) -> None:
+def test_balls_of_other_sizes_are_within_their_deviations(closed_run):
     """A ball of 4 mm read 8 to 14 % too large: the smoothing of the image was not undone."""
     sensor = VirtualSensor(SensorDesign().scaled(0.25), 0)
     reconstructor = Reconstructor(closed_run.calibration)
@@ -144,9 +116,7 @@ def test_balls_of_other_sizes_are_within_their_deviations(closed_run: Run) -> No
         assert abs(found.height_mm - depth) < 2.0 * found.sd["height_mm"]
 
 
-def test_the_file_gives_the_same_depth(
-    closed_run: Run, closed_session: Session, tmp_path: Path
-) -> None:
+def test_the_file_gives_the_same_depth(closed_run, closed_session, tmp_path):
     path = tmp_path / "closed.gplcal"
     write_calibration(closed_run.calibration, path)
     again = read_calibration(path)
@@ -163,7 +133,7 @@ def test_the_file_gives_the_same_depth(
         Reconstructor(again, model="full")
 
 
-def test_what_the_balls_have_not_shown_is_flagged(closed_run: Run, closed_session: Session) -> None:
+def test_what_the_balls_have_not_shown_is_flagged(closed_run, closed_session):
     reconstructor = Reconstructor(closed_run.calibration)
     frame = closed_session.averaged("background").rgb.copy()
     quiet = reconstructor.depth(frame)
@@ -177,7 +147,7 @@ def test_what_the_balls_have_not_shown_is_flagged(closed_run: Run, closed_sessio
     assert np.isfinite(strange.depth_mm).all()
 
 
-def test_a_wrong_background_is_refused(closed_folder: Path, tmp_path: Path) -> None:
+def test_a_wrong_background_is_refused(closed_folder, tmp_path):
     folder = tmp_path / "session"
     shutil.copytree(closed_folder, folder)
     for path in (folder / "background").iterdir():
@@ -189,7 +159,7 @@ def test_a_wrong_background_is_refused(closed_folder: Path, tmp_path: Path) -> N
         calibrate(session)
 
 
-def test_a_set_without_any_ball_is_refused(closed_folder: Path, tmp_path: Path) -> None:
+def test_a_set_without_any_ball_is_refused(closed_folder, tmp_path):
     folder = tmp_path / "session"
     shutil.copytree(closed_folder, folder)
     background = cv2.imread(
@@ -205,9 +175,7 @@ def test_a_set_without_any_ball_is_refused(closed_folder: Path, tmp_path: Path) 
         calibrate(session)
 
 
-def test_a_new_background_and_new_presses_refresh_a_calibration(
-    closed_run: Run, closed_session: Session
-) -> None:
+def test_a_new_background_and_new_presses_refresh_a_calibration(closed_run, closed_session):
     old = closed_run.calibration
     background = closed_session.averaged("background")
     brighter = replace(background, rgb=np.clip(background.rgb * np.float32(1.02), 0.0, 1.0))
@@ -233,7 +201,7 @@ def test_a_new_background_and_new_presses_refresh_a_calibration(
     assert error(mended) <= error(alone) + 0.1
 
 
-def test_drift_and_zero_work_without_optics(closed_run: Run, closed_session: Session) -> None:
+def test_drift_and_zero_work_without_optics(closed_run, closed_session):
     frame = closed_session.averaged("background").rgb
     assert background_shift(frame, closed_run.calibration).quality.verdict is Verdict.PASS
     new = zeroed(

@@ -46,7 +46,7 @@ def pressed_ball(
     return depth, (-size * dx / turn).astype(np.float32), (-size * dy / turn).astype(np.float32)
 
 
-def test_slopes_of_a_ball_in_a_dome_are_those_of_two_spheres() -> None:
+def test_slopes_of_a_ball_in_a_dome_are_those_of_two_spheres():
     cap = Surface("spherical_cap", 160.0, 2000.0, axis_mm=(30.0, -20.0))
     dome_radius = (1000.0**2 + 160.0**2) / 320.0
     dome = np.array([30.0, -20.0, 160.0 - dome_radius])
@@ -72,7 +72,7 @@ def test_slopes_of_a_ball_in_a_dome_are_those_of_two_spheres() -> None:
     assert np.abs(on_flat - wanted).max() > 0.02
 
 
-def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit() -> None:
+def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit():
     random = np.random.default_rng(1)
     change = random.normal(0.0, 0.4, (12, 17, 3)).astype(np.float32)
     coefficients = random.normal(0.0, 1.0, (TERMS, 2))
@@ -82,7 +82,7 @@ def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit() -> None:
     assert found.reshape(-1, 2) == pytest.approx(wanted, abs=2e-4)
 
 
-def test_the_light_is_that_of_the_untouched_part_also_with_a_third_pressed() -> None:
+def test_the_light_is_that_of_the_untouched_part_also_with_a_third_pressed():
     random = np.random.default_rng(3)
     y, x = np.mgrid[:240, :320] / 320.0
     background = (0.4 + np.stack([0.1 * x, -0.1 * x, 0.1 * y], axis=-1)).astype(np.float32)
@@ -95,7 +95,7 @@ def test_the_light_is_that_of_the_untouched_part_also_with_a_third_pressed() -> 
     assert 1.0 + common.gain == pytest.approx(light, rel=0.003)
 
 
-def test_normals_are_those_of_the_depth_map() -> None:
+def test_normals_are_those_of_the_depth_map():
     depth, slope_x, slope_y = pressed_ball((60, 70), Ball(34.0, 30.0, 14.0, 30.0), 6.0)
     found = normals_from_slopes(*surface_slopes((0.5 * depth).astype(np.float32), 0.5))
     wanted = np.stack([-slope_x, -slope_y, -np.ones_like(slope_x)], axis=-1)
@@ -106,7 +106,7 @@ def test_normals_are_those_of_the_depth_map() -> None:
     assert np.abs(found - wanted)[smooth].max() < 0.01
 
 
-def test_colours_and_slopes_that_no_ball_has_shown_are_flagged() -> None:
+def test_colours_and_slopes_that_no_ball_has_shown_are_flagged():
     seen = np.zeros((COLOUR_CELLS,) * 3, np.float32)
     plain = tuple(colour_cells(np.zeros(3, np.float32)))
     seen[plain] = 1.0
@@ -129,19 +129,7 @@ def test_colours_and_slopes_that_no_ball_has_shown_are_flagged() -> None:
     assert set(zip(*np.nonzero(found), strict=True)) == {(3, 4), (3, 5), (3, 6), (8, 10)}
 
 
-def test_a_place_is_seen_where_the_grid_says() -> None:
-    grid = WorkingGrid(ImageSize(1280, 960), 0.02)
-    table = grid.table()
-    nodes = np.array([[grid.x_mm[0], grid.y_mm[0]], [grid.x_mm[-1], grid.y_mm[-1]]])
-    seen = [[table.u_px[0, 0], table.v_px[0, 0]], [table.u_px[-1, -1], table.v_px[-1, -1]]]
-    assert grid.to_pixels(nodes) == pytest.approx(np.array(seen), abs=1e-3)
-    middle = grid.on_nodes(Circle(*grid.to_pixels(np.zeros((1, 2)))[0], 40.0))
-    assert np.interp(middle.x, np.arange(320), grid.x_mm) == pytest.approx(0.0, abs=1e-9)
-    assert np.interp(middle.y, np.arange(240), grid.y_mm) == pytest.approx(0.0, abs=1e-9)
-    assert middle.radius * grid.pitch_mm == pytest.approx(40.0 * 0.02)
-
-
-def test_the_next_ball_is_asked_for_where_the_membrane_is_seen() -> None:
+def test_the_next_ball_is_asked_for_where_the_membrane_is_seen():
     grid = WorkingGrid(ImageSize(100, 80), 0.1)
     lit = np.ones((80, 100), np.bool_)
     ball = Ball(20.0, 20.0, 10.0, 30.0)
@@ -153,9 +141,7 @@ def test_the_next_ball_is_asked_for_where_the_membrane_is_seen() -> None:
 
 
 @pytest.mark.parametrize("centre", [(70.0, 60.0), (4.0, 60.0), (70.0, 112.0)])
-def test_depth_is_right_also_where_the_border_cuts_the_contact(
-    centre: tuple[float, float],
-) -> None:
+def test_depth_is_right_also_where_the_border_cuts_the_contact(centre):
     ball = Ball(*centre, 20.0, 50.0)
     depth, slope_x, slope_y = pressed_ball((120, 160), ball, 5.0)
     found, crossed = depth_of(
@@ -165,7 +151,7 @@ def test_depth_is_right_also_where_the_border_cuts_the_contact(
     assert np.abs(found - depth).max() < 0.03 * depth.max()
 
 
-def test_slopes_place_ball_and_contact() -> None:
+def test_slopes_place_ball_and_contact():
     true = Ball(82.3, 55.6, 24.0, 60.0)
     _, slope_x, slope_y = pressed_ball((120, 160), true, 6.0)
     guess = Ball(79.0, 58.0, 20.0, 60.0)
@@ -175,7 +161,7 @@ def test_slopes_place_ball_and_contact() -> None:
     assert contact == pytest.approx(true.contact, abs=0.6)
 
 
-def test_a_flat_punch_gives_the_scale() -> None:
+def test_a_flat_punch_gives_the_scale():
     """Its face changes nothing; the light changes where the membrane slopes around it."""
     background = np.full((240, 320, 3), 0.4, np.float32)
     y, x = np.mgrid[:240, :320]
@@ -194,7 +180,7 @@ def test_a_flat_punch_gives_the_scale() -> None:
 
 
 @pytest.mark.parametrize(("aspect", "turn"), [(1.0, 0.6), (1.03, 0.07), (1.25, 0.3)])
-def test_a_pin_grid_gives_the_scale(aspect: float, turn: float) -> None:
+def test_a_pin_grid_gives_the_scale(aspect, turn):
     spacing_px = 23.7
     background = np.full((240, 320, 3), 0.4, np.float32)
     image, (y, x) = background.copy(), np.mgrid[:240, :320]
@@ -213,7 +199,7 @@ def test_a_pin_grid_gives_the_scale(aspect: float, turn: float) -> None:
         scale_from_pins([background], background, spacing_mm=2.0)
 
 
-def test_a_wide_lens_is_corrected_with_the_pins_it_shows() -> None:
+def test_a_wide_lens_is_corrected_with_the_pins_it_shows():
     """The lens draws its corner 20 % nearer to the middle; the pins reach near the border."""
     lens, spacing_px = (-0.3, 0.1), 30.0
     grid = WorkingGrid(ImageSize(400, 300), 1.0, lens=lens)
@@ -238,8 +224,8 @@ def test_a_wide_lens_is_corrected_with_the_pins_it_shows() -> None:
 @pytest.mark.parametrize(("aspect", "lens"), [(1.0, ()), (1.25, ()), (0.7, ()), (1.0, (-0.2,))])
 @pytest.mark.parametrize("size", [(320, 240), (1280, 960)])
 def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states(
-    size: tuple[int, int], aspect: float, lens: tuple[float, ...]
-) -> None:
+    size, aspect, lens
+):
     width, height = size
     region = (width // 9, height // 5, width // 2, height // 3)
     grid = WorkingGrid(ImageSize(*size), 0.02, aspect, region, lens)
@@ -266,12 +252,12 @@ def test_nodes_are_averages_of_the_region_around_the_pixel_that_the_table_states
 @pytest.mark.parametrize(
     "region", [(300, 10, 21, 100), (0, 200, 100, 41), (10, 10, 31, 100), (-1, 0, 100, 100)]
 )
-def test_a_region_that_cannot_hold_a_press_is_refused(region: tuple[int, int, int, int]) -> None:
+def test_a_region_that_cannot_hold_a_press_is_refused(region):
     with pytest.raises(InputError, match=r"is not inside the image of 320 x 240 pixels or below"):
         WorkingGrid(ImageSize(320, 240), 0.1, region_px=region)
 
 
-def test_a_grid_of_square_pixels_and_the_whole_image_is_named_as_in_earlier_programs() -> None:
+def test_a_grid_of_square_pixels_and_the_whole_image_is_named_as_in_earlier_programs():
     usual = WorkingGrid(ImageSize(320, 240), 0.1)
     assert repr(usual) == "WorkingGrid(image=ImageSize(width=320, height=240), mm_per_px=0.1)"
     others = [

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.preset import FOLDER, preset_named, presets
 
 
-def test_the_sensors_people_own_have_presets() -> None:
+def test_the_sensors_people_own_have_presets():
     assert {p.key for p in presets()} == {"9dtact", "digit", "gelsight-mini"}
 
 
 @pytest.mark.parametrize("key", [preset.key for preset in presets()])
-def test_the_image_shows_about_the_working_area(key: str) -> None:
+def test_the_image_shows_about_the_working_area(key):
     preset = preset_named(key)
     for pixels, mm in zip(preset.image_px, preset.working_area_mm, strict=True):
         assert pixels * preset.mm_per_px == pytest.approx(mm, rel=0.15)
 
 
-def test_a_sensor_whose_lights_show_no_slope_is_named() -> None:
+def test_a_sensor_whose_lights_show_no_slope_is_named():
     assert preset_named("9dtact").limits and not preset_named("digit").limits
 
 
@@ -33,7 +31,7 @@ def test_a_sensor_whose_lights_show_no_slope_is_named() -> None:
         ("light_colours = 3", "light_colours"),
     ],
 )
-def test_a_preset_of_ones_own_is_checked(tmp_path: Path, line: str, output: str) -> None:
+def test_a_preset_of_ones_own_is_checked(tmp_path, line, output):
     own = tmp_path / "own.toml"
     text = (FOLDER / "gelsight-mini.toml").read_text()
     own.write_text(text)

@@ -9,9 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gelpolight_core import Measurement, measure, read_image
 from gelpolight_core.calibration.project import calibrate
-from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import InPlace, Session, read_session
 
@@ -25,7 +23,7 @@ def real_session(shared_data: Path, name: str) -> Session:
     return session
 
 
-def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None:
+def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data):
     session = real_session(shared_data, "mini-1")
     with (session.folder / "labels.csv").open() as stream:
         labels = [row for row in csv.DictReader(stream) if row["x_px"]]
@@ -51,69 +49,13 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None
         inside = np.hypot(across, down) < 0.9 * contact
         root = np.sqrt(radius**2 - across[inside] ** 2 - down[inside] ** 2)
         wanted = np.stack([across[inside], down[inside], -root], axis=-1) / radius
-        assert found.normals is not None
         cosine = np.clip((wanted * found.normals[inside]).sum(axis=-1), -1.0, 1.0)
         errors.append(float(np.degrees(np.arccos(cosine)).mean()))
     # Labels of 1 to 2 px alone cost 1.5 degrees.
     assert np.mean(errors) < 2.8
 
 
-@pytest.mark.parametrize("name", ["mini-1", "wedge-1"])
-def test_diameters_of_presses_left_out_are_within_their_deviations(
-    shared_data: Path, name: str
-) -> None:
-    """The stated deviation was 2.5 times the scatter."""
-    session = real_session(shared_data, name)
-    files = session.files("balls")
-    excluded = frozenset(f"balls/{path.name}" for path in files[::2])
-    training = replace(session, decisions=replace(session.decisions, excluded=excluded))
-    reconstructor = Reconstructor(calibrate(training).calibration)
-    error, sd = [], []
-    for path in files[::2]:
-        try:
-            found = measure(reconstructor.depth(read_image(path), uncertainty=True), shape="ball")
-        except InputError:
-            continue  # cut by the border
-        if found.verdict == "ok":
-            error.append(found.diameter_mm - 2.0 * session.ball_radius_mm(path.name))
-            sd.append(found.sd["diameter_mm"])
-    assert len(error) >= 15
-    assert (np.abs(error) < 3.0 * np.array(sd)).all()
-    assert np.median(sd) < 2.0 * np.sqrt(np.mean(np.square(error)))
-
-
-def test_another_exposure_of_a_gelsight_mini_changes_no_size(shared_data: Path) -> None:
-    """x0.95 read 11.6 for 12.7 mm and ok, x1.05 no object at all."""
-    session = real_session(shared_data, "mini-1")
-    names = ("ball_03.png", "ball_20.png", "ball_40.png")
-    # Every third ball, and none of those that are measured.
-    excluded = {
-        f"balls/{path.name}"
-        for n, path in enumerate(session.files("balls"))
-        if n % 3 or path.name in names
-    }
-    training = replace(session, decisions=replace(session.decisions, excluded=frozenset(excluded)))
-    reconstructor = Reconstructor(calibrate(training).calibration)
-    for name in names:
-        image = read_image(session.folder / "balls" / name)
-
-        def exposed(gain: float, image: np.ndarray = image) -> Measurement:
-            frame = np.clip(np.rint(gain * image.astype(float)), 0, 255).astype(np.uint8)
-            height_map = reconstructor.depth(frame, uncertainty=True)
-            stated = any(note.key == "exposure" for note in height_map.findings)
-            assert stated or gain == 1.0
-            return measure(height_map, shape="ball")
-
-        alone = exposed(1.0)
-        for gain in (0.8, 0.95, 1.05, 1.1):
-            found = exposed(gain)
-            assert found.verdict == alone.verdict
-            assert found.diameter_mm == pytest.approx(
-                alone.diameter_mm, abs=0.2 * alone.sd["diameter_mm"]
-            )
-
-
-def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data: Path) -> None:
+def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data):
     session = real_session(shared_data, "wedge-1")
     some = [path.name for path in session.files("balls")]
     excluded = frozenset(f"balls/{name}" for number, name in enumerate(some) if number % 4)

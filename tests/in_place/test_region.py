@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.calibration.in_place import BALLS
-from gelpolight_core.calibration.project import Run, calibrate
+from gelpolight_core.calibration.project import calibrate
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -63,8 +63,8 @@ def housed_session(
 
 
 def test_a_region_gives_the_depth_of_the_membrane_alone_at_the_places_of_the_whole_image(
-    housed_session: Session, closed_run: Run, closed_session: Session, tmp_path: Path
-) -> None:
+    housed_session, closed_run, closed_session, tmp_path
+):
     run = calibrate(housed_session)
     path = tmp_path / "housed.gplcal"
     write_calibration(run.calibration, path)
@@ -87,7 +87,7 @@ def test_a_region_gives_the_depth_of_the_membrane_alone_at_the_places_of_the_who
     assert calibration.data.to_pixels(place)[0] == pytest.approx((ball.x + LEFT, ball.y + TOP))
 
 
-def test_a_region_beyond_the_image_is_refused(housed_session: Session) -> None:
+def test_a_region_beyond_the_image_is_refused(housed_session):
     assert housed_session.in_place is not None
     beyond = replace(housed_session.in_place, region_px=(LEFT, TOP, 10_000, 60))
     with pytest.raises(InputError, match="is not inside the image"):
@@ -109,9 +109,7 @@ def squeezed_session(
     return changed(closed_folder, tmp_path_factory.mktemp("tall") / "session", squeeze, stated)
 
 
-def test_pixels_that_are_not_square_give_a_metric_map(
-    squeezed_session: Session, closed_run: Run, tmp_path: Path
-) -> None:
+def test_pixels_that_are_not_square_give_a_metric_map(squeezed_session, closed_run, tmp_path):
     run = calibrate(squeezed_session)
     path = tmp_path / "tall.gplcal"
     write_calibration(run.calibration, path)
@@ -129,8 +127,8 @@ def test_pixels_that_are_not_square_give_a_metric_map(
 
 
 def test_contacts_that_are_all_oval_alike_say_what_pixels_to_state(
-    squeezed_session: Session, closed_run: Run, closed_session: Session
-) -> None:
+    squeezed_session, closed_run, closed_session
+):
     assert squeezed_session.in_place is not None
     scale = scale_of(closed_session)
     nearly = replace(squeezed_session.in_place, mm_per_px=(scale, 1.15 * scale))
@@ -147,8 +145,8 @@ def test_contacts_that_are_all_oval_alike_say_what_pixels_to_state(
 
 @pytest.mark.parametrize("share", [0.0, 0.05])
 def test_a_channel_without_light_in_all_images_is_named(
-    closed_folder: Path, closed_session: Session, tmp_path: Path, share: float
-) -> None:
+    closed_folder, closed_session, tmp_path, share
+):
     random = np.random.default_rng(1)
 
     def without_blue(image: Image) -> Image:

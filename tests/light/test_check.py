@@ -70,18 +70,16 @@ def light(*shares: float) -> Change:
     return lambda frame: frame * np.array(shares, np.float32)
 
 
-def test_no_fault_is_found_in_good_images_with_and_without_presses(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
-) -> None:
+def test_no_fault_is_found_in_good_images_with_and_without_presses(known, frames, check):
     for name, frame in frames.items():
-        for seed in range(4):
+        for seed in range(2):
             found = check.check(known.noisy(frame, seed=seed), whole=seed % 2 == 0)
             assert not found.findings, (name, seed)
             assert found.light is None, (name, seed)
         assert found.untouched > 0.4, name
 
 
-def test_a_shallow_wide_face_in_much_noise_is_no_change_of_light() -> None:
+def test_a_shallow_wide_face_in_much_noise_is_no_change_of_light():
     usual = SensorDesign().scaled(0.25)
     camera = usual.camera
     noisy = replace(camera, shot_variance=16.0 * camera.shot_variance, read_sd=4.0 * camera.read_sd)
@@ -110,22 +108,15 @@ AT_TEN_UM: list[tuple[str, Change]] = [
 @pytest.mark.parametrize("press", ["bare", "ball", "cylinder"])
 @pytest.mark.parametrize(("key", "change"), AT_TEN_UM, ids=lambda v: v if type(v) is str else "")
 def test_each_fault_is_found_where_it_costs_ten_micrometres(
-    known: KnownSensor,
-    frames: dict[str, Map],
-    check: HealthCheck,
-    key: str,
-    change: Change,
-    press: str,
-) -> None:
+    known, frames, check, key, change, press
+):
     found = check.check(known.noisy(change(frames[press])))
     assert found.keys == (key,)
     assert found.meaningless is None
     assert found.findings[0].remedy
 
 
-def test_the_rounding_of_an_image_of_half_the_size_is_no_room_light(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
-) -> None:
+def test_the_rounding_of_an_image_of_half_the_size_is_no_room_light(known, frames, check):
     """Means of four whole numbers, rounded again, are an eighth of a step too large."""
     for name in ("bare", "cylinder"):
         assert not check.check(known.noisy(frames[name] + np.float32(0.125 / 255.0))).faults
@@ -153,17 +144,12 @@ MEANINGLESS: list[tuple[str, Change]] = [
 
 
 @pytest.mark.parametrize(("key", "change"), MEANINGLESS, ids=lambda v: v if type(v) is str else "")
-def test_a_fault_that_makes_depth_meaningless_says_so(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck, key: str, change: Change
-) -> None:
+def test_a_fault_that_makes_depth_meaningless_says_so(known, frames, check, key, change):
     fault = check.check(known.noisy(change(frames["cylinder"]))).meaningless
-    assert fault is not None
     assert fault.key == key
 
 
-def test_the_named_size_of_a_fault_is_its_size(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
-) -> None:
+def test_the_named_size_of_a_fault_is_its_size(known, frames, check):
     def value(change: Change, key: str, whole: bool = False) -> float:
         found = check.check(known.noisy(change(frames["cylinder"])), whole=whole)
         return next(finding.value for finding in found.findings if finding.key == key)
@@ -182,20 +168,15 @@ def test_the_named_size_of_a_fault_is_its_size(
         assert shifted == pytest.approx(pixels, rel=0.15)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("press", [Ball(4.0, 0.0), Cylinder(8.0, 1.0)])
-def test_an_image_of_another_sensor_of_the_same_design_is_recognised(
-    check: HealthCheck, seed: int, press: Indenter
-) -> None:
-    other = known_sensor(SensorDesign().scaled(0.5), seed=seed)
+def test_an_image_of_another_sensor_of_the_same_design_is_recognised(check, press):
+    other = known_sensor(SensorDesign().scaled(0.5), seed=1)
     image = other.noisy(other.pressed(press, x_mm=3.0, samples=1).frame)
     for whole in (False, True):
         assert check.check(image, whole=whole).keys == ("other_sensor",)
 
 
-def test_dirt_is_distinguished_from_a_press(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
-) -> None:
+def test_dirt_is_distinguished_from_a_press(known, frames, check):
     frame = frames["ball"]
     rows, columns = np.indices(frame.shape[:2])
     away = np.hypot(rows - 150, columns - 420) / 12.0
@@ -204,9 +185,7 @@ def test_dirt_is_distinguished_from_a_press(
     assert check.check(known.noisy(dirty)).keys == ("dirt",)
 
 
-def test_dead_lines_are_found(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
-) -> None:
+def test_dead_lines_are_found(known, frames, check):
     image = known.noisy(frames["cylinder"])
     column, row = image.copy(), image.copy()
     column[:, 350] = 0
@@ -217,11 +196,9 @@ def test_dead_lines_are_found(
     assert any("bad_line" in check.check(row).keys for _ in range(row.shape[0]))
 
 
-@pytest.mark.parametrize("share", [5e-4, 0.002, 0.003, 0.01, 0.03, 0.1])
+@pytest.mark.parametrize("share", [5e-4, 0.003, 0.1])
 @pytest.mark.parametrize("whole", [True, False])
-def test_hot_pixels_are_found_and_the_more_there_are_the_worse(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck, share: float, whole: bool
-) -> None:
+def test_hot_pixels_are_found_and_the_more_there_are_the_worse(known, frames, check, share, whole):
     """From 0.3 % on they hid the light of most cells, and nothing was judged."""
     image = known.noisy(frames["cylinder"])
     image[np.random.default_rng(0).random(image.shape[:2]) < share] = 255
@@ -231,25 +208,23 @@ def test_hot_pixels_are_found_and_the_more_there_are_the_worse(
     assert found.meaningless is (found.verdict is Verdict.FAIL) is (share > 0.05)
 
 
-@pytest.mark.parametrize("effort", ["best", "fast"])
-@pytest.mark.parametrize(("share", "value"), [(0.001, 255), (0.01, 255), (0.01, 0), (0.04, 255)])
-def test_hot_and_dead_pixels_are_left_out_of_the_depth(
-    known: KnownSensor, frames: dict[str, Map], effort: str, share: float, value: int
-) -> None:
+@pytest.mark.parametrize(
+    ("effort", "share", "value"), [("best", 0.01, 255), ("fast", 0.01, 0), ("fast", 0.04, 255)]
+)
+def test_hot_and_dead_pixels_are_left_out_of_the_depth(known, frames, effort, share, value):
     """One of a hundred made a press of 1 mm 80 um deeper."""
     sensor = Reconstructor(known.calibration, effort=effort)
     image = known.noisy(frames["cylinder"])
     clean = sensor.depth(image, normals=False)
     image[np.random.default_rng(2).random(image.shape[:2]) < share] = value
     found = sensor.depth(image, normals=False)
-    assert found.health is not None
     assert found.health.keys == ("bad_pixels",)
     assert found.doubts
     pressed = clean.depth_mm > 0.9 * clean.depth_mm.max()
     assert abs(float((found.depth_mm - clean.depth_mm)[pressed].mean())) < 0.004
 
 
-def test_saturation_in_a_small_part_of_a_contact_is_no_fault_but_overexposure_is() -> None:
+def test_saturation_in_a_small_part_of_a_contact_is_no_fault_but_overexposure_is():
     bright = SensorDesign().scaled(0.5)
     photometry = replace(bright.photometry, whiteboard_peak=1.5)
     known = known_sensor(replace(bright, photometry=photometry))
@@ -260,23 +235,7 @@ def test_saturation_in_a_small_part_of_a_contact_is_no_fault_but_overexposure_is
     assert "saturated" in check.check(known.noisy(1.5 * frame)).keys
 
 
-def test_hot_pixels_in_groups_are_found(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck
-) -> None:
-    """Nothing was said of them: none differs from all its neighbours."""
-    image = known.noisy(frames["cylinder"])
-    hot = np.random.default_rng(0).random(image.shape[:2]) < 0.003
-    hot |= np.roll(hot, 1, 0)
-    hot |= np.roll(hot, 1, 1)
-    image[hot] = 255
-    found = check.check(image)
-    assert found.keys == ("bad_pixels",)
-    assert found.bad is not None
-    assert found.bad.mask[hot].mean() > 0.85
-    assert found.bad.mask[~hot].mean() < 1e-3
-
-
-def test_what_no_texture_shows_is_unknown_and_not_guessed() -> None:
+def test_what_no_texture_shows_is_unknown_and_not_guessed():
     known = known_sensor(matt_design(0.25))
     check = _check_of(known.calibration)
     press = known.pressed(Ball(4.0, 1.0), samples=1).frame
@@ -285,17 +244,13 @@ def test_what_no_texture_shows_is_unknown_and_not_guessed() -> None:
     assert not found.findings
 
 
-def test_a_contact_on_nearly_all_of_the_field_is_not_taken_for_another_sensor(
-    known: KnownSensor, check: HealthCheck
-) -> None:
+def test_a_contact_on_nearly_all_of_the_field_is_not_taken_for_another_sensor(known, check):
     wide = known.pressed(Cylinder(16.0, 0.5), samples=1).frame
     found = check.check(known.noisy(wide))
     assert not found.findings
 
 
-def test_kinds_of_numbers_and_a_camera_that_is_not_linear_give_the_same_findings(
-    known: KnownSensor, frames: dict[str, Map]
-) -> None:
+def test_kinds_of_numbers_and_a_camera_that_is_not_linear_give_the_same_findings(known, frames):
     bent_design = SensorDesign().scaled(0.5)
     bent_design = replace(
         bent_design, camera=replace(bent_design.camera, response="gamma", gamma=2.2)
@@ -317,15 +272,6 @@ def test_kinds_of_numbers_and_a_camera_that_is_not_linear_give_the_same_findings
     assert check.check(np.full_like(frames["bare"], np.nan)).meaningless is not None
 
 
-def test_the_paper_models_calibration_is_checked_too(known: KnownSensor) -> None:
-    matt = known_sensor(matt_design(0.25))
-    paper = replace(matt.calibration, model="paper").changed(full=None)
-    check = _check_of(paper)
-    press = matt.pressed(Ball(4.0, 1.0), samples=1).frame
-    assert not check.check(matt.noisy(press)).findings
-    assert check.check(matt.noisy(press * np.float32(0.98))).keys == ("exposure",)
-
-
 def fall_off(share: float, shape: tuple[int, ...]) -> Map:
     """Return the light of a lens that is darker by a share at the left and right edge."""
     down, across = np.mgrid[: shape[0], : shape[1]]
@@ -334,17 +280,13 @@ def fall_off(share: float, shape: tuple[int, ...]) -> Map:
     return np.asarray(1.0 - share * square, np.float32)[..., None]
 
 
-@pytest.mark.parametrize("share", [0.02, 0.05])
-@pytest.mark.parametrize("name", ["cylinder", "ball", "cuboid"])
-def test_light_that_falls_off_towards_the_edge_is_corrected(
-    known: KnownSensor, frames: dict[str, Map], name: str, share: float
-) -> None:
+@pytest.mark.parametrize(("name", "share"), [("cylinder", 0.05), ("ball", 0.02)])
+def test_light_that_falls_off_towards_the_edge_is_corrected(known, frames, name, share):
     sensor = Reconstructor(known.calibration)
     frame = frames[name]
     usual = sensor.depth(frame, normals=False).depth_mm
     darker = frame * fall_off(share, frame.shape)
     found = sensor.depth(darker, normals=False)
-    assert found.health is not None
     assert found.health.light is not None
     assert "uneven" in found.health.keys
     assert not found.doubts
@@ -357,29 +299,24 @@ def test_light_that_falls_off_towards_the_edge_is_corrected(
 
 
 def test_a_shaded_corner_is_corrected_and_a_strong_shade_is_refused(
-    known: KnownSensor, frames: dict[str, Map], check: HealthCheck, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    known, frames, check, monkeypatch
+):
     frame = frames["ball"]
     ramp = np.linspace(0.0, 1.0, frame.shape[1], dtype=np.float32)[None, :, None]
     tilted = check.check(known.noisy(frame * (1.0 - 0.03 * ramp)))
     assert "uneven" in tilted.keys
     assert tilted.meaningless is None
-    assert tilted.light is not None
-    assert tilted.light.shape is not None
     # Darker to the right: the share falls along x.
     assert tilted.light.shape[1] == pytest.approx(-0.015, abs=0.003)
     assert abs(tilted.light.shape[2]) < 0.002
     monkeypatch.setattr("gelpolight_core.light.judging.FAR", 5.0)
     strong = check.check(known.noisy(frame * (1.01 - 0.04 * ramp)))
-    assert strong.meaningless is not None
     assert strong.meaningless.key == "uneven"
     assert strong.light is None
 
 
 @pytest.mark.parametrize(("leds", "keys"), [((0.9, 0.0, 0.0), ()), ((0.9, 0.5, 0.4), ("dirt",))])
-def test_crosstalk_of_one_led_is_no_dirt(
-    check: HealthCheck, leds: tuple[float, ...], keys: tuple[str, ...]
-) -> None:
+def test_crosstalk_of_one_led_is_no_dirt(check, leds, keys):
     """Where one LED lights all channels, a slope makes them alike darker."""
     crosstalk = np.full((3, 3), 0.03) + 0.97 * np.eye(3)
     seen = crosstalk @ np.array(leds)
@@ -392,9 +329,7 @@ def test_crosstalk_of_one_led_is_no_dirt(
 
 
 @pytest.mark.parametrize(("shift_px", "text"), [(1.2, "by 1.2 px"), (2.0, "by 2.0 px or more")])
-def test_a_movement_beyond_the_reach_of_the_fit_is_a_lower_bound(
-    shift_px: float, text: str
-) -> None:
+def test_a_movement_beyond_the_reach_of_the_fit_is_a_lower_bound(shift_px, text):
     values, sd = np.zeros(16), np.full(16, 1e-3)
     values[SHIFT_U] = shift_px
     found = moved_finding(SimpleNamespace(values=values, sd=sd, share=1.0), None)

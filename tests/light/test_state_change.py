@@ -23,7 +23,7 @@ def check(known: KnownSensor) -> HealthCheck:
     return HealthCheck(data, usual_of_open(), crosstalk=data.crosstalk)
 
 
-def test_each_quantity_is_what_was_changed(known: KnownSensor, check: HealthCheck) -> None:
+def test_each_quantity_is_what_was_changed(known, check):
     bare = known.bare()
     moved = cv2.warpAffine(bare, np.float32([[1, 0, 0.3], [0, 1, -0.2]]), bare.shape[1::-1])
     cases = {
@@ -41,7 +41,7 @@ def test_each_quantity_is_what_was_changed(known: KnownSensor, check: HealthChec
                 assert abs(change.values[k] - expected) < allowed[k], (name, k, change.values)
 
 
-def test_its_deviation_is_that_of_repeated_frames(known: KnownSensor, check: HealthCheck) -> None:
+def test_its_deviation_is_that_of_repeated_frames(known, check):
     changes = [check.check(known.noisy(known.bare(), seed=seed)).change for seed in range(12)]
     seen = np.array([change.values for change in changes if change is not None])
     stated = np.mean([change.sd for change in changes if change is not None], axis=0)

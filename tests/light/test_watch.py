@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ DIM = Finding("exposure", "darker", remedy="Restore it", verdict=WARN, heights=D
 OFF = Finding("led_off", "the LED is off", remedy="Check it", verdict=FAIL, heights=WRONG)
 
 
-def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is() -> None:
+def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is():
     watch = HealthWatch()
     assert not watch.update(Health((DIM,)), 0.0).findings
     for time_s in (0.2, 0.4):
@@ -29,7 +31,7 @@ def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is() -> None:
     assert watch.update(Health(), 9.0).keys == ()
 
 
-def test_the_worst_comes_first_and_makes_the_line() -> None:
+def test_the_worst_comes_first_and_makes_the_line():
     health = health_of([DIM, OFF])
     assert health.keys == ("led_off", "exposure")
     assert health.line == "The LED is off. Check it."
@@ -38,69 +40,51 @@ def test_the_worst_comes_first_and_makes_the_line() -> None:
     refuse_meaningless(health_of([DIM]), where="press.png")
 
 
-def follow(left: list[float], every_s: float = 0.1) -> list[tuple[str, ...]]:
-    """Return what is shown of a press that leaves a share of itself, frame by frame."""
+def follow(left: list[float], every_s: float = 0.1) -> tuple[HealthWatch, list[Any], list[bool]]:
+    """Watch a press that leaves a share of itself; also what is shown and whether it is free."""
     rng = np.random.default_rng(1)
-    press = np.zeros((300, 3))
+    press, watch, shown, free = np.zeros((300, 3)), HealthWatch(), [], []
     press[100:140] = rng.uniform(-0.3, 0.3, (40, 3))
-    watch = HealthWatch()
-    return [
-        watch.update(Health(cells=share * press + rng.normal(0.0, 2e-3, press.shape)), time_s).keys
-        for time_s, share in zip(every_s * np.arange(len(left)), left, strict=True)
-    ]
+    for n, share in enumerate(left):
+        cells = share * press + rng.normal(0.0, 2e-3, press.shape)
+        shown.append(watch.update(Health(cells=cells), every_s * n).keys)
+        free.append(watch.is_free)
+    return watch, shown, free
 
 
-def test_a_gel_that_has_not_recovered_is_reported_until_it_has() -> None:
+def test_a_gel_that_has_not_recovered_is_reported_until_it_has():
     slow = [1.0] * 10 + [0.08 * 0.5 ** (n / 15) for n in range(90)]
-    shown = follow(slow)
+    _, shown, _ = follow(slow)
     assert ("not_recovered",) in shown[25:40]
     assert shown[-1] == ()
     assert not any(shown[:10])
 
 
-def test_two_slow_frames_say_nothing_of_a_recovery() -> None:
-    assert not any(follow([1.0, 0.08, 0.05], every_s=1.5))
+def test_two_slow_frames_say_nothing_of_a_recovery():
+    assert not any(follow([1.0, 0.08, 0.05], every_s=1.5)[1])
 
 
 @pytest.mark.parametrize("after", [0.0, 0.08])
-def test_a_gel_that_has_recovered_and_a_lighter_press_are_not(after: float) -> None:
-    assert not any(follow([1.0] * 10 + [after] * 60))
+def test_a_gel_that_has_recovered_and_a_lighter_press_are_not(after):
+    assert not any(follow([1.0] * 10 + [after] * 60)[1])
 
 
-def watched(left: list[float]) -> HealthWatch:
-    """Return a watch that has seen shares of one press, ten frames a second."""
-    press = np.zeros((300, 3))
-    press[100:140] = np.random.default_rng(1).uniform(-0.3, 0.3, (40, 3))
-    watch = HealthWatch()
-    for n, share in enumerate(left):
-        watch.update(Health(cells=share * press), 0.1 * n)
-    return watch
-
-
-def test_presses_are_counted() -> None:
+def test_presses_are_counted():
     rest, pressed = [0.0] * 10, [1.0] * 10
     slow = [0.1 * 0.5**n for n in range(30)]  # below 1 % in the fifth frame after the press
-    assert watched([*rest, *pressed]).presses == 1
-    assert watched([*rest, *pressed, *slow]).presses == 1
-    assert watched([*rest, *pressed, *slow, *pressed, *rest]).presses == 2
-    assert watched([*rest, *pressed, *[0.05] * 600]).presses == 1
+    assert follow([*rest, *pressed])[0].presses == 1
+    assert follow([*rest, *pressed, *slow])[0].presses == 1
+    assert follow([*rest, *pressed, *slow, *pressed, *rest])[0].presses == 2
+    assert follow([*rest, *pressed, *[0.05] * 600])[0].presses == 1
 
 
-def test_a_flicker_and_a_press_that_was_there_before_are_not_counted() -> None:
+def test_a_flicker_and_a_press_that_was_there_before_are_not_counted():
     pressed = [1.0] * 10
-    assert watched(pressed).presses == 0
-    assert watched([0.0, *pressed, 0.2, *pressed]).presses == 1
+    assert follow(pressed)[0].presses == 0
+    assert follow([0.0, *pressed, 0.2, *pressed])[0].presses == 1
 
 
-def test_the_membrane_is_free_only_when_nothing_is_pressed_or_left_of_a_press() -> None:
-    rng = np.random.default_rng(1)
-    press = np.zeros((300, 3))
-    press[100:140] = rng.uniform(-0.3, 0.3, (40, 3))
-    watch, free = HealthWatch(), []
-    shares = [0.0] * 30 + [1.0] * 20 + [0.08 * 0.5 ** (n / 15) for n in range(120)]
-    for n, share in enumerate(shares):
-        cells = share * press + rng.normal(0.0, 2e-3, press.shape)
-        watch.update(Health(cells=cells), 0.1 * n)
-        free.append(watch.is_free)
+def test_the_membrane_is_free_only_when_nothing_is_pressed_or_left_of_a_press():
+    _, _, free = follow([0.0] * 30 + [1.0] * 20 + [0.08 * 0.5 ** (n / 15) for n in range(120)])
     assert free[29] and free[-1]
     assert not any(free[30:52])

@@ -53,9 +53,7 @@ def single_led(
     st.floats(0.3, 1.3),
     st.integers(0, 2**16),
 )
-def test_the_mixture_is_found_whatever_the_dark_level_and_exposure(
-    leaks: list[float], offset: float, peak: float, seed: int
-) -> None:
+def test_the_mixture_is_found_whatever_the_dark_level_and_exposure(leaks, offset, peak, seed):
     """Within half a percent: two grey levels of the brightest pixels."""
     matrix = np.eye(3)
     matrix[~np.eye(3, dtype=bool)] = leaks
@@ -66,12 +64,12 @@ def test_the_mixture_is_found_whatever_the_dark_level_and_exposure(
     assert np.abs(found.matrix - matrix).max() < 0.005
 
 
-def test_a_camera_without_crosstalk_has_none() -> None:
+def test_a_camera_without_crosstalk_has_none():
     found = find_crosstalk(spots(np.eye(3)), single_led(np.eye(3)))
     assert np.abs(found.matrix - np.eye(3)).max() < 0.002
 
 
-def test_crosstalk_that_no_spot_shows_is_a_warning_and_not_zero() -> None:
+def test_crosstalk_that_no_spot_shows_is_a_warning_and_not_zero():
     hidden = TRUTH.copy()
     hidden[:, 1:] = np.nan
     figures = find_crosstalk(spots(hidden)).quality
@@ -111,8 +109,6 @@ def times(factor: float) -> Callable[[list[LinearImage]], list[LinearImage]]:
         (times(60.0), "saturated"),
     ],
 )
-def test_images_of_something_else_are_refused(
-    change: Callable[[list[LinearImage]], list[LinearImage]], what: str
-) -> None:
+def test_images_of_something_else_are_refused(change, what):
     with pytest.raises(InputError, match=what):
         find_crosstalk(spots(TRUTH), change(single_led(TRUTH)))

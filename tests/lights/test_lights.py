@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.session.session import read_session
 
+MATRIX = np.array([[1.0, 0.05, 0.02], [0.04, 1.0, 0.05], [0.03, 0.06, 1.0]])
 CENTRES = np.array([[320.4, 401.7], [180.2, 160.9], [470.6, 150.3]])
 
 
@@ -45,22 +45,21 @@ def add_spot(rgb: np.ndarray, centre: tuple[float, float], colour: tuple[float, 
     return np.clip(rgb + disc[..., None] * np.array(colour), 0, 1).astype(np.float32)
 
 
-def test_each_spot_is_found_in_its_own_colour_to_a_twentieth_of_a_pixel() -> None:
+def test_each_spot_is_found_in_its_own_colour_to_a_twentieth_of_a_pixel():
     spots = find_mirror_spots(LinearImage("mirror.png", mirror_image()))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.05)
 
 
-def test_crosstalk_moves_no_spot_and_is_measured() -> None:
-    matrix = np.array([[1.0, 0.05, 0.02], [0.04, 1.0, 0.05], [0.03, 0.06, 1.0]])
-    spots = find_mirror_spots(LinearImage("m", mirror_image(crosstalk=matrix, noise=0.0)))
+def test_crosstalk_moves_no_spot_and_is_measured():
+    spots = find_mirror_spots(LinearImage("m", mirror_image(crosstalk=MATRIX, noise=0.0)))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.05)
     found, _ = crosstalk_from_spots(spots)
-    np.testing.assert_allclose(found, matrix, atol=0.005)
+    np.testing.assert_allclose(found, MATRIX, atol=0.005)
     light = np.array([[0.3, 0.5, 0.2]], np.float32)
-    np.testing.assert_allclose(unmix((light @ matrix.T).astype(np.float32), matrix), light, 1e-5)
+    np.testing.assert_allclose(unmix((light @ MATRIX.T).astype(np.float32), MATRIX), light, 1e-5)
 
 
-def test_a_faint_reflection_of_a_reflection_is_set_aside_with_its_reason() -> None:
+def test_a_faint_reflection_of_a_reflection_is_set_aside_with_its_reason():
     rgb = add_spot(mirror_image(), (100.0, 300.0), (0.2, 0.0, 0.0))
     spots = find_mirror_spots(LinearImage("m", rgb))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.05)
@@ -79,21 +78,25 @@ def test_a_faint_reflection_of_a_reflection_is_set_aside_with_its_reason() -> No
         (mirror_image(np.array([[320.0, 400.0], [180.0, 160.0], [638.0, 150.0]])), "border"),
     ],
 )
-def test_an_unusable_mirror_image_is_refused_with_the_reason(rgb: np.ndarray, what: str) -> None:
+def test_an_unusable_mirror_image_is_refused_with_the_reason(rgb, what):
     with pytest.raises(InputError, match=what) as refusal:
         find_mirror_spots(LinearImage("mirror_0.png", rgb))
     assert refusal.value.where == "mirror/mirror_0.png"
     assert refusal.value.advice
 
 
-def test_saturated_spots_are_found_and_warned_of() -> None:
+def test_saturated_spots_are_found_and_warned_of():
     spots = find_mirror_spots(LinearImage("m", mirror_image(peak=3.0)))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.1)
     assert spots.quality["spot_peak"].verdict == "warn"
     np.testing.assert_allclose(crosstalk_from_spots(spots)[0], np.eye(3), atol=0.01)
+    # Crosstalk is read off their flanks.
+    mixed = mirror_image(peak=1.6, crosstalk=MATRIX, noise=0.0)
+    found = crosstalk_from_spots(find_mirror_spots(LinearImage("m", mixed)))[0]
+    np.testing.assert_allclose(found, MATRIX, atol=0.02)
 
 
-def test_leds_are_found_from_the_images_of_their_mirror_twins() -> None:
+def test_leds_are_found_from_the_images_of_their_mirror_twins():
     """The mirror image of each LED is projected directly; the reflection is never computed here."""
     camera = Camera(640, 480, 690.0, 690.0, 320.0, 240.0)
     normal = np.array([0.02, -0.015, 1.0]) / np.linalg.norm([0.02, -0.015, 1.0])
@@ -108,7 +111,7 @@ def test_leds_are_found_from_the_images_of_their_mirror_twins() -> None:
 
 
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
-def test_the_rendered_mirror_is_read_to_a_tenth_of_a_pixel(shared_data: Path, sensor: str) -> None:
+def test_the_rendered_mirror_is_read_to_a_tenth_of_a_pixel(shared_data, sensor):
     truth = json.loads((shared_data / sensor / "truth.json").read_text())
     c = truth["camera"]
     camera = Camera(1280, 960, c["fx"], c["fy"], c["cx"], c["cy"], (*c["k1_k2_p1_p2"], 0.0))
@@ -127,15 +130,8 @@ def test_the_rendered_mirror_is_read_to_a_tenth_of_a_pixel(shared_data: Path, se
     np.testing.assert_allclose(crosstalk_from_spots(spots)[0], truth_matrix, atol=0.005)
 
 
-def test_crosstalk_is_read_off_the_flanks_of_saturated_spots() -> None:
-    matrix = np.array([[1.0, 0.05, 0.02], [0.04, 1.0, 0.05], [0.03, 0.06, 1.0]])
-    spots = find_mirror_spots(LinearImage("m", mirror_image(peak=1.6, crosstalk=matrix, noise=0.0)))
-    assert spots.quality["spot_peak"].verdict == "warn"
-    np.testing.assert_allclose(crosstalk_from_spots(spots)[0], matrix, atol=0.02)
-
-
 @pytest.mark.parametrize("where", ["darkness", "another spot"])
-def test_a_spot_dragged_where_its_led_does_not_shine_fails(where: str) -> None:
+def test_a_spot_dragged_where_its_led_does_not_shine_fails(where):
     image = LinearImage("m", mirror_image())
     found = find_mirror_spots(image)
     assert found.quality["spot_light"].verdict is Verdict.PASS

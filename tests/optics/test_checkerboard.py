@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -38,9 +36,7 @@ def tilted_board() -> LinearImage:
     roll_deg=st.floats(-180.0, 180.0),
     distance_mm=st.floats(45.0, 60.0),
 )
-def test_corners_are_found_in_any_pose(
-    tilt_deg: float, towards_deg: float, roll_deg: float, distance_mm: float
-) -> None:
+def test_corners_are_found_in_any_pose(tilt_deg, towards_deg, roll_deg, distance_mm):
     """The technician may hold the board in any pose: tilted, rotated, near or far."""
     pose = board_pose(
         tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=distance_mm
@@ -53,7 +49,7 @@ def test_corners_are_found_in_any_pose(
     assert view.tilt_deg == pytest.approx(tilt_deg, abs=12.0)
 
 
-def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: LinearImage) -> None:
+def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board):
     """An overlay draws the grid along its rows; no row may be swapped or mirrored."""
     view = find_board(tilted_board, BOARD)
     grid = view.corners_px.reshape(6, 9, 2)
@@ -65,9 +61,7 @@ def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: Lin
 
 
 @pytest.mark.parametrize("stated", [(8, 5), (7, 7), (9, 7), (10, 7), (5, 4), (12, 9)])
-def test_another_board_size_is_refused_and_the_real_one_named(
-    tilted_board: LinearImage, stated: tuple[int, int]
-) -> None:
+def test_another_board_size_is_refused_and_the_real_one_named(tilted_board, stated):
     """A board of another size would give a wrong camera; the message names the mistake."""
     with pytest.raises(InputError, match=r"9 x 6 inner corners, not") as refusal:
         find_board(tilted_board, BoardSpec(stated, 3.0))
@@ -75,7 +69,7 @@ def test_another_board_size_is_refused_and_the_real_one_named(
     assert refusal.value.advice == Remedy.BOARD_SIZE
 
 
-def test_uneven_light_does_not_move_the_corners(tilted_board: LinearImage) -> None:
+def test_uneven_light_does_not_move_the_corners(tilted_board):
     """A lamp at one side is not an error of the lens."""
     straight = find_board(tilted_board, BOARD).corners_px
     falloff = np.linspace(0.25, 1.2, 480, dtype=np.float32)[None, :, None]
@@ -98,14 +92,14 @@ def flat(value: float) -> LinearImage:
         (flat(float("nan")), "no valid value"),
     ],
 )
-def test_an_empty_image_is_refused_with_the_reason(image: LinearImage, says: str) -> None:
+def test_an_empty_image_is_refused_with_the_reason(image, says):
     """The advice depends on the kind of exposure error."""
     with pytest.raises(InputError, match=says):
         find_board(image, BOARD)
 
 
 @pytest.mark.parametrize("blur_px", [2.5, 5.0, 12.0])
-def test_a_blurred_board_is_refused_as_blurred(tilted_board: LinearImage, blur_px: float) -> None:
+def test_a_blurred_board_is_refused_as_blurred(tilted_board, blur_px):
     """A defocused or moved image is reported as blurred, not as a missing board."""
     blurred = np.asarray(cv2.GaussianBlur(tilted_board.rgb, (0, 0), blur_px))
     with pytest.raises(InputError, match="blurred: edges are"):
@@ -115,14 +109,14 @@ def test_a_blurred_board_is_refused_as_blurred(tilted_board: LinearImage, blur_p
 @pytest.mark.parametrize(
     ("corners", "square_mm"), [((2, 6), 3.0), ((9, 6), 0.0), ((9, 6), float("nan"))]
 )
-def test_an_impossible_board_is_refused(corners: tuple[int, int], square_mm: float) -> None:
+def test_an_impossible_board_is_refused(corners, square_mm):
     """A typing error in the session is found before any image is read."""
     with pytest.raises(InputError):
         BoardSpec(corners, square_mm)
 
 
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
-def test_wrong_sizes_never_pass_on_rendered_sessions(shared_data: Path, sensor: str) -> None:
+def test_wrong_sizes_never_pass_on_rendered_sessions(shared_data, sensor):
     """The board of the independent renderer is found, and only with its own size."""
     path = shared_data / sensor / "top_pose" / "top_pose.png"
     rgb = cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)

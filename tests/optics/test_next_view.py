@@ -27,7 +27,7 @@ def held(quad: np.ndarray) -> BoardView:
     return BoardView("", BOARD, SIZE, corners, 0, 0, 0, 0, 40.0, 2.0, 0.5, 0.0, box, tilt_deg)
 
 
-def test_twelve_suggested_views_are_whole_tilted_and_cover_the_image() -> None:
+def test_twelve_suggested_views_are_whole_tilted_and_cover_the_image():
     views: list[BoardView] = []
     for _ in range(12):
         quad = next_view(BOARD, SIZE, views)

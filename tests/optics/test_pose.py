@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.calibration.open_sensor import TOP_POSE
-from gelpolight_core.calibration.recipe import Results
 from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.image.linear import LinearImage
@@ -68,9 +65,7 @@ def angle_deg(plane: TopPlane, other: TopPlane) -> float:
     roll_deg=st.floats(-180.0, 180.0),
     distance_mm=st.floats(32.0, 55.0),
 )
-def test_the_surface_is_found_however_it_is_mounted(
-    tilt_deg: float, towards_deg: float, roll_deg: float, distance_mm: float
-) -> None:
+def test_the_surface_is_found_however_it_is_mounted(tilt_deg, towards_deg, roll_deg, distance_mm):
     """Distance to 0.1 %, normal to 0.1 degrees, and both within the stated uncertainty."""
     image, truth = lying_board(
         tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=distance_mm
@@ -87,12 +82,11 @@ def test_the_surface_is_found_however_it_is_mounted(
     assert result.plane.normal_camera[2] > 0.9
 
 
-def test_the_mirrored_pose_is_rejected_and_shown() -> None:
+def test_the_mirrored_pose_is_rejected_and_shown():
     """Both poses of a flat board are reported, with the evidence against the wrong one."""
     image, truth = lying_board(tilt_deg=6.0)
     result = estimate_top_pose([image], BOARD, CAMERA)
     assert result.decision is Decision.EVIDENCE
-    assert result.mirrored is not None
     assert angle_deg(result.plane, truth) < 0.1
     assert angle_deg(result.mirrored.plane, truth) > 3.0
     assert result.mirrored.rms_px > 3.0 * result.rms_px
@@ -105,7 +99,7 @@ def far_camera() -> Camera:
     return Camera(320, 240, 120000.0, 120000.0, 160.0, 120.0)
 
 
-def test_two_poses_that_fit_equally_well_are_reported() -> None:
+def test_two_poses_that_fit_equally_well_are_reported():
     """At a large distance and with noise, nothing separates the poses; the result says so."""
     image, truth = lying_board(
         tilt_deg=6.0, distance_mm=10000.0, camera=far_camera(), noise=0.03, blur_px=1.0
@@ -113,13 +107,12 @@ def test_two_poses_that_fit_equally_well_are_reported() -> None:
     result = estimate_top_pose([image], BOARD, far_camera())
     assert result.decision is Decision.TILT
     assert result.quality["mirrored_margin"].verdict is Verdict.WARN
-    assert result.mirrored is not None
     assert result.tilt_deg <= result.mirrored.tilt_deg
     nearest = min(angle_deg(plane, truth) for plane in (result.plane, result.mirrored.plane))
     assert nearest < 2.0
 
 
-def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
+def test_a_board_that_does_not_lie_flat_is_left_out_and_named():
     """A particle under one of three boards does not tilt the result."""
     flat = [lying_board(roll_deg=roll, name=f"flat_{roll:.0f}.png") for roll in (-40.0, 10.0, 70.0)]
     propped, _ = lying_board(tilt_deg=4.0, towards_deg=200.0, name="propped.png")
@@ -130,7 +123,7 @@ def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
 
 
 @pytest.mark.parametrize("tilts_deg", [(0.0, 12.0, 24.0), (-24.0, -8.0, 9.0, 25.0)])
-def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg: tuple[float, ...]) -> None:
+def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg):
     """Images of a hand-held board, copied here, give no information about the surface.
 
     One of three such boards may happen to be in the middle; even then there is no evidence for it.
@@ -145,7 +138,7 @@ def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg: tuple[flo
     assert "held_0.png" in refusal.value.found
 
 
-def test_the_focal_length_s_uncertainty_reaches_the_distance() -> None:
+def test_the_focal_length_s_uncertainty_reaches_the_distance():
     """The distance cannot be known better than the focal length."""
     image, _ = lying_board()
     result = estimate_top_pose([image], BOARD, CAMERA, focal_sd_px=0.01 * CAMERA.fx)
@@ -153,7 +146,7 @@ def test_the_focal_length_s_uncertainty_reaches_the_distance() -> None:
     assert result.quality["distance_sd"].verdict is not Verdict.PASS
 
 
-def test_without_a_usable_image_the_reason_is_given() -> None:
+def test_without_a_usable_image_the_reason_is_given():
     """If there is only one image, its error is the error of the stage."""
     image, _ = lying_board()
     with pytest.raises(InputError, match="no image"):
@@ -168,15 +161,11 @@ def test_without_a_usable_image_the_reason_is_given() -> None:
 
 @pytest.mark.parametrize(("sensor", "normal_deg"), [("sensor-A", 0.05), ("sensor-B", 0.1)])
 def test_rendered_sessions_give_the_surface_with_our_own_lens(
-    shared_data: Path,
-    rendered_optics: Callable[[str], Results],
-    sensor: str,
-    normal_deg: float,
-) -> None:
+    shared_data, rendered_optics, sensor, normal_deg
+):
     """0.1 % of the distance is 0.1 % of every length; 0.1 degrees moves a light by 0.1 mm."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["top_plane"]
     result = rendered_optics(sensor)[TOP_POSE].pose
-    assert result is not None
     x, y, z = truth["normal_camera"]
     plane = TopPlane((x, y, z), truth["offset_mm"])
     assert result.plane.distance_mm == pytest.approx(plane.distance_mm, rel=1e-3)
@@ -185,7 +174,7 @@ def test_rendered_sessions_give_the_surface_with_our_own_lens(
 
 
 @pytest.mark.parametrize("blur_px", [0.6, 0.8, 1.05])
-def test_the_blur_on_the_surface_is_measured(blur_px: float) -> None:
+def test_the_blur_on_the_surface_is_measured(blur_px):
     """With the width of a pixel, which a square aperture of one pixel has."""
     image, _ = lying_board(blur_px=blur_px)
     result = estimate_top_pose([image], BOARD, CAMERA)

@@ -41,9 +41,7 @@ def corrected_radius_px(
     st.floats(0.5, 30.0),
     st.floats(1.0, 60.0),
 )
-def test_one_face_on_the_axis_is_the_papers_equation_3(
-    radius_px: float, index: float, gel_mm: float, air_mm: float
-) -> None:
+def test_one_face_on_the_axis_is_the_papers_equation_3(radius_px, index, gel_mm, air_mm):
     focal_px = 1000.0
     stack = build_stack(air_mm + gel_mm, elastomer_thickness_mm=gel_mm, elastomer_index=index)
     direction = np.array([radius_px / focal_px, 0.0, 1.0])
@@ -62,9 +60,7 @@ def test_one_face_on_the_axis_is_the_papers_equation_3(
     st.floats(-0.05, 0.05),
     st.sampled_from([0.0, 2.0]),
 )
-def test_membrane_to_pixel_and_back_is_the_same_point(
-    x: float, y: float, tilt_x: float, tilt_y: float, window_mm: float
-) -> None:
+def test_membrane_to_pixel_and_back_is_the_same_point(x, y, tilt_x, tilt_y, window_mm):
     plane = tilted_plane(tilt_x, tilt_y)
     stack = build_stack(
         39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41, window_thickness_mm=window_mm
@@ -73,7 +69,7 @@ def test_membrane_to_pixel_and_back_is_the_same_point(
     np.testing.assert_allclose(back, [x, y], atol=1e-9)
 
 
-def test_the_ray_takes_the_quickest_path() -> None:
+def test_the_ray_takes_the_quickest_path():
     """Fermat: the crossing points of the faces make the optical path an extremum."""
     stack = build_stack(
         39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41, window_thickness_mm=2.0
@@ -90,7 +86,7 @@ def test_the_ray_takes_the_quickest_path() -> None:
     assert direction[0] * stack.thicknesses_mm[0] == pytest.approx(quickest[0], abs=1e-5)
 
 
-def test_the_ray_slope_is_where_the_ray_meets_a_higher_surface() -> None:
+def test_the_ray_slope_is_where_the_ray_meets_a_higher_surface():
     """Moving a millimetre from elastomer to air shifts the visible point by the ray slope."""
     plane = tilted_plane(0.01, -0.02)
     stack = build_stack(39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41)
@@ -101,7 +97,7 @@ def test_the_ray_slope_is_where_the_ray_meets_a_higher_surface() -> None:
     np.testing.assert_allclose(point + 1.0 * ray_slope, closer, atol=1e-12)
 
 
-def test_rays_that_never_reach_the_surface_are_not_numbers() -> None:
+def test_rays_that_never_reach_the_surface_are_not_numbers():
     stack = build_stack(39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41)
     point, _ = camera_to_membrane(
         np.array([1.0, 0.0, -0.1]), TopPlane((0.0, 0.0, 1.0), 39.0), stack
@@ -110,9 +106,7 @@ def test_rays_that_never_reach_the_surface_are_not_numbers() -> None:
 
 
 @given(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-0.02, 0.02), st.floats(-0.02, 0.02))
-def test_a_point_of_a_curved_membrane_is_seen_like_one_on_a_thicker_slab(
-    x: float, y: float, tilt_x: float, tilt_y: float
-) -> None:
+def test_a_point_of_a_curved_membrane_is_seen_like_one_on_a_thicker_slab(x, y, tilt_x, tilt_y):
     cap, plane = Surface("spherical_cap", 2.0, 26.0, (-0.4, 0.3)), tilted_plane(tilt_x, tilt_y)
     gel = {"elastomer_index": 1.41, "window_thickness_mm": 2.0}
     stack = build_stack(plane.distance_mm, elastomer_thickness_mm=12.0, **gel)

@@ -19,7 +19,7 @@ STACK = build_stack(
 )
 
 
-def test_every_raw_pixel_is_found_at_its_membrane_position() -> None:
+def test_every_raw_pixel_is_found_at_its_membrane_position():
     """Images of u and of v, resampled, give the pixel of each node, and its ray gives the node."""
     table = build_resampling_table(CAMERA, PLANE, STACK, working_diameter_mm=26.0)
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width].astype(np.float32)
@@ -32,7 +32,7 @@ def test_every_raw_pixel_is_found_at_its_membrane_position() -> None:
     np.testing.assert_allclose(place, expected, atol=2e-3)
 
 
-def test_the_grid_covers_what_is_seen_of_the_working_circle_and_no_more() -> None:
+def test_the_grid_covers_what_is_seen_of_the_working_circle_and_no_more():
     table = build_resampling_table(CAMERA, PLANE, STACK, working_diameter_mm=16.0)
     x, y = table.grid.x_mm, table.grid.y_mm
     assert x[0] == pytest.approx(-8.0, abs=1.0)
@@ -41,7 +41,7 @@ def test_the_grid_covers_what_is_seen_of_the_working_circle_and_no_more() -> Non
     assert area == pytest.approx(np.pi * 64.0, rel=0.01)
 
 
-def test_a_tilted_sensor_has_its_origin_below_the_camera() -> None:
+def test_a_tilted_sensor_has_its_origin_below_the_camera():
     foot = PLANE.origin_camera_mm
     np.testing.assert_allclose(PLANE.to_sensor(foot), 0.0, atol=1e-12)
     np.testing.assert_allclose(PLANE.to_sensor(np.zeros(3)), [0.0, 0.0, -39.0], atol=1e-12)
@@ -50,13 +50,13 @@ def test_a_tilted_sensor_has_its_origin_below_the_camera() -> None:
     assert np.linalg.det(PLANE.rotation) == pytest.approx(1.0)
 
 
-def test_a_working_circle_of_a_few_pixels_is_refused_where_it_is_stated() -> None:
+def test_a_working_circle_of_a_few_pixels_is_refused_where_it_is_stated():
     with pytest.raises(InputError, match="working circle") as refusal:
         build_resampling_table(CAMERA, PLANE, STACK, working_diameter_mm=1.0)
     assert "sensor" in refusal.value.where
     assert refusal.value.advice == Remedy.CHECK_LENGTHS
 
 
-def test_a_grid_that_would_not_fit_in_memory_is_refused() -> None:
+def test_a_grid_that_would_not_fit_in_memory_is_refused():
     with pytest.raises(InputError, match="nodes"):
         build_resampling_table(CAMERA, PLANE, STACK, working_diameter_mm=26.0, pitch_mm=1e-5)

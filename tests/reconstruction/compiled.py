@@ -83,6 +83,24 @@ class RaySlopes:
     flags: NDArray[np.uint8]
 
 
+def field_of(
+    ratio: NDArray[np.float64],
+    ray_slope: NDArray[np.float64],
+    x_mm: NDArray[np.float64],
+    y_mm: NDArray[np.float64],
+    *,
+    sigma: float,
+    around: float | NDArray[np.float64] = 1.0,
+) -> ShadedField:
+    """Return a field that is usable everywhere, in single precision."""
+    whole = np.ones(ratio.shape[:2], bool)
+    single = [np.asarray(a, np.float32) for a in (ratio, np.full_like(ratio, sigma))]
+    light = np.asarray(np.broadcast_to(around, ratio.shape), np.float32)
+    nothing = np.zeros(ratio.shape, bool)
+    slope = np.asarray(ray_slope, np.float32)
+    return ShadedField(*single, light, nothing, whole, whole, slope, x_mm, y_mm)
+
+
 def full_model(membrane: Membrane, leds_mm: NDArray[np.float64]) -> FullModel:
     """Return lights and membrane as a calibration holds them."""
     nothing = np.zeros((1, 1, 3), np.float32)
@@ -122,7 +140,7 @@ def solve(
     if start is not None:
         slopes = slopes._replace(normal_x=start[0].copy(), normal_y=start[1].copy())
         steps = steps._replace(warm=True)
-    numbers = membrane_numbers(full, coverage)  # type: ignore[arg-type]
+    numbers = membrane_numbers(full, coverage)
     RowWorkers(workers).run(
         len(depth), solve_rows, image_of(field), depth, scale, (0, 0), numbers, steps, slopes
     )

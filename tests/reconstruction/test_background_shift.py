@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.finding import Verdict
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.exposure import Frame, exposed
 from gelpolight_core.simulation.lamps import lamps_of
@@ -52,7 +50,7 @@ def moved(frame: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
     return np.ascontiguousarray(np.roll(frame, columns, axis=1))
 
 
-def test_a_sensor_that_has_not_changed_has_not_drifted(small_calibration: Calibration) -> None:
+def test_a_sensor_that_has_not_changed_has_not_drifted(small_calibration):
     shift = background_shift(frames(1.0, 1.0, 1.0, count=1)[0], small_calibration)
     assert not shift.touched
     assert np.abs(shift.brightness_percent).max() < 0.5
@@ -61,9 +59,7 @@ def test_a_sensor_that_has_not_changed_has_not_drifted(small_calibration: Calibr
     assert shift.quality.verdict is Verdict.PASS
 
 
-def test_leds_that_changed_are_reported_by_channel(
-    small_calibration: Calibration, warm: list[Frame]
-) -> None:
+def test_leds_that_changed_are_reported_by_channel(small_calibration, warm):
     shift = background_shift(warm[0], small_calibration)
     assert shift.brightness_percent == pytest.approx([3.0, 0.0, -3.0], abs=0.5)
     assert not shift.touched
@@ -71,9 +67,7 @@ def test_leds_that_changed_are_reported_by_channel(
     assert any("zero" in line for line in shift.quality.remedies)
 
 
-def test_a_membrane_that_moved_in_the_image_is_reported(
-    virtual_calibration: Calibration, virtual_session: Path
-) -> None:
+def test_a_membrane_that_moved_in_the_image_is_reported(virtual_calibration, virtual_session):
     bare = read_image(next((virtual_session / "background").iterdir())).rgb
     shift = background_shift(moved(bare, 3), virtual_calibration)
     assert shift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
@@ -83,8 +77,8 @@ def test_a_membrane_that_moved_in_the_image_is_reported(
 
 
 def test_a_press_is_called_a_touch_and_never_taken_for_the_background(
-    small_calibration: Calibration, small_session: Path
-) -> None:
+    small_calibration, small_session
+):
     press = read_image(small_session / "presses" / "cylinder_s5_d050.png").rgb
     shift = background_shift(press, small_calibration)
     assert shift.touched
@@ -94,9 +88,7 @@ def test_a_press_is_called_a_touch_and_never_taken_for_the_background(
 
 
 @pytest.mark.parametrize("model", ["paper", "full"])
-def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(
-    small_calibration: Calibration, model: str
-) -> None:
+def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(small_calibration, model):
     warm = frames(*MUCH_BRIGHTER)
     new = zeroed(small_calibration, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
     before, after = (
@@ -107,9 +99,7 @@ def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(
     assert np.abs(shift.brightness_percent).max() < 0.3
 
 
-def test_a_place_too_dim_for_the_calibration_stays_out_after_zeroing(
-    small_calibration: Calibration, warm: list[Frame]
-) -> None:
+def test_a_place_too_dim_for_the_calibration_stays_out_after_zeroing(small_calibration, warm):
     dim = small_calibration.data.radiance.copy()
     rows, columns = (slice(n // 2, n // 2 + 5) for n in dim.shape[:2])
     dim[rows, columns, 1] *= 0.005 / dim[rows, columns, 1].max()
@@ -121,9 +111,7 @@ def test_a_place_too_dim_for_the_calibration_stays_out_after_zeroing(
     assert new.data.factors.any(axis=2).mean() > 0.9 * factors.any(axis=2).mean()
 
 
-def test_zeroing_is_on_record_and_has_a_name_of_its_own(
-    small_calibration: Calibration, warm: list[Frame], tmp_path: Path
-) -> None:
+def test_zeroing_is_on_record_and_has_a_name_of_its_own(small_calibration, warm, tmp_path):
     new = zeroed(small_calibration, warm, operator="me", made="2026-01-02T03:04:05+00:00")
     assert new.identity != small_calibration.identity
     edit = new.provenance.edits[-1]
@@ -134,7 +122,7 @@ def test_zeroing_is_on_record_and_has_a_name_of_its_own(
     assert again.provenance.edits == new.provenance.edits
 
 
-def test_what_is_no_image_of_this_sensor_is_refused(small_calibration: Calibration) -> None:
+def test_what_is_no_image_of_this_sensor_is_refused(small_calibration):
     camera = small_calibration.camera
     dark = np.zeros((camera.height, camera.width, 3), np.float32)
     with pytest.raises(InputError, match="dark"):

@@ -18,7 +18,6 @@ from gelpolight_core.reconstruction.checks import (
     unanchored_note,
 )
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
-from gelpolight_core.reconstruction.near_light.structures import Region
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
@@ -73,12 +72,18 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
     return rms_um(depth_error(found, press.truth, radius_mm=SEEN_MM))
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
 @pytest.mark.parametrize(
-    "name",
-    ["cylinder 6 at 11", "cylinder 12 at 11", "edge 0.23", "edge 0.5", "half plane", "quadrant"],
+    ("name", "effort"),
+    [
+        ("cylinder 6 at 11", "fast"),
+        ("cylinder 12 at 11", "best"),
+        ("edge 0.23", "fast"),
+        ("edge 0.5", "best"),
+        ("half plane", "fast"),
+        ("quadrant", "best"),
+    ],
 )
-def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str) -> None:
+def test_a_flat_face_across_the_boundary_keeps_its_depth(name, effort):
     """Held at depth 0 all around, or freed by brightness, these are 80 to 480 um off."""
     press = scene(name)
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
@@ -88,11 +93,8 @@ def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str)
     assert not (found.flags & int(Flag.UNANCHORED)).any()
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("depth_mm", [0.05, 0.1])
-def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(
-    effort: str, depth_mm: float
-) -> None:
+@pytest.mark.parametrize(("effort", "depth_mm"), [("fast", 0.1), ("best", 0.05)])
+def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(effort, depth_mm):
     """Only its edge changes the light: the region around the edge ends on the face.
 
     Half of the field is a little brighter: this is the face, and no change of exposure.
@@ -103,11 +105,10 @@ def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(
     for frame in (press.frame, sensor().noisy(press.frame)):
         found = reconstructor.depth(frame, normals=False)
         assert error_um(found, press) < 4.0
-        assert found.health is not None
         assert not found.health.findings
 
 
-def test_the_stated_deviation_covers_what_a_far_face_is_off_by() -> None:
+def test_the_stated_deviation_covers_what_a_far_face_is_off_by():
     press = scene("edge 0.5")
     found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
     assert found.depth_sd_mm is not None
@@ -122,27 +123,25 @@ def test_the_stated_deviation_covers_what_a_far_face_is_off_by() -> None:
     assert np.mean(off < 3.0 * sd[face]) > 0.95
 
 
-def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_anchor() -> None:
+def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_anchor():
     press = scene("ring 8")
     found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
     assert error_um(found, press) < 10.0
     assert unanchored_note() in found.findings
     inside = (found.flags & int(Flag.OUTSIDE)) == 0
     assert (found.flags[inside] & int(Flag.UNANCHORED)).all()
-    assert found.depth_model_sd_mm is not None
     assert np.median(found.depth_model_sd_mm[inside]) > 0.5 * DEPTH_MM
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("x_mm", [10.5, 12.0])
-def test_what_the_boundary_cuts_off_is_not_measured(x_mm: float, effort: str) -> None:
+@pytest.mark.parametrize(("effort", "x_mm"), [("fast", 12.0), ("best", 10.5)])
+def test_what_the_boundary_cuts_off_is_not_measured(x_mm, effort):
     press = scene(f"cylinder 12 at {x_mm:g}")
     found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
     with pytest.raises(InputError, match="cut by the border"):
         measure_object(found, shape="cylinder")
 
 
-def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
+def test_the_papers_model_says_that_it_holds_the_boundary_down():
     press = scene("cylinder 12 at 10.5")
     paper = Reconstructor(sensor().calibration, model="paper")
     found = paper.depth(press.frame)
@@ -153,7 +152,7 @@ def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
     assert not paper.depth(central.frame).findings
 
 
-def test_a_face_without_an_anchor_is_doubtful() -> None:
+def test_a_face_without_an_anchor_is_doubtful():
     """A block in the middle of a field whose boundary is pressed all around."""
     press = sensor().pressed(Cylinder(5.0, DEPTH_MM), samples=1)
     found = Reconstructor(sensor().calibration).depth(press.frame)
@@ -163,8 +162,3 @@ def test_a_face_without_an_anchor_is_doubtful() -> None:
 
     assert verdict(found.flags) == "ok"
     assert verdict(found.flags | np.uint8(Flag.UNANCHORED)) == "doubtful"
-
-
-PITCH_MM = 0.2
-FIELD = np.hypot(*np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))) * PITCH_MM < 12.0
-WHOLE = Region((0, 0), FIELD.shape)

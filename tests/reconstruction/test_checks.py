@@ -56,7 +56,7 @@ def images(draw: st.DrawFn) -> np.ndarray:
 
 @settings(max_examples=60, deadline=None)
 @given(images())
-def test_no_image_whatever_crashes_or_gives_depth_that_is_no_number(image: np.ndarray) -> None:
+def test_no_image_whatever_crashes_or_gives_depth_that_is_no_number(image):
     for reconstruct in RECONSTRUCTORS:
         try:
             found = reconstruct.depth(image)
@@ -72,7 +72,7 @@ def test_no_image_whatever_crashes_or_gives_depth_that_is_no_number(image: np.nd
     st.sampled_from([np.nan, np.inf, -np.inf, -1.0, 3e38, 1e-45, 0.0, 1.0]),
     st.integers(0, 2**32 - 1),
 )
-def test_a_few_wild_pixels_leave_the_rest_of_the_map_as_it_was(value: float, seed: int) -> None:
+def test_a_few_wild_pixels_leave_the_rest_of_the_map_as_it_was(value, seed):
     press = standard_press()
     frame = press.frame.copy()
     rows, columns = np.random.default_rng(seed).integers(30, 200, (2, 10))
@@ -82,9 +82,7 @@ def test_a_few_wild_pixels_leave_the_rest_of_the_map_as_it_was(value: float, see
 
 
 @pytest.mark.parametrize("reconstruct", STANDARD, ids=lambda r: r.model)
-def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(
-    reconstruct: Reconstructor,
-) -> None:
+def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(reconstruct):
     frame = standard_press().frame
     assert not reconstruct.depth(frame).findings
     for share in (0.9, 0.5):
@@ -96,12 +94,11 @@ def test_another_exposure_or_colour_order_than_the_calibrations_is_reported(
         (frame[::-1], "other_sensor"),
     ):
         found = reconstruct.depth(wrong)
-        assert found.health is not None and found.health.meaningless is not None
         assert found.health.meaningless.key == key
         assert found.health.findings[0] in found.findings
 
 
-def test_light_that_has_drifted_by_two_per_cent_is_reported_with_its_amount() -> None:
+def test_light_that_has_drifted_by_two_per_cent_is_reported_with_its_amount():
     frame = standard_press().frame
     red = frame * np.array([1.02, 1.0, 1.0], np.float32)
     for reconstruct in STANDARD:
@@ -112,7 +109,7 @@ def test_light_that_has_drifted_by_two_per_cent_is_reported_with_its_amount() ->
         assert not reconstruct.depth(eight_bit).findings
 
 
-def test_known_bad_pixels_are_left_out_of_the_solve() -> None:
+def test_known_bad_pixels_are_left_out_of_the_solve():
     frame = np.rint(standard_press().frame * 255.0).astype(np.uint8)
     calibration, (height, width) = standard_sensor().calibration, frame.shape[:2]
     bad = np.random.default_rng(0).random((height, width)) < 1e-3
@@ -133,13 +130,13 @@ def test_known_bad_pixels_are_left_out_of_the_solve() -> None:
         assert seen.health is not None and "bad_line" in seen.health.keys
 
 
-def test_a_contact_on_the_rim_is_not_taken_for_another_sensor() -> None:
+def test_a_contact_on_the_rim_is_not_taken_for_another_sensor():
     press = standard_sensor().pressed(Ball(4.0, 1.0), x_mm=11.0, samples=1)
     notes = STANDARD[0].depth(press.frame).findings
     assert notes and not any(note.key == "exposure" for note in notes)
 
 
-def test_lights_in_one_plane_are_refused_with_their_condition() -> None:
+def test_lights_in_one_plane_are_refused_with_their_condition():
     calibration = standard_sensor().calibration
     row = np.array([[-8.0, 0.1, -13.7], [0.0, 0.0, -13.7], [8.0, 0.0, -13.7]])
     assert calibration.data.full is not None

@@ -18,9 +18,7 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(1, 400), st.integers(1, 140), st.booleans(), st.integers(0, 2**32 - 1))
-def test_columns_are_solved_as_a_banded_solver_does(
-    rows: int, columns: int, single: bool, seed: int
-) -> None:
+def test_columns_are_solved_as_a_banded_solver_does(rows, columns, single, seed):
     dtype = np.dtype(np.float32 if single else np.float64)
     field = np.random.default_rng(seed).normal(size=(rows, columns)).astype(dtype)
     waves = 4.0 * np.sin(np.pi * np.arange(1, columns + 1) / (2 * columns)) ** 2
@@ -41,9 +39,9 @@ def test_columns_are_solved_as_a_banded_solver_does(
 
 
 @pytest.mark.parametrize("owner", [RowWorkers, lambda n: PoissonSolver(90, 80, pitch_mm=0.1)])
-def test_threads_end_with_their_owner(owner: object) -> None:
+def test_threads_end_with_their_owner(owner):
     before = set(threading.enumerate())
-    kept = owner(2)  # type: ignore[operator]
+    kept = owner(2)
     if isinstance(kept, RowWorkers):
         kept.run(100, lambda first, last: None)
     else:

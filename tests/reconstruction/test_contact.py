@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.checks import small_image_notes, visible_depth_notes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.solver import Wanted
@@ -23,7 +22,7 @@ from gelpolight_core.studies.known_sensor import (
 from gelpolight_core.studies.trial import depth_error, rms_um
 
 AT_MM = (1.0, -2.0)
-EMPTY_FRAMES = 150
+EMPTY_FRAMES = 60
 
 
 @lru_cache(maxsize=3)
@@ -34,15 +33,16 @@ def sensor(scale: float) -> KnownSensor:
 
 def face_um(found: object, at_mm: tuple[float, float]) -> float:
     """Return the median depth of the middle of a face 5 mm wide."""
-    x, y = np.meshgrid(found.x_mm, found.y_mm)  # type: ignore[attr-defined]
+    x, y = np.meshgrid(found.x_mm, found.y_mm)
     middle = np.hypot(x - at_mm[0], y - at_mm[1]) < 2.2
-    return float(1e3 * np.median(found.depth_mm[middle]))  # type: ignore[attr-defined]
+    return float(1e3 * np.median(found.depth_mm[middle]))
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("noisy", [False, True], ids=["clean", "noisy"])
-@pytest.mark.parametrize("depth_um", [10.0, 20.0])
-def test_shallow_faces_are_seen(depth_um: float, noisy: bool, effort: str) -> None:
+@pytest.mark.parametrize(
+    ("depth_um", "noisy", "effort"),
+    [(10.0, False, "best"), (10.0, True, "fast"), (20.0, True, "best")],
+)
+def test_shallow_faces_are_seen(depth_um, noisy, effort):
     """By single blocks of pixels all of these read 0."""
     known = sensor(0.5)
     press = known.pressed(Cylinder(5.0, 1e-3 * depth_um), x_mm=AT_MM[0], y_mm=AT_MM[1], samples=1)
@@ -51,7 +51,7 @@ def test_shallow_faces_are_seen(depth_um: float, noisy: bool, effort: str) -> No
     assert face_um(found, AT_MM) == pytest.approx(depth_um, abs=1.0)
 
 
-def test_the_stated_smallest_depth_is_seen_and_half_of_it_is_not() -> None:
+def test_the_stated_smallest_depth_is_seen_and_half_of_it_is_not():
     known = sensor(0.5)
     reconstruct = Reconstructor(known.calibration, effort="fast")
     least_um = 1e3 * (reconstruct.visible_depth_mm or 0.0)
@@ -67,7 +67,7 @@ def test_the_stated_smallest_depth_is_seen_and_half_of_it_is_not() -> None:
             assert face_um(found, at_mm) == pytest.approx(wanted, abs=1.5)
 
 
-def test_noise_is_no_contact() -> None:
+def test_noise_is_no_contact():
     known = sensor(0.25)
     bare = known.bare()
     solver = Reconstructor(known.calibration).solver
@@ -77,12 +77,9 @@ def test_noise_is_no_contact() -> None:
 
 
 @pytest.mark.parametrize("off", [0.97, 1.03])
-def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_in(
-    off: float,
-) -> None:
+def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_in(off):
     known = sensor(0.25)
     full = known.calibration.data.full
-    assert full is not None
     brighter = np.float32(1.1 / full.background.max())
     true = full.background * brighter
     filled = np.where(true > 1.0, off * true, true).astype(np.float32)
@@ -103,7 +100,7 @@ def test_a_background_that_is_saturated_is_no_contact_where_its_light_is_filled_
     assert "integration" in needed.done, "other channels show it"
 
 
-def test_a_shallow_face_beside_a_deep_one_is_seen() -> None:
+def test_a_shallow_face_beside_a_deep_one_is_seen():
     known = sensor(0.5)
     deep = known.pressed(Cylinder(4.0, 0.5), x_mm=-7.0, samples=1)
     shallow = known.pressed(Cylinder(5.0, 0.03), x_mm=6.0, samples=1)
@@ -113,23 +110,7 @@ def test_a_shallow_face_beside_a_deep_one_is_seen() -> None:
     assert face_um(found, (6.0, 0.0)) == pytest.approx(30.0, abs=3.0)
 
 
-@pytest.mark.parametrize("model", ["linear", "bent"])
-def test_with_any_camera_response_nothing_is_solved_while_nothing_is_pressed(model: str) -> None:
-    known = sensor(0.25)
-    calibration, frame = known.calibration, known.noisy(known.bare())
-    if model == "bent":
-        levels = np.linspace(0.0, 1.0, 256)
-        response = CameraResponse(np.tile(levels**1.2, (3, 1)))
-        calibration = calibration.changed(response=response)
-        frame = np.rint(255.0 * (frame / 255.0) ** (1.0 / 1.2)).astype(np.uint8)
-    for effort in EFFORTS:
-        found = Reconstructor(calibration, effort=effort).depth(frame)
-        assert not found.depth_mm.any()
-        assert found.trace is not None
-        assert len(found.trace.done) == 1
-
-
-def test_a_calibration_whose_noise_hides_presses_says_so() -> None:
+def test_a_calibration_whose_noise_hides_presses_says_so():
     known = sensor(0.25)
     deaf = known.calibration.changed(noise=np.full(3, 0.2))
     press = known.pressed(Ball(4.0, 0.05), samples=1)
@@ -143,7 +124,7 @@ def test_a_calibration_whose_noise_hides_presses_says_so() -> None:
 
 
 @pytest.mark.parametrize("effort", ["fast", "best"])
-def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort: str) -> None:
+def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort):
     """64 x 48 pixels at a quarter scale: nodes of 2 mm, and a plateau of 1 mm that reads 0.85."""
     known = sensor(0.05)
     press = known.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
@@ -151,7 +132,6 @@ def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort: str)
         Reconstructor(known.calibration, effort=e).depth(press.frame) for e in (effort, "best")
     )
     np.testing.assert_array_equal(found.depth_mm, best.depth_mm)
-    assert found.trace is not None
     assert found.trace.effort == "best"
     assert (f"effort {effort}" in found.trace.left_out) == (effort != "best")
     (note,) = small_image_notes(found.pitch_mm, 0.7)
@@ -170,12 +150,13 @@ def steep_press(decay_mm: float) -> tuple[KnownSensor, KnownPress]:
 
 @pytest.mark.parametrize("effort", ["fast", "best"])
 @pytest.mark.parametrize("decay_mm", [0.35, 0.18, 0.1])
-def test_walls_are_right_or_reported_to_be_too_steep(decay_mm: float, effort: str) -> None:
+def test_walls_are_right_or_reported_to_be_too_steep(decay_mm, effort):
     """Walls of 71, 80 and 84 degrees."""
     steep, press = steep_press(decay_mm)
     found = Reconstructor(steep.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=12.0))
     assert found.findings or error_um < 15.0
+    assert ("steep_walls" in {note.key for note in found.findings}) or decay_mm > 0.1
 
 
 @lru_cache(maxsize=1)
@@ -188,9 +169,8 @@ def wide_press(focal_px: float) -> tuple[KnownSensor, KnownPress]:
     return known, known.pressed(Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
 
 
-@pytest.mark.parametrize("effort", ["fast", "best"])
-@pytest.mark.parametrize("focal_px", [150.0, 80.0, 40.0])
-def test_wide_lenses_are_right_or_reported_to_see_too_little(focal_px: float, effort: str) -> None:
+@pytest.mark.parametrize(("effort", "focal_px"), [("best", 150.0), ("fast", 80.0), ("best", 40.0)])
+def test_wide_lenses_are_right_or_reported_to_see_too_little(focal_px, effort):
     """Rays up to 47, 63 and 76 degrees: wide pixels."""
     known, press = wide_press(focal_px)
     found = Reconstructor(known.calibration, effort=effort).depth(press.frame, normals=False)

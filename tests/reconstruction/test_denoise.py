@@ -30,7 +30,7 @@ def quieted(light: np.ndarray, sigma: float = 0.005) -> np.ndarray:
     return ratio
 
 
-def test_noise_goes_and_the_step_stays() -> None:
+def test_noise_goes_and_the_step_stays():
     clean, noisy = image(0.01)
     quiet = quieted(noisy)
     even = np.s_[10:-10, 10:100]
@@ -39,14 +39,14 @@ def test_noise_goes_and_the_step_stays() -> None:
     np.testing.assert_allclose(quiet[20:140, 118:122], noisy[20:140, 118:122], atol=1e-3)
 
 
-def test_an_image_without_noise_is_left_alone() -> None:
+def test_an_image_without_noise_is_left_alone():
     clean, noisy = image(0.0)
     assert np.abs(quieted(noisy) - clean).max() < 2e-3
     assert quiet(noisy, ONE, np.float32(0.005) * ONE, USABLE)[2] is None
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.3, 0.5])
-def test_the_noise_that_is_left_is_known(shift: float) -> None:
+def test_the_noise_that_is_left_is_known(shift):
     """Raw noise, resampled between the pixels and quieted, beside what is stated."""
     random = np.random.default_rng(1)
     clean = np.full((160, 200, 3), 0.5, np.float32)
@@ -61,7 +61,7 @@ def test_the_noise_that_is_left_is_known(shift: float) -> None:
 
 
 @pytest.mark.parametrize("resampled", [1, 2])
-def test_the_noise_that_sharpening_makes_is_known(resampled: int) -> None:
+def test_the_noise_that_sharpening_makes_is_known(resampled):
     """Averaged over where nodes fall between the pixels."""
     random, kernel = np.random.default_rng(3), inverse_of_blur(0.5)
     found = []
@@ -78,7 +78,7 @@ def test_the_noise_that_sharpening_makes_is_known(resampled: int) -> None:
     assert np.sqrt(np.mean(found)) == pytest.approx(float(stated[0, 0]), rel=0.1)
 
 
-def test_little_light_is_averaged_wider_and_the_light_it_has_is_known() -> None:
+def test_little_light_is_averaged_wider_and_the_light_it_has_is_known():
     """A fortieth of the light: a fifth of the noise of the first average is left, none invented."""
     random = np.random.default_rng(2)
     background = np.full((160, 200, 3), 0.02, np.float32)
@@ -93,7 +93,7 @@ def test_little_light_is_averaged_wider_and_the_light_it_has_is_known() -> None:
     assert (ratio - 1.0)[bright].std() == pytest.approx(0.005 * 0.235, rel=0.15)
 
 
-def test_what_lies_outside_of_the_membrane_does_not_darken_its_rim() -> None:
+def test_what_lies_outside_of_the_membrane_does_not_darken_its_rim():
     usable = np.zeros((160, 200), bool)
     usable[40:120, 50:150] = True
     background = np.where(usable[..., None], 0.02, 0.01).astype(np.float32) * ONE

@@ -18,7 +18,7 @@ AXIS = (PITCH * (np.arange(NODES) - NODES / 2)).astype(np.float32)
 LEDS = np.array([[0.0, 10.0, -10.0], [-9.0, -5.0, -10.0], [9.0, -5.0, -10.0]], np.float32)
 
 
-def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches() -> None:
+def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches():
     height = 0.8
     ridge = np.where(np.abs(AXIS) < 1.0, height, 0.0).astype(np.float32)
     depth = np.ascontiguousarray(np.repeat(ridge[:, None], NODES, axis=1))
@@ -35,7 +35,7 @@ def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches() -> N
     assert not hidden[np.abs(AXIS) < 1.0 - PITCH].any()
 
 
-def test_an_image_gets_what_is_hidden_and_what_comes_from_around() -> None:
+def test_an_image_gets_what_is_hidden_and_what_comes_from_around():
     ratio = np.ones((3, 8, 8), np.float32)
     marks = np.full((8, 8), 1, np.uint8)
     around, clear = np.full((3, 4, 4), 0.2, np.float32), np.ones((3, 4, 4), np.float32)
@@ -49,7 +49,7 @@ def test_an_image_gets_what_is_hidden_and_what_comes_from_around() -> None:
     assert not (found.marks & (HIDDEN | HIDDEN << 2)).any()
 
 
-def test_light_from_around_jumps_where_the_image_jumps() -> None:
+def test_light_from_around_jumps_where_the_image_jumps():
     """A wall begins in the middle of a coarse node: bilinear values would smear its light."""
     wall = np.arange(64) >= 30
     fine = np.where(wall, np.array([[0.4], [1.4], [0.9]]), 1.0)[:, None, :].repeat(32, axis=1)

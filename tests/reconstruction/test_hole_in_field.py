@@ -10,7 +10,7 @@ from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.studies.known_sensor import known_sensor, matt_design
 
 
-def test_a_hole_on_a_face_is_filled_in_and_flagged() -> None:
+def test_a_hole_on_a_face_is_filled_in_and_flagged():
     known = known_sensor(matt_design(0.25))
     calibration = known.calibration
     frame = known.pressed(Cylinder(6.0, 0.6), samples=1).frame

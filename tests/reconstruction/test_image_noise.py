@@ -28,7 +28,7 @@ def scene() -> np.ndarray:
 
 
 @pytest.mark.parametrize(("shot", "read"), [(4e-5, 0.0015), (4e-4, 0.005)])
-def test_noise_is_found_at_every_brightness(shot: float, read: float) -> None:
+def test_noise_is_found_at_every_brightness(shot, read):
     light, random = scene(), np.random.default_rng(0)
     sd = np.sqrt(shot * light + read**2)
     seen = light + sd * random.normal(size=light.shape)

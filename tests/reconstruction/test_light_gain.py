@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.image.response import gamma_response
 from gelpolight_core.light.finding import Health, LightGain
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.studies.known_sensor import KnownPress, KnownSensor, known_sensor
 from gelpolight_core.studies.trial import depth_error, rms_um
@@ -25,12 +22,9 @@ TEN_UM = 10.0
 CORRECTION = "light of the image"
 CHANGES = {
     "exposure 3 % longer": (1.03, 1.03, 1.03),
-    "exposure 3 % shorter": (0.97, 0.97, 0.97),
     "exposure 0.2 % longer": (1.002, 1.002, 1.002),
-    "red LED 2 % brighter": (1.02, 1.0, 1.0),
     "all LEDs otherwise": (0.98, 1.02, 1.01),
     "half the exposure": (0.5, 0.5, 0.5),
-    "a fifth more light": (1.2, 1.2, 1.2),
     "red LED 40 % weaker": (0.6, 1.0, 1.0),
 }
 
@@ -55,32 +49,24 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
 @pytest.mark.parametrize(
     ("model", "effort"), [("full", "best"), ("full", "fast"), ("paper", "best")]
 )
-def test_a_change_of_light_costs_less_than_ten_micrometres(
-    known: KnownSensor, press: KnownPress, model: str, effort: str
-) -> None:
+def test_a_change_of_light_costs_less_than_ten_micrometres(known, press, model, effort):
     reconstructor = Reconstructor(known.calibration, model=model, effort=effort)
     usual = error_um(reconstructor.depth(known.noisy(press.frame), normals=False), press)
     for name, shares in CHANGES.items():
         frame = known.noisy(press.frame * np.array(shares, np.float32))
         found = reconstructor.depth(frame, normals=False)
         assert abs(error_um(found, press) - usual) < 0.3 * TEN_UM, name
-        assert found.health is not None
-        assert found.health.light is not None
         np.testing.assert_allclose(found.health.light.share, shares, atol=6e-4)
-        assert found.trace is not None
         assert CORRECTION in found.trace.done
         assert reconstructor.needs(frame).done[0] == CORRECTION
 
 
-def test_a_corrected_image_is_measured_well_and_says_what_was_done(
-    known: KnownSensor, press: KnownPress
-) -> None:
+def test_a_corrected_image_is_measured_well_and_says_what_was_done(known, press):
     reconstructor = Reconstructor(known.calibration)
     still, changed = (
         reconstructor.depth(known.noisy(press.frame * np.float32(share)), uncertainty=True)
         for share in (1.0, 1.03)
     )
-    assert changed.health is not None
     assert changed.health.keys == ("exposure",)
     assert not changed.health.faults
     assert changed.findings and not changed.doubts
@@ -94,9 +80,7 @@ def test_a_corrected_image_is_measured_well_and_says_what_was_done(
     assert np.nanmean(left[1]) == pytest.approx(np.nanmean(left[0]), rel=0.2)
 
 
-def test_the_error_of_a_corrected_light_is_part_of_every_deviation(
-    known: KnownSensor, press: KnownPress
-) -> None:
+def test_the_error_of_a_corrected_light_is_part_of_every_deviation(known, press):
     """What each channel's gain does to the height, if it is off by its standard deviation."""
     reconstructor, off, frame = Reconstructor(known.calibration), 0.005, known.noisy(press.frame)
 
@@ -110,45 +94,22 @@ def test_the_error_of_a_corrected_light_is_part_of_every_deviation(
         height([1.0 + off * (k == n) for n in range(3)], off).height_mm - usual.height_mm
         for k in range(3)
     ]
-    assert usual.noise_sd is not None
     assert usual.noise_sd["height_mm"] == pytest.approx(np.linalg.norm(moved), rel=0.3)
     assert usual.sd["height_mm"] > usual.noise_sd["height_mm"]
     exact = height((1.0, 1.0, 1.0), 0.0, uncertainty=True)
-    assert exact.noise_sd is not None
     assert exact.noise_sd["height_mm"] < 0.2 * usual.noise_sd["height_mm"]
 
 
-def test_light_as_at_calibration_changes_nothing(known: KnownSensor, press: KnownPress) -> None:
+def test_light_as_at_calibration_changes_nothing(known, press):
     for model in ("full", "paper"):
         reconstructor = Reconstructor(known.calibration, model=model)
         for seed in range(3):
             found = reconstructor.depth(known.noisy(press.frame, seed=seed), normals=False)
-            assert found.health is not None
             assert found.health.light is None
-            assert found.trace is not None
             assert CORRECTION in found.trace.left_out
 
 
-def test_with_a_camera_that_is_not_linear_the_light_is_corrected_too(
-    known: KnownSensor, press: KnownPress
-) -> None:
-    camera = replace(known.sensor.design.camera, response="gamma", gamma=2.2)
-    bent = known.calibration.changed(response=gamma_response(2.2))
-    for effort in ("best", "fast"):
-        reconstructor = Reconstructor(bent, effort=effort)
-        depths = []
-        for share in (1.0, 1.03):
-            random = np.random.default_rng(0)
-            for frame in (press.frame, known.bare()):
-                encoded = exposed(frame.astype(np.float64) * share, camera, random, averaged=1)
-                depths.append(reconstructor.depth(encoded, normals=False))
-        pressed, bare, pressed_brighter, bare_brighter = depths
-        assert abs(error_um(pressed_brighter, press) - error_um(pressed, press)) < 0.3 * TEN_UM
-        assert not bare.depth_mm.any()
-        assert not bare_brighter.depth_mm.any()
-
-
-def test_room_light_stays_a_fault(known: KnownSensor, press: KnownPress) -> None:
+def test_room_light_stays_a_fault(known, press):
     lit = press.frame * np.float32(1.02) + np.float32(0.002)
     found = Reconstructor(known.calibration).health(known.noisy(lit))
     assert [fault.key for fault in found.faults] == ["room_light"]

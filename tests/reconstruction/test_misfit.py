@@ -13,7 +13,6 @@ import pytest
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
@@ -58,17 +57,13 @@ def surface(known: KnownSensor) -> Callable[[float], HeightMap]:
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_a_flat_surface_looks_like_the_background(
-    model: str, known: KnownSensor, surface: Callable[[float], HeightMap]
-) -> None:
+def test_a_flat_surface_looks_like_the_background(model, known, surface):
     image = Reconstructor(known.calibration, model=model).predict(surface(0.0))
     assert np.isfinite(image).any()
     assert np.nanmax(np.abs(image - 1.0)) < 1e-3
 
 
-def test_the_image_of_a_true_surface_is_that_of_the_camera(
-    known: KnownSensor, surface: Callable[[float], HeightMap]
-) -> None:
+def test_the_image_of_a_true_surface_is_that_of_the_camera(known, surface):
     """Crosstalk is a part of it: without, the image would be off by 9 %."""
     frame = known.pressed(Cylinder(5.0, 1.0), x_mm=2.0).frame
     true = surface(1.0)
@@ -85,8 +80,8 @@ def test_the_image_of_a_true_surface_is_that_of_the_camera(
 
 @pytest.mark.parametrize(("model", "most"), [("paper", 0.03), ("full", 0.02)])
 def test_a_true_surface_explains_its_image_and_a_false_one_does_not(
-    model: str, most: float, small_calibration: Calibration, press: np.ndarray
-) -> None:
+    model, most, small_calibration, press
+):
     reconstruct = Reconstructor(small_calibration, model=model, effort="best")
     heightmap = reconstruct.depth(press, normals=False)
     true = reconstruct.misfit(press, heightmap, largest=10_000)

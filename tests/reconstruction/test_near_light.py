@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from compiled import RaySlopes, ShadedField, solve
+from compiled import RaySlopes, ShadedField, field_of, solve
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.height_map import Flag
@@ -85,19 +85,7 @@ def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
     around[..., 0] = 0.8
     around *= membrane.interreflection * 0.5 * (1.0 + normals[..., 2:])
     ratio = ratio + around
-    single = [np.asarray(a, np.float32) for a in (ratio, np.full_like(ratio, SIGMA), around)]
-    field = ShadedField(
-        single[0],
-        single[1],
-        single[2],
-        np.zeros(ratio.shape, bool),
-        np.ones(depth.shape, bool),
-        np.ones(depth.shape, bool),
-        DRIFT.astype(np.float32),
-        X,
-        Y,
-    )
-    return field, depth, normals
+    return field_of(ratio, DRIFT, X, Y, sigma=SIGMA, around=around), depth, normals
 
 
 def solved(field: ShadedField, depth: Array, membrane: Membrane, *, workers: int = 1) -> RaySlopes:
@@ -127,7 +115,7 @@ def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
     ],
     ids=["matt", "exponent", "glossy", "light from around", "curves", "glossy curves"],
 )
-def test_known_normals_are_found(membrane: Membrane) -> None:
+def test_known_normals_are_found(membrane):
     field, depth, normals = scene_of(membrane)
     found = solved(field, depth, membrane)
     error = angle_deg(found.normals, normals)
@@ -138,14 +126,7 @@ def test_known_normals_are_found(membrane: Membrane) -> None:
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-5)
 
 
-def test_light_frozen_at_the_flat_membrane_would_be_wrong() -> None:
-    """At depth 0 the same image gives other normals: the depth is used."""
-    field, depth, normals = scene_of(MATT)
-    frozen = angle_deg(solved(field, 0.0 * depth, MATT).normals, normals)
-    assert frozen.max() > 0.8  # eight times the error at the true depth
-
-
-def test_slopes_follow_the_rays_from_node_to_node() -> None:
+def test_slopes_follow_the_rays_from_node_to_node():
     field, depth, _ = scene_of(MATT)
     found = solved(field, depth, MATT)
     slope_y, slope_x = np.gradient(depth, PITCH)
@@ -156,7 +137,7 @@ def test_slopes_follow_the_rays_from_node_to_node() -> None:
 
 
 @pytest.mark.parametrize("membrane", [MATT, GLOSSY], ids=["matt", "glossy"])
-def test_the_stated_deviation_is_what_noise_does(membrane: Membrane) -> None:
+def test_the_stated_deviation_is_what_noise_does(membrane):
     field, depth, _ = scene_of(membrane)
     noise = 0.01
     ratio = np.ascontiguousarray(np.moveaxis(field.ratio, -1, 0))
@@ -182,9 +163,7 @@ def test_the_stated_deviation_is_what_noise_does(membrane: Membrane) -> None:
 
 @pytest.mark.parametrize("membrane", [MATT, GLOSSY], ids=["matt", "glossy"])
 @pytest.mark.parametrize("channel", [0, 1, 2])
-def test_a_wall_turned_away_from_one_light_is_found_by_the_other_two(
-    membrane: Membrane, channel: int
-) -> None:
+def test_a_wall_turned_away_from_one_light_is_found_by_the_other_two(membrane, channel):
     """Steep walls that do not see one light: nothing of it is left in the image."""
     field, depth, _ = scene_of(membrane)
     led = LEDS[channel]
@@ -208,7 +187,7 @@ def test_a_wall_turned_away_from_one_light_is_found_by_the_other_two(
 
 
 @pytest.mark.parametrize("channel", [0, 1, 2])
-def test_a_saturated_channel_is_missing_not_one(channel: int) -> None:
+def test_a_saturated_channel_is_missing_not_one(channel):
     """Walls turned towards a light saturate it; its cut value must not bend the normal."""
     field, depth, normals = scene_of(MATT)
     saturated = field.saturated.copy()
@@ -228,7 +207,7 @@ def test_a_saturated_channel_is_missing_not_one(channel: int) -> None:
     assert angle_deg(found.normals, normals)[kept].max() < 0.1
 
 
-def test_an_all_black_image_is_flat_flagged_and_hardly_counts() -> None:
+def test_an_all_black_image_is_flat_flagged_and_hardly_counts():
     field, depth, _ = scene_of(GLOSSY)
     found = solved(replace(field, ratio=0.0 * field.ratio), depth, GLOSSY)
     assert ((found.flags & int(Flag.DARK)) != 0).all()
@@ -238,7 +217,7 @@ def test_an_all_black_image_is_flat_flagged_and_hardly_counts() -> None:
     assert not found.slope_y.any()
 
 
-def test_outside_is_firm_flat_ground_and_a_hole_inside_is_led_by_what_is_around() -> None:
+def test_outside_is_firm_flat_ground_and_a_hole_inside_is_led_by_what_is_around():
     field, depth, normals = scene_of(MATT)
     inside = (POINTS[..., 0] - 1.0) ** 2 + POINTS[..., 1] ** 2 < 9.0
     hole = (POINTS[..., 0] - 1.5) ** 2 + (POINTS[..., 1] - 0.5) ** 2 < 0.2
@@ -251,7 +230,7 @@ def test_outside_is_firm_flat_ground_and_a_hole_inside_is_led_by_what_is_around(
     assert angle_deg(found.normals, normals)[inside & ~hole].max() < 0.1
 
 
-def test_walls_steeper_than_can_be_seen_are_held_and_flagged() -> None:
+def test_walls_steeper_than_can_be_seen_are_held_and_flagged():
     field, depth, _ = scene_of(MATT)
     ratio = np.zeros_like(field.ratio)
     ratio[..., 1] = ratio[..., 2] = 3.0  # brighter than any wall
@@ -260,3 +239,17 @@ def test_walls_steeper_than_can_be_seen_are_held_and_flagged() -> None:
     steep = found.normals[..., 2] > -0.1501
     assert ((found.flags[steep] & int(Flag.NOT_OBSERVABLE)) != 0).all()
     assert np.isfinite(found.slope_x).all()
+
+
+def test_a_channel_seen_at_a_cosine_that_no_ball_showed_is_flagged():
+    field, depth, normals = scene_of(MATT)
+    place = np.concatenate([POINTS + depth[..., None] * DRIFT, -depth[..., None]], axis=-1)
+    away = LEDS[1] - place
+    cosines = (away * normals).sum(-1) / np.linalg.norm(away, axis=-1)
+    limit = float(np.percentile(cosines, 90))
+    coverage = ((-1.0, 2.0), (-1.0, limit), (-1.0, 2.0))
+    flags = solve(field, depth.astype(np.float32), LEDS, MATT, coverage=coverage).flags
+    far = (flags & int(Flag.EXTRAPOLATED)) != 0
+    clear = np.abs(cosines - limit) > 1e-3
+    np.testing.assert_array_equal(far[clear], (cosines > limit)[clear])
+    assert far[clear].any()

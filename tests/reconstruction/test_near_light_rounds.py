@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from compiled import ShadedField, solve
+from compiled import ShadedField, field_of, full_model, solve
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
@@ -44,20 +44,7 @@ def dent(
         lit = np.clip((away * np.expand_dims(facing, -2)).sum(-1) / r, 0.0, None)
         shown.append(lit * -away[..., 2] / r**3)
     ratio = np.asarray(shown[0] / shown[1], np.float32)
-    whole = np.ones(depth.shape, bool)
-    field = ShadedField(
-        ratio,
-        np.full_like(ratio, 0.002),
-        np.ones_like(ratio),
-        np.zeros(ratio.shape, bool),
-        whole,
-        whole,
-        DRIFT.astype(np.float32),
-        X,
-        Y,
-    )
-    full = FullModel(leds, 0.0 * leds, Membrane(), ratio, 0.7, 0.01, (0.0, 0.0), "mirror")
-    return field, full, depth
+    return field_of(ratio, DRIFT, X, Y, sigma=0.002), full_model(Membrane(), leds), depth
 
 
 def coarsen(field: ShadedField, factor: int) -> ShadedField:
@@ -68,17 +55,10 @@ def coarsen(field: ShadedField, factor: int) -> ShadedField:
         whole = np.ascontiguousarray(values[: rows * factor, : columns * factor])
         return np.asarray(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA))
 
-    everywhere = np.ones((rows, columns), bool)
-    return ShadedField(
-        average(field.ratio),
-        average(field.sigma) / np.float32(factor),
-        average(field.around),
-        np.zeros((rows, columns, 3), bool),
-        everywhere,
-        everywhere,
-        average(field.ray_slope),
-        field.x_mm[: columns * factor].reshape(columns, factor).mean(axis=1),
-        field.y_mm[: rows * factor].reshape(rows, factor).mean(axis=1),
+    x_mm = field.x_mm[: columns * factor].reshape(columns, factor).mean(axis=1)
+    y_mm = field.y_mm[: rows * factor].reshape(rows, factor).mean(axis=1)
+    return field_of(
+        average(field.ratio), average(field.ray_slope), x_mm, y_mm, sigma=0.002 / factor
     )
 
 
@@ -108,7 +88,7 @@ def rms(found: Array, expected: Array) -> float:
     return float(np.sqrt(np.mean((found - expected) ** 2)))
 
 
-def test_an_ordinary_press_is_not_damped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_ordinary_press_is_not_damped(monkeypatch):
     """Not a bit of its depth changes, nor the number of rounds."""
     field, full, depth = dent(1.5, 2.0, 13.7)
     found, changes, stopped = solved(field, full)
@@ -123,8 +103,8 @@ def test_an_ordinary_press_is_not_damped(monkeypatch: pytest.MonkeyPatch) -> Non
     ("depth_mm", "width_mm", "led_height_mm"), [(1.5, 3.5, 5.0), (2.5, 3.5, 7.0)]
 )
 def test_under_low_lights_damped_rounds_stay_near_where_others_leap_away(
-    depth_mm: float, width_mm: float, led_height_mm: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    depth_mm, width_mm, led_height_mm, monkeypatch
+):
     field, full, depth = dent(depth_mm, width_mm, led_height_mm)
     found, _, stopped = solved(field, full)
     assert stopped != "done"
@@ -134,7 +114,7 @@ def test_under_low_lights_damped_rounds_stay_near_where_others_leap_away(
     assert found.max() < led_height_mm
 
 
-def test_a_deep_press_that_was_damped_and_settled_is_right_and_says_so() -> None:
+def test_a_deep_press_that_was_damped_and_settled_is_right_and_says_so():
     field, full, depth = dent(3.0, 3.5, 13.7)
     found, changes, stopped = solved(field, full)
     assert stopped == "damped"

@@ -28,7 +28,7 @@ def lopsided(points: np.ndarray) -> np.ndarray:
     return np.stack([-x / 2 * bump, -2 * y * bump], axis=-1)
 
 
-def test_known_slopes_are_found_with_their_signs() -> None:
+def test_known_slopes_are_found_with_their_signs():
     field = solved(scene.raw_image(lopsided, CALIBRATION))
     expected = lopsided(CALIBRATION.table.grid.points_mm())
     seen = field.flags & int(Flag.OUTSIDE) == 0
@@ -37,7 +37,7 @@ def test_known_slopes_are_found_with_their_signs() -> None:
     np.testing.assert_allclose(field.slope_y[seen], expected[seen][:, 1], atol=0.02)
 
 
-def test_the_fused_pass_is_the_plain_mathematics() -> None:
+def test_the_fused_pass_is_the_plain_mathematics():
     raw = scene.raw_image(lopsided, CALIBRATION)
     raw8 = np.round(np.clip(raw, 0, 1) * 255).astype(np.uint8)
     field = solved(raw8)
@@ -50,7 +50,7 @@ def test_the_fused_pass_is_the_plain_mathematics() -> None:
     assert np.abs(depth - plain)[seen].max() < 2e-3
 
 
-def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
+def test_bad_pixels_are_flagged_and_the_rest_is_unchanged():
     raw = scene.raw_image(lopsided, CALIBRATION)
     bad = raw.copy()
     bad[100, 120] = np.nan
@@ -71,7 +71,7 @@ def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
     assert np.isfinite(Reconstructor(CALIBRATION).depth(bad).depth_mm).all()
 
 
-def test_an_image_of_another_size_is_refused_with_both_sizes() -> None:
+def test_an_image_of_another_size_is_refused_with_both_sizes():
     with pytest.raises(InputError, match="320x240x3") as refusal:
         Reconstructor(CALIBRATION).depth(np.zeros((480, 640, 3), np.uint8), name="other.png")
     assert "640x480x3" in str(refusal.value)

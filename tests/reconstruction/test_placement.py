@@ -33,7 +33,7 @@ def seen_along_rays(depth_of: object, ray_slope: Array) -> Array:
     for _ in range(60):
         middle = 0.5 * (low + high)
         place = POINTS + middle[..., None] * ray_slope
-        above = middle > depth_of(place[..., 0], place[..., 1])  # type: ignore[operator]
+        above = middle > depth_of(place[..., 0], place[..., 1])
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return 0.5 * (low + high)
 
@@ -51,7 +51,7 @@ def inner(margin: int = 10) -> tuple[slice, slice]:
     return slice(margin, -margin), slice(margin, -margin)
 
 
-def test_a_bump_stands_at_its_true_place() -> None:
+def test_a_bump_stands_at_its_true_place():
     ray_slope = leaning(POINTS)
     seen = seen_along_rays(lopsided_depth, ray_slope).astype(np.float32)
     truth = lopsided_depth(POINTS[..., 0], POINTS[..., 1])
@@ -63,7 +63,7 @@ def test_a_bump_stands_at_its_true_place() -> None:
     assert not folded[inner()].any()
 
 
-def test_every_place_knows_the_ray_that_sees_it() -> None:
+def test_every_place_knows_the_ray_that_sees_it():
     ray_slope = leaning(POINTS)
     seen = seen_along_rays(lopsided_depth, ray_slope)
     column, row, _ = place_on_grid(seen.astype(np.float32), ray_slope.astype(np.float32), X, Y)
@@ -77,7 +77,7 @@ def test_every_place_knows_the_ray_that_sees_it() -> None:
     assert np.abs(row - expected_row)[inner()].max() < 0.02
 
 
-def test_upright_rays_and_a_flat_membrane_change_nothing() -> None:
+def test_upright_rays_and_a_flat_membrane_change_nothing():
     depth = lopsided_depth(POINTS[..., 0], POINTS[..., 1]).astype(np.float32)
     column, row, folded = place_on_grid(depth, np.zeros((*depth.shape, 2), np.float32), X, Y)
     np.testing.assert_array_equal(resample(depth, column, row), depth)
@@ -89,7 +89,7 @@ def test_upright_rays_and_a_flat_membrane_change_nothing() -> None:
 
 
 @pytest.mark.parametrize("axis", [0, 1])
-def test_the_floor_hidden_behind_a_wall_is_flagged(axis: int) -> None:
+def test_the_floor_hidden_behind_a_wall_is_flagged(axis):
     """Rays lean by 0.3 per mm, so a wall 1 mm high hides a strip of 0.3 mm behind it."""
     lean = 0.3
     along = POINTS[..., axis]

@@ -72,7 +72,7 @@ def pressed(known: KnownSensor, sensor: Reconstructor) -> Maps:
     return at
 
 
-def test_a_smooth_top_loses_an_eighth_of_its_laplacian() -> None:
+def test_a_smooth_top_loses_an_eighth_of_its_laplacian():
     x, y = np.meshgrid(*[H * np.arange(-20, 21) + 0.03] * 2)
     depth = np.maximum(1.0 - (x**2 + y**2) / 4.0, 0.0).astype(np.float32)
     top, lost = lost_at_top(depth)
@@ -80,7 +80,7 @@ def test_a_smooth_top_loses_an_eighth_of_its_laplacian() -> None:
     assert lost == pytest.approx(H**2 / 8.0, rel=0.02)
 
 
-def test_a_kink_loses_in_proportion_to_the_distance_of_the_nodes() -> None:
+def test_a_kink_loses_in_proportion_to_the_distance_of_the_nodes():
     """The mean of a cone of slope 1 over a square node is 0.38 of the node below its tip."""
     x, y = np.meshgrid(*[H * np.arange(-20, 21)] * 2)
     sharp = np.maximum(1.0 - np.hypot(x, y), 0.0).astype(np.float32)
@@ -89,7 +89,7 @@ def test_a_kink_loses_in_proportion_to_the_distance_of_the_nodes() -> None:
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.005])
-def test_a_face_loses_nothing_although_its_edge_is_sharp(tilt: float) -> None:
+def test_a_face_loses_nothing_although_its_edge_is_sharp(tilt):
     x, y = np.meshgrid(*[H * np.arange(-40, 41)] * 2)
     noise = np.random.default_rng(1).normal(0.0, 1e-3, x.shape)
     away = np.maximum(np.maximum(np.abs(x), np.abs(y)) - 2.0, 0.0)
@@ -100,9 +100,7 @@ def test_a_face_loses_nothing_although_its_edge_is_sharp(tilt: float) -> None:
 
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("name", ["ball 2", "ball 0.5", "ball 0.25"])
-def test_small_balls_are_within_their_deviations_in_every_effort(
-    pressed: Maps, name: str, effort: str
-) -> None:
+def test_small_balls_are_within_their_deviations_in_every_effort(pressed, name, effort):
     ball = OBJECTS[name]
     assert isinstance(ball, Ball)
     found = measure_heightmap(pressed(name, effort), shape="ball")
@@ -117,9 +115,7 @@ def test_small_balls_are_within_their_deviations_in_every_effort(
     ("name", "efforts"),
     [("needle", EFFORTS), ("ball 0.25", EFFORTS[:2]), ("wire 0.3", EFFORTS[:1])],
 )
-def test_tips_finer_than_the_nodes_are_doubtful(
-    pressed: Maps, name: str, efforts: tuple[str, ...]
-) -> None:
+def test_tips_finer_than_the_nodes_are_doubtful(pressed, name, efforts):
     for effort in efforts:
         found = pressed(name, effort)
         assert [f.key for f in found.doubts] == ["too_coarse"]
@@ -130,15 +126,13 @@ def test_tips_finer_than_the_nodes_are_doubtful(
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
-def test_what_the_nodes_resolve_is_not_doubted(pressed: Maps, effort: str) -> None:
+def test_what_the_nodes_resolve_is_not_doubted(pressed, effort):
     for name in ("ball 2", "cylinder", "cuboid", "plate", "square plate"):
         assert not pressed(name, effort).doubts
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
-def test_shallow_plates_are_within_their_deviations_in_every_effort(
-    pressed: Maps, effort: str
-) -> None:
+def test_shallow_plates_are_within_their_deviations_in_every_effort(pressed, effort):
     for name, shape in (("plate", "cylinder"), ("square plate", "cuboid")):
         found = measure_heightmap(pressed(name, effort), shape=shape)
         off_mm = found.height_mm - OBJECTS[name].depth_mm
@@ -146,9 +140,7 @@ def test_shallow_plates_are_within_their_deviations_in_every_effort(
         assert found.sd["height_mm"] < 2e-3
 
 
-def test_an_edge_is_not_taken_for_a_large_fillet_where_nodes_do_not_resolve_the_drape(
-    pressed: Maps,
-) -> None:
+def test_an_edge_is_not_taken_for_a_large_fillet_where_nodes_do_not_resolve_the_drape(pressed):
     found = measure_heightmap(pressed("wide cuboid", "fast"), shape="cuboid")
     assert found.edge_radius_mm == pytest.approx(0.05, abs=0.1)
     assert abs(found.size_mm - 6.0) < 2.0 * found.size_sd_mm

@@ -11,7 +11,7 @@ from gelpolight_core.reconstruction.near_light.ratio import inverse_of_blur
 
 @pytest.mark.parametrize("blur_px", [0.5, 0.75])
 @pytest.mark.parametrize("period_px", [8.0, 16.0, 40.0])
-def test_a_blurred_wave_gets_its_height_back(blur_px: float, period_px: float) -> None:
+def test_a_blurred_wave_gets_its_height_back(blur_px, period_px):
     across = np.cos(2.0 * np.pi * np.arange(400) / period_px)
     wave = np.tile(across, (60, 1)).astype(np.float32)
     # A Gaussian lowers a wave by this much, wherever it lies between the pixels.
@@ -21,5 +21,5 @@ def test_a_blurred_wave_gets_its_height_back(blur_px: float, period_px: float) -
     assert np.abs(low).max() < np.abs(back).max()
 
 
-def test_even_light_stays_as_it_is() -> None:
+def test_even_light_stays_as_it_is():
     assert float(inverse_of_blur(0.5).sum()) == pytest.approx(1.0, abs=1e-6)

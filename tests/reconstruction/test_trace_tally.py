@@ -9,7 +9,7 @@ PRESSED = Trace("fast", (TraceStep("looking", True, "", 1.0), TraceStep("solving
 EMPTY = Trace("fast", (TraceStep("looking", True, "", 1.0), TraceStep("solving", False, "why")))
 
 
-def test_steps_are_counted_and_what_was_left_out_has_saved_its_time() -> None:
+def test_steps_are_counted_and_what_was_left_out_has_saved_its_time():
     tally = TraceTally()
     for second in range(30):
         tally.add(PRESSED if second % 3 == 0 else EMPTY, float(second))

@@ -38,11 +38,9 @@ class Repeats:
         """Flat ground, the plateau, and its wall."""
         x, y = np.meshgrid(self.stated.x_mm, self.stated.y_mm)
         good = (np.hypot(x, y) < 11.5) & (self.stated.flags == 0)
-        assert self.stated.normals is not None
         slope = np.hypot(*np.moveaxis(self.stated.normals[..., :2], -1, 0))
         steep = slope > 0.5 * np.abs(self.stated.normals[..., 2])
         away = self.distance_mm
-        assert self.stated.depth_sd_mm is not None
         solved = self.stated.depth_sd_mm > 0.0
         return {
             "flat": good & solved & (away > 5),
@@ -51,7 +49,7 @@ class Repeats:
         }
 
 
-DESIGN = SensorDesign().scaled(0.5)
+DESIGN = SensorDesign().scaled(0.25)
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +68,7 @@ def light() -> NDArray[np.float64]:
 
 @pytest.fixture(scope="module", params=[1.0, 4.0], ids=["8-bit, 43 dB", "8-bit, 31 dB"])
 def repeats(
-    request: pytest.FixtureRequest, light: NDArray[np.float64], virtual_calibration: Calibration
+    request: pytest.FixtureRequest, light: NDArray[np.float64], small_calibration: Calibration
 ) -> Repeats:
     """Take the image of the press again and again."""
     quiet, item = DESIGN.camera, DESIGN.presses[1]
@@ -80,7 +78,7 @@ def repeats(
         read_sd=quiet.read_sd * request.param,
     )
     random = np.random.default_rng(11)
-    reconstruct = Reconstructor(virtual_calibration)
+    reconstruct = Reconstructor(small_calibration)
     maps = [
         reconstruct.depth(exposed(light, camera, random), uncertainty=k == 0)
         for k in range(REPEATS)
@@ -98,21 +96,19 @@ def repeats(
 
 
 @pytest.mark.parametrize("region", ["flat", "cap", "wall"])
-def test_depth_and_slopes_scatter_by_what_is_stated(repeats: Repeats, region: str) -> None:
+def test_depth_and_slopes_scatter_by_what_is_stated(repeats, region):
     here = repeats.regions()[region]
-    assert here.sum() > 500
+    assert here.sum() > 125
     pairs = (
         (repeats.stated.depth_sd_mm, repeats.depth_sd_mm),
         (repeats.stated.slope_sd, repeats.slope_sd),
     )
     for stated, seen in pairs:
-        assert stated is not None
         assert 1.0 / HONEST < np.median(stated[here] / seen[here]) < HONEST
 
 
-def test_measured_sizes_scatter_by_what_is_stated(repeats: Repeats) -> None:
+def test_measured_sizes_scatter_by_what_is_stated(repeats):
     stated = repeats.measured[0].noise_sd
-    assert stated is not None
     height = np.std([m.height_mm for m in repeats.measured], ddof=1)
     assert 1.0 / HONEST < stated["height_mm"] / height < HONEST
     # The fit's weights move with the noise too, which its last step does not show: walls scatter
@@ -123,12 +119,9 @@ def test_measured_sizes_scatter_by_what_is_stated(repeats: Repeats) -> None:
     assert repeats.measured[0].size_sd_mm > 2.0 * diameter
 
 
-def test_the_whole_deviation_covers_noise_and_calibration(repeats: Repeats) -> None:
+def test_the_whole_deviation_covers_noise_and_calibration(repeats):
     first = repeats.measured[0]
     scale = repeats.stated.depth_scale_sd
-    assert first.noise_sd is not None
-    assert first.calibration_sd is not None
-    assert scale is not None
     # Walls steeper than the balls of the calibration add to it.
     assert 0.95 < first.calibration_sd["height_mm"] / (scale * first.height_mm) < 3.0
     for key in ("height_mm", "diameter_mm", "drape_decay_mm"):
@@ -139,15 +132,11 @@ def test_the_whole_deviation_covers_noise_and_calibration(repeats: Repeats) -> N
     assert abs(first.size_mm - 5.0) < 3.0 * first.size_sd_mm
 
 
-def test_beside_the_solved_region_nothing_scatters_and_what_is_left_out_is_stated(
-    repeats: Repeats,
-) -> None:
+def test_beside_the_solved_region_nothing_scatters_and_what_is_left_out_is_stated(repeats):
     """There the depth is 0 in every repeat; true is what the drape still has."""
     stated = repeats.stated
     x, y = np.meshgrid(stated.x_mm, stated.y_mm)
     assert stated.depth_sd_mm is not None
-    assert stated.depth_model_sd_mm is not None
-    assert stated.slope_model_sd is not None
     beside = (stated.depth_sd_mm == 0.0) & (np.hypot(x, y) < 11.5)
     if not beside.any():
         pytest.skip("so noisy an image is solved everywhere")
@@ -162,25 +151,22 @@ def test_beside_the_solved_region_nothing_scatters_and_what_is_left_out_is_state
     assert np.sqrt(np.mean(true_slope**2)) < np.median(stated.slope_model_sd[beside])
 
 
-def test_the_models_own_error_is_where_the_membrane_is_pressed(repeats: Repeats) -> None:
+def test_the_models_own_error_is_where_the_membrane_is_pressed(repeats):
     model = repeats.stated.slope_model_sd
-    assert model is not None
     parts = repeats.regions()
     assert np.median(model[parts["wall"]]) > 5.0 * np.median(model[parts["flat"]])
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, np.nan])
-def test_an_image_without_information_has_finite_deviations(
-    virtual_calibration: Calibration, value: float
-) -> None:
-    camera = virtual_calibration.camera
-    rgb = np.full((camera.height, camera.width, 3), value, np.float32)
-    found = Reconstructor(virtual_calibration).depth(rgb, uncertainty=True)
-    for name in (*SD_MAPS, "noise_mm"):
-        assert np.isfinite(getattr(found, name)).all(), name
+def test_an_image_without_information_has_finite_deviations(small_calibration):
+    camera = small_calibration.camera
+    for value in (0.0, 1.0, np.nan):
+        rgb = np.full((camera.height, camera.width, 3), value, np.float32)
+        found = Reconstructor(small_calibration).depth(rgb, uncertainty=True)
+        for name in (*SD_MAPS, "noise_mm"):
+            assert np.isfinite(getattr(found, name)).all(), name
 
 
-def test_a_wall_is_known_to_its_node() -> None:
+def test_a_wall_is_known_to_its_node():
     """The depth of a step that lies anywhere within a node scatters as stated beside it."""
     pitch, slope = 0.1, 2.0
     x = pitch * np.arange(40.0)

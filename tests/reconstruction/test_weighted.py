@@ -44,7 +44,7 @@ def plateau(edge_mm: float = 0.35) -> tuple[Array, Array, Array, Array]:
     return depth, fall * u / safe, fall * v / safe * 1.25, r
 
 
-def test_a_known_surface_comes_back() -> None:
+def test_a_known_surface_comes_back():
     depth, slope_x, slope_y = lopsided()
     found = integrate_weighted(*single(slope_x, slope_y, np.ones_like(depth)), pitch_mm=PITCH)
     assert found.converged
@@ -55,13 +55,13 @@ def test_a_known_surface_comes_back() -> None:
 
 @settings(max_examples=12, deadline=None)
 @given(st.integers(0, 999), st.floats(0.02, 0.2))
-def test_even_weights_are_the_plain_integration_also_of_noise(seed: int, noise: float) -> None:
+def test_even_weights_are_the_plain_integration_also_of_noise(seed, noise):
     """Noise is not integrable: both must strike the same balance, not only find what fits."""
     random = np.random.default_rng(seed)
     _, slope_x, slope_y = lopsided()
     noisy = [s + noise * random.normal(size=s.shape) for s in (slope_x, slope_y)]
     for s in noisy:  # next to the border the two have different edge integrals
-        s[:5] = s[-5:] = s[:, :5] = s[:, -5:] = 0.0  # type: ignore[call-overload]
+        s[:5] = s[-5:] = s[:, :5] = s[:, -5:] = 0.0
     maps = single(*noisy, np.ones_like(slope_x))
     solver = PoissonSolver(ROWS, COLUMNS, pitch_mm=PITCH)
     expected = solver.integrate(maps[0], maps[1]).depth_mm
@@ -72,9 +72,7 @@ def test_even_weights_are_the_plain_integration_also_of_noise(seed: int, noise: 
 
 
 @pytest.mark.parametrize("sector_deg", [60.0, 150.0, 300.0])
-def test_wrong_slopes_that_are_not_trusted_leave_the_plateau_at_its_height(
-    sector_deg: float,
-) -> None:
+def test_wrong_slopes_that_are_not_trusted_leave_the_plateau_at_its_height(sector_deg):
     """A wall in shadow: on part of the ring the slopes are nonsense and weighted down."""
     depth, slope_x, slope_y, r = plateau()
     angle = np.degrees(np.arctan2(YY + 0.3, XX - 0.5)) % 360.0
@@ -92,7 +90,7 @@ def test_wrong_slopes_that_are_not_trusted_leave_the_plateau_at_its_height(
     assert np.abs(found.depth_mm[top] - 1.0).max() < 0.03
 
 
-def test_the_least_squares_balance_is_the_dense_one() -> None:
+def test_the_least_squares_balance_is_the_dense_one():
     """On a small grid against numpy's least squares with the same edges and border."""
     random = np.random.default_rng(5)
     rows, columns, pitch = 7, 9, 0.3
@@ -141,7 +139,7 @@ def test_the_least_squares_balance_is_the_dense_one() -> None:
     np.testing.assert_allclose(found.depth_mm, expected, atol=1e-5)
 
 
-def test_rounds_that_do_not_suffice_are_reported() -> None:
+def test_rounds_that_do_not_suffice_are_reported():
     """A tolerance below single precision cannot be reached."""
     random = np.random.default_rng(2)
     slope_x, slope_y = random.normal(size=(2, ROWS, COLUMNS))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -38,7 +36,7 @@ def recomputed(project: Project) -> StageStatus:
     return project.compute("reflectance")
 
 
-def test_good_presses_agree_with_each_other(small_project: Project) -> None:
+def test_good_presses_agree_with_each_other(small_project):
     results = small_project.results
     found = compared(results, results[BALLS].images)
     assert len(found) == len(results[BALLS].presses)
@@ -48,9 +46,7 @@ def test_good_presses_agree_with_each_other(small_project: Project) -> None:
 
 
 @pytest.mark.parametrize("stated", [8.0, 3.0])
-def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
-    stated: float, computed_project: Callable[[], Project]
-) -> None:
+def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(stated, computed_project):
     """The ball has a radius of 4 mm."""
     project = computed_project()
     project.set_ball_radius(ODD, stated)
@@ -59,7 +55,6 @@ def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
     assert status.quality["press_radius_percent"].verdict is Verdict.FAIL
     assert ODD.removesuffix(".png") in status.sentence
     reflectance = project.results[REFLECTANCE].table
-    assert reflectance is not None
     (odd,) = [a for a in reflectance.agreements if a.fault]
     assert odd.name.endswith(ODD)
     assert odd.radius_mm == pytest.approx(4.0, rel=0.08)
@@ -70,7 +65,7 @@ def test_a_wrong_radius_fails_the_step_and_the_right_one_is_offered(
     assert recomputed(project).quality["press_radius_percent"].verdict is Verdict.PASS
 
 
-def test_a_misplaced_circle_is_named(computed_project: Callable[[], Project]) -> None:
+def test_a_misplaced_circle_is_named(computed_project):
     project = computed_project()
     results = project.results
     press = next(p for p in results[BALLS].presses if p.name.endswith(ODD))
@@ -82,11 +77,10 @@ def test_a_misplaced_circle_is_named(computed_project: Callable[[], Project]) ->
     status = recomputed(project)
     assert status.state is not StageState.PASS
     reflectance = project.results[REFLECTANCE].table
-    assert reflectance is not None
     assert [a.name for a in reflectance.agreements if a.fault] == [f"balls/{ODD}"]
 
 
-def test_dirt_on_a_contact_is_named(small_project: Project) -> None:
+def test_dirt_on_a_contact_is_named(small_project):
     results = small_project.results
     mask = contact_mask(results[BALLS].presses[1], results[TOP_POSE].table)
     columns = np.nonzero(mask)[1]

@@ -19,14 +19,14 @@ from gelpolight_core.reflectance.ball import (
 )
 
 
-def test_depth_and_contact_radius_agree_with_a_rendered_ball() -> None:
+def test_depth_and_contact_radius_agree_with_a_rendered_ball():
     """Figures of a ball pressed into an elastic foundation of 0.7 mm decay, solved elsewhere."""
     assert ball_depth_from_contact(1.558946, 3.0) == pytest.approx(0.7898, abs=2e-4)
     assert contact_radius_from_depth(0.7898, 3.0) == pytest.approx(1.558946, abs=5e-4)
 
 
 @given(st.floats(0.3, 0.9), st.floats(1.0, 8.0))
-def test_contact_and_depth_are_each_others_inverse(share: float, radius: float) -> None:
+def test_contact_and_depth_are_each_others_inverse(share, radius):
     contact = share * radius
     depth = ball_depth_from_contact(contact, radius)
     assert contact_radius_from_depth(depth, radius) == pytest.approx(contact, rel=1e-6)
@@ -34,8 +34,8 @@ def test_contact_and_depth_are_each_others_inverse(share: float, radius: float) 
 
 @given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
 def test_rays_meet_the_ball_on_its_surface_on_the_side_of_the_camera(
-    x: float, y: float, ray_slope_x: float, ray_slope_y: float
-) -> None:
+    x, y, ray_slope_x, ray_slope_y
+):
     pose = BallPose((0.0, 0.0), 3.0, 1.0)
     surface, normal = ball_surface(np.array([[x, y]]), np.array([[ray_slope_x, ray_slope_y]]), pose)
     assert np.linalg.norm(surface[0] - [0.0, 0.0, 2.0]) == pytest.approx(3.0)
@@ -77,9 +77,7 @@ def shaded(pose: BallPose, glossy: float, exponent: float) -> ShadedPixels:
     st.floats(-0.32, 0.32),
     st.floats(0.8, 1.3),
 )
-def test_the_shading_pulls_a_wrong_centre_to_the_right_place(
-    x: float, y: float, off_x: float, off_y: float, exponent: float
-) -> None:
+def test_the_shading_pulls_a_wrong_centre_to_the_right_place(x, y, off_x, off_y, exponent):
     pixels = shaded(BallPose((x, y), 3.0, 0.9), 0.0, exponent)
     found, misfit, sd = refine_centre(
         pixels, BallPose((x + off_x, y + off_y), 3.0, 0.9), scene.LEDS
@@ -89,7 +87,7 @@ def test_the_shading_pulls_a_wrong_centre_to_the_right_place(
     assert sd < 0.01
 
 
-def test_a_glossy_membrane_moves_the_centre_less_than_the_bar() -> None:
+def test_a_glossy_membrane_moves_the_centre_less_than_the_bar():
     pixels = shaded(BallPose((4.0, -3.0), 3.0, 0.9), 0.25, 1.0)
     found, _, _ = refine_centre(pixels, BallPose((4.1, -3.1), 3.0, 0.9), scene.LEDS)
     np.testing.assert_allclose(found.centre_mm, [4.0, -3.0], atol=0.05)

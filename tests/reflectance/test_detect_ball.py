@@ -58,9 +58,9 @@ def off(found: BallDetection, x: float, y: float) -> float:
 
 
 @pytest.mark.parametrize(("pitch", "diameter"), [(20.0, 6.0), (30.0, 10.0)])
-def test_balls_are_found_among_printed_dots(pitch: float, diameter: float) -> None:
+def test_balls_are_found_among_printed_dots(pitch, diameter):
     errors, in_sd = [], []
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         press = (rng.uniform(80, 240), rng.uniform(80, 160), rng.uniform(22, 45))
         found = detect_ball(*marked_scene(press, pitch=pitch, diameter=diameter, seed=seed))
@@ -78,9 +78,9 @@ def test_balls_are_found_among_printed_dots(pitch: float, diameter: float) -> No
 # -- what is known of the uncertainty -------------------------------------------------------------
 
 
-def test_stated_uncertainty_covers_the_error_of_noisy_and_textured_presses() -> None:
+def test_stated_uncertainty_covers_the_error_of_noisy_and_textured_presses():
     held = []
-    for seed in range(20):
+    for seed in range(10):
         rng = np.random.default_rng(seed)
         x, y, radius = rng.uniform(80, 240), rng.uniform(80, 160), rng.uniform(20, 50)
         grain = 1.0 + 0.3 * cv2.GaussianBlur(rng.standard_normal((HEIGHT, WIDTH)), (0, 0), 2.0)
@@ -95,9 +95,7 @@ def test_stated_uncertainty_covers_the_error_of_noisy_and_textured_presses() -> 
 
 
 @pytest.mark.parametrize(("x", "verdict"), [(18.0, Verdict.PASS), (-6.0, Verdict.WARN)])
-def test_ball_cut_by_the_border_is_named_and_warns_where_its_centre_is_unsure(
-    x: float, verdict: Verdict
-) -> None:
+def test_ball_cut_by_the_border_is_named_and_warns_where_its_centre_is_unsure(x, verdict):
     image, background = scene((x, 120.0, 35.0))
     found = detect_ball(image, background)
     assert found.reason is Reason.CUT
@@ -109,18 +107,18 @@ def test_ball_cut_by_the_border_is_named_and_warns_where_its_centre_is_unsure(
 
 
 @pytest.mark.parametrize("apart", [30.0, 55.0])
-def test_two_touching_balls_do_not_pass(apart: float) -> None:
+def test_two_touching_balls_do_not_pass(apart):
     found = detect_ball(*scene((120.0, 120.0, 30.0), (120.0 + apart, 120.0, 30.0)))
     assert found.verdict is not Verdict.PASS
 
 
-def test_contact_much_larger_than_the_stated_ball_is_refused() -> None:
+def test_contact_much_larger_than_the_stated_ball_is_refused():
     image, background = scene((150.0, 120.0, 45.0))
     assert detect_ball(image, background, ball_radius_px=82.0).reason is Reason.OK
     assert detect_ball(image, background, ball_radius_px=20.0).reason is not Reason.OK
 
 
-def test_an_image_that_cannot_be_used_is_an_answer_and_no_exception() -> None:
+def test_an_image_that_cannot_be_used_is_an_answer_and_no_exception():
     image, background = scene((150.0, 120.0, 35.0))
     for bad in (np.zeros_like(image), np.ones_like(image), image[:, :300]):
         found = detect_ball(bad, background)
@@ -201,23 +199,22 @@ def pressed(thing: str) -> tuple[Image, Image]:
 
 
 @pytest.mark.parametrize("thing", THINGS)
-def test_other_objects_are_no_balls(thing: str) -> None:
+def test_other_objects_are_no_balls(thing):
     found = detect_ball(*pressed(thing))
     assert found.indentation is None
     assert found.reason in {Reason.FLAT, Reason.NOT_ROUND, Reason.NOT_A_BALL, Reason.TOO_SMALL}
 
 
-def test_markers_are_named_where_they_hide_what_is_pressed() -> None:
+def test_markers_are_named_where_they_hide_what_is_pressed():
     print_of_dots = dots(18.0, 12.0, None)[..., None].astype(np.float32)
     image, background = (light * print_of_dots for light in pressed("coin"))
     found = detect_ball(image, background)
     assert found.reason is Reason.MARKERS
-    assert found.refusal is not None
     assert "markers" in found.refusal.found
 
 
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-C"])
-def test_rendered_cylinders_and_cuboids_are_no_balls(shared_data: Path, sensor: str) -> None:
+def test_rendered_cylinders_and_cuboids_are_no_balls(shared_data, sensor):
     background = read_rgb(shared_data / sensor / "background" / "background.png")
     for file in sorted((shared_data / sensor / "presses").glob("*.png"))[::2]:
         assert detect_ball(read_rgb(file), background).indentation is None, file.name
@@ -258,7 +255,7 @@ def labelled(folder: Path) -> Iterator[tuple[Image, float, float, float]]:
 
 
 @pytest.mark.parametrize("name", GOALS)
-def test_real_balls_are_found_where_a_person_sees_them(shared_data: Path, name: str) -> None:
+def test_real_balls_are_found_where_a_person_sees_them(shared_data, name):
     folder = shared_data / "real" / "closed" / name
     background = read_rgb(folder / "background" / "background.png")
     errors, held, count = [], [], 0

@@ -71,7 +71,7 @@ decays = st.floats(0.4, 1.2)
 
 @settings(max_examples=40, deadline=None)
 @given(poses, decays, st.integers(0, 99))
-def test_upright_rays_see_the_simulators_drape(pose: BallPose, decay: float, seed: int) -> None:
+def test_upright_rays_see_the_simulators_drape(pose, decay, seed):
     points = field(pose, 2.5 * decay + pose.radius_mm, 200, seed)
     surface, _, on_ball = draped_ball(points, np.zeros_like(points), pose, decay_mm=decay)
     np.testing.assert_allclose(surface[:, :2], points, atol=1e-12)
@@ -83,28 +83,22 @@ def test_upright_rays_see_the_simulators_drape(pose: BallPose, decay: float, see
     np.testing.assert_array_equal(on_ball[clear], (r < b)[clear])
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(poses, decays, st.floats(-0.25, 0.25), st.floats(-0.25, 0.25))
-def test_leaning_rays_end_where_a_ray_march_ends(
-    pose: BallPose, decay: float, ray_slope_x: float, ray_slope_y: float
-) -> None:
-    points = field(pose, 2.0 * decay + pose.radius_mm, 15, 1)
+def test_leaning_rays_end_where_a_ray_march_ends_with_normals_square_to_the_surface(
+    pose, decay, ray_slope_x, ray_slope_y
+):
+    points = field(pose, 2.0 * decay + pose.radius_mm, 100, 1)
     ray_slope = np.tile([ray_slope_x, ray_slope_y], (len(points), 1))
-    surface, _, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
-    expected = [marched_depth(p, w, pose, decay) for p, w in zip(points, ray_slope, strict=True)]
+    surface, normals, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
+    expected = [
+        marched_depth(p, w, pose, decay) for p, w in zip(points[:15], ray_slope[:15], strict=True)
+    ]
     # Six rounds, each shrinking the error by ray slope times slope (at most 0.35): below 1 um.
-    np.testing.assert_allclose(-surface[:, 2], expected, atol=1e-3)
+    np.testing.assert_allclose(-surface[:15, 2], expected, atol=1e-3)
     np.testing.assert_allclose(
         surface[:, :2], points - surface[:, 2:] * ray_slope, atol=1e-12
     )  # on its own ray
-
-
-@settings(max_examples=30, deadline=None)
-@given(poses, decays, st.floats(-0.25, 0.25))
-def test_normals_are_square_to_the_surface(pose: BallPose, decay: float, lean: float) -> None:
-    points = field(pose, 2.0 * decay + pose.radius_mm, 100, 2)
-    ray_slope = np.tile([lean, -0.5 * lean], (len(points), 1))
-    surface, normals, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
     place, step = surface[:, :2], 1e-4
     ball = Ball(pose.radius_mm, pose.depth_mm)
     b = contact_radius(ball.profile, ball.reach_mm, decay)
@@ -125,7 +119,7 @@ def test_normals_are_square_to_the_surface(pose: BallPose, decay: float, lean: f
     assert (normals[:, 2] < 0.0).all()
 
 
-def test_the_ball_may_be_seen_exactly_at_its_lowest_point() -> None:
+def test_the_ball_may_be_seen_exactly_at_its_lowest_point():
     surface, normals, on_ball = draped_ball(
         np.zeros((1, 2)), np.zeros((1, 2)), BallPose((0.0, 0.0), 3.0, 1.0), decay_mm=0.7
     )
@@ -135,9 +129,7 @@ def test_the_ball_may_be_seen_exactly_at_its_lowest_point() -> None:
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (-6.0, 2.5), (3.0, 8.0)])
-def test_a_ball_in_a_curved_membrane_drapes_like_the_simulators(
-    centre: tuple[float, float],
-) -> None:
+def test_a_ball_in_a_curved_membrane_drapes_like_the_simulators(centre):
     pose = BallPose(centre, 3.0, 0.9)
     at_rest = MembraneDesign(working_diameter_mm=26.0, apex_height_mm=3.5)
     ball = Ball(pose.radius_mm, pose.depth_mm)
@@ -161,7 +153,7 @@ def test_a_ball_in_a_curved_membrane_drapes_like_the_simulators(
     np.testing.assert_array_equal(on_ball[clear], touched[clear] > 0.5)
 
 
-def test_far_from_a_ball_a_curved_membrane_is_at_rest() -> None:
+def test_far_from_a_ball_a_curved_membrane_is_at_rest():
     cap, points = Surface("spherical_cap", 2.0, 26.0), np.array([[9.0, -6.0], [-8.0, -8.0]])
     pose, rays = BallPose((-2.0, 3.0), 3.0, 1.0), np.array([[-0.2, 0.1], [0.2, 0.2]])
     seen, normals, on_ball = draped_ball(points, rays, pose, decay_mm=0.7, surface=cap)

@@ -32,9 +32,7 @@ def fresnel(angle: np.ndarray, index: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("thickness_mm", "window"), [(4.0, 1.41), (12.0, 1.41), (12.0, 1.6)])
-def test_an_even_matt_membrane_receives_what_its_mirror_image_shows(
-    thickness_mm: float, window: float
-) -> None:
+def test_an_even_matt_membrane_receives_what_its_mirror_image_shows(thickness_mm, window):
     axis = SIDE * (np.arange(NODES) - 0.5 * (NODES - 1))
     x, y = np.meshgrid(axis, axis)
     points = np.stack([x, y, np.zeros_like(x)], axis=-1)
@@ -54,7 +52,7 @@ def test_an_even_matt_membrane_receives_what_its_mirror_image_shows(
     assert middle.mean() / 0.3 == pytest.approx(share, rel=0.05)
 
 
-def test_a_saturated_or_dim_part_reflects_light_and_a_hole_reflects_none() -> None:
+def test_a_saturated_or_dim_part_reflects_light_and_a_hole_reflects_none():
     valid = np.array([[True, True, True, False]])
     # Saturated; without green and blue; a hole; outside.
     background = np.array([[[1.0, 0.3, 0.3], [0.4, 0.0, 0.0], [0.0, 0.0, 0.0], [0.5, 0.5, 0.5]]])
@@ -67,7 +65,7 @@ def test_a_saturated_or_dim_part_reflects_light_and_a_hole_reflects_none() -> No
 
 
 @pytest.mark.parametrize("shape", [(96, 64), (64, 112)])
-def test_a_matt_dent_receives_the_light_of_every_facet_once(shape: tuple[int, int]) -> None:
+def test_a_matt_dent_receives_the_light_of_every_facet_once(shape):
     rng = np.random.default_rng(7)
     y, x = (SIDE * (np.arange(n) - 0.4 * n) for n in shape)
     x, y = np.meshgrid(x, y)
@@ -94,7 +92,7 @@ def test_a_matt_dent_receives_the_light_of_every_facet_once(shape: tuple[int, in
     assert np.abs(found - np.array(exact)).max() < 0.05 * np.max(exact)
 
 
-def test_an_even_matt_cap_lights_itself_evenly() -> None:
+def test_an_even_matt_cap_lights_itself_evenly():
     axis = SIDE * (np.arange(NODES) - 0.5 * (NODES - 1))
     x, y = np.meshgrid(axis, axis)
     places, cap = np.stack([x, y], axis=-1), AtRest("spherical_cap", 3.5, 26.0)
@@ -111,7 +109,7 @@ def test_an_even_matt_cap_lights_itself_evenly() -> None:
     assert found == pytest.approx(3.5 / (2.0 * sphere_mm), rel=0.03)
 
 
-def test_what_is_pressed_hides_one_side_of_a_cap_from_the_other() -> None:
+def test_what_is_pressed_hides_one_side_of_a_cap_from_the_other():
     side = 0.1
     axis = side * (np.arange(272) - 135.5)
     x, y = np.meshgrid(axis, axis)

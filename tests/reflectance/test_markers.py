@@ -31,7 +31,7 @@ def dotted(image: Image, *, pitch: float, diameter: float, shift: float = 0.0) -
 
 
 @pytest.mark.parametrize(("pitch", "diameter"), [(20.0, 6.0), (36.0, 12.0), (14.0, 4.5)])
-def test_printed_dots_are_found_with_their_size_and_pitch(pitch: float, diameter: float) -> None:
+def test_printed_dots_are_found_with_their_size_and_pitch(pitch, diameter):
     image = dotted(gel(), pitch=pitch, diameter=diameter)
     found = find_markers(image)
     assert found
@@ -45,13 +45,13 @@ def test_printed_dots_are_found_with_their_size_and_pitch(pitch: float, diameter
     assert found.mask.mean() < 2.5 * dark.mean()
 
 
-def test_a_plain_gel_has_no_markers() -> None:
+def test_a_plain_gel_has_no_markers():
     assert not find_markers(gel())
     assert not no_markers((ROWS, COLUMNS)).mask.any()
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_dust_of_many_sizes_and_texture_are_no_markers(seed: int) -> None:
+def test_dust_of_many_sizes_and_texture_are_no_markers(seed):
     rng = np.random.default_rng(seed)
     image = gel(seed)
     for _ in range(60):
@@ -62,7 +62,7 @@ def test_dust_of_many_sizes_and_texture_are_no_markers(seed: int) -> None:
     assert not find_markers((gel() * grain[..., None]).astype(np.float32))
 
 
-def test_dots_that_moved_with_the_membrane_are_covered_too() -> None:
+def test_dots_that_moved_with_the_membrane_are_covered_too():
     background = dotted(gel(), pitch=20.0, diameter=6.0)
     moved = dotted(gel(1), pitch=20.0, diameter=6.0, shift=5.0)
     covered = find_markers(background).covered(moved)
@@ -71,7 +71,7 @@ def test_dots_that_moved_with_the_membrane_are_covered_too() -> None:
         assert (covered & dark)[20:-20, 20:-20].sum() > 0.98 * dark[20:-20, 20:-20].sum()
 
 
-def test_holes_are_filled_from_around_and_the_rest_is_untouched() -> None:
+def test_holes_are_filled_from_around_and_the_rest_is_untouched():
     y, x = np.indices((ROWS, COLUMNS), dtype=np.float32) / COLUMNS
     smooth = np.stack([x, y, 1.0 - x], axis=2).astype(np.float32)
     holes = np.zeros((ROWS, COLUMNS), np.bool_)

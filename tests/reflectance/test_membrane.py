@@ -65,9 +65,7 @@ directions = st.builds(direction, tilts, azimuths)
 
 
 @given(st.floats(0.0, 1.5), azimuths, st.floats(0.05, 1.0), directions)
-def test_without_gloss_it_is_lamberts_law_whatever_the_view(
-    tilt: float, azimuth: float, roughness: float, view: Array
-) -> None:
+def test_without_gloss_it_is_lamberts_law_whatever_the_view(tilt, azimuth, roughness, view):
     light = direction(tilt, azimuth)
     normal = np.array(UP)
     value = shown(Membrane(1.0, 0.0, roughness), light, normal, view)
@@ -76,9 +74,7 @@ def test_without_gloss_it_is_lamberts_law_whatever_the_view(
 
 @settings(max_examples=200)
 @given(membranes, directions, directions, st.floats(0.0, 0.4), azimuths)
-def test_the_glossy_share_is_the_published_microfacet_lobe(
-    membrane: Membrane, light: Array, normal: Array, lean: float, azimuth: float
-) -> None:
+def test_the_glossy_share_is_the_published_microfacet_lobe(membrane, light, normal, lean, azimuth):
     view = direction(lean, azimuth)
     lit, seen = float(light @ normal), float(view @ normal)
     if lit < 0.02 or seen < 0.02:
@@ -89,9 +85,7 @@ def test_the_glossy_share_is_the_published_microfacet_lobe(
 
 
 @given(membranes, directions, directions, directions)
-def test_the_brightness_is_finite_and_never_negative(
-    membrane: Membrane, light: Array, normal: Array, view: Array
-) -> None:
+def test_the_brightness_is_finite_and_never_negative(membrane, light, normal, view):
     value = shown(membrane, light, normal, view)
     assert math.isfinite(value)
     assert value >= 0.0

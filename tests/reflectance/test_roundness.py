@@ -28,21 +28,21 @@ def judged(*, stretch: float) -> Finding:
         presses.append(SimpleNamespace(indentation=SimpleNamespace(contour=contour + place + 200)))
     table = SimpleNamespace(grid=MembraneGrid(x, x, 1.0), surface=FLAT)
     dome = SimpleNamespace(grid=table.grid, surface=Surface("spherical_cap", 40.0, 400.0))
-    assert judge_roundness(presses, dome) == ()  # type: ignore[arg-type]
-    (figure,) = judge_roundness(presses, table)  # type: ignore[arg-type]
+    assert judge_roundness(presses, dome) == ()
+    (figure,) = judge_roundness(presses, table)
     return figure
 
 
-def test_round_contacts_pass() -> None:
+def test_round_contacts_pass():
     assert judged(stretch=0.0).verdict is Verdict.PASS
 
 
 @pytest.mark.parametrize("stretch", [0.03, -0.03])
-def test_contacts_that_are_stretched_towards_the_edge_are_found(stretch: float) -> None:
+def test_contacts_that_are_stretched_towards_the_edge_are_found(stretch):
     figure = judged(stretch=stretch)
     assert figure.verdict is Verdict.WARN
     assert figure.value == pytest.approx(3.0, abs=0.5)
 
 
-def test_few_presses_are_not_judged() -> None:
-    assert judge_roundness([], SimpleNamespace(grid=MembraneGrid(*[np.arange(3.0)] * 2, 1.0))) == ()  # type: ignore[arg-type]
+def test_few_presses_are_not_judged():
+    assert judge_roundness([], SimpleNamespace(grid=MembraneGrid(*[np.arange(3.0)] * 2, 1.0))) == ()

@@ -21,9 +21,7 @@ def fitted(cosines: np.ndarray, values: np.ndarray) -> ReflectanceTable:
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.6, 1.8), st.floats(0.2, 2.0), st.floats(0.0, 0.05))
-def test_a_power_law_is_recovered_through_noise_and_outliers(
-    exponent: float, gain: float, noise: float
-) -> None:
+def test_a_power_law_is_recovered_through_noise_and_outliers(exponent, gain, noise):
     rng = np.random.default_rng(5)
     cosines = rng.uniform(0.2, 0.97, 20_000)
     values = gain * cosines**exponent * (1.0 + noise * rng.normal(size=cosines.size))
@@ -34,7 +32,7 @@ def test_a_power_law_is_recovered_through_noise_and_outliers(
     np.testing.assert_allclose(table.cosine(0, gain * seen**exponent), seen, atol=0.02)
 
 
-def test_the_table_and_its_inverse_undo_each_other_and_grow() -> None:
+def test_the_table_and_its_inverse_undo_each_other_and_grow():
     cosines = RNG.uniform(0.3, 0.9, 5_000)
     table = fitted(cosines, cosines**1.3)
     every = np.linspace(0.0, 1.0, 501)
@@ -44,13 +42,13 @@ def test_the_table_and_its_inverse_undo_each_other_and_grow() -> None:
     np.testing.assert_allclose(table.cosine(1, table.response(1, inside)), inside, atol=2e-3)
 
 
-def test_what_the_balls_have_shown_is_stated() -> None:
+def test_what_the_balls_have_shown_is_stated():
     cosines = RNG.uniform(0.4, 0.8, 5_000)
     coverage = fitted(cosines, cosines).coverage[0]
     np.testing.assert_allclose(coverage, [0.4, 0.8], atol=0.02)
 
 
-def test_stray_light_is_what_a_shadow_shows() -> None:
+def test_stray_light_is_what_a_shadow_shows():
     """With light that no angle takes away, a value at its level means no direct light at all."""
     cosines = RNG.uniform(0.15, 0.95, 20_000)
     table = fitted(cosines, 0.1 + 0.9 * cosines)
@@ -58,7 +56,7 @@ def test_stray_light_is_what_a_shadow_shows() -> None:
     assert table.cosine(0, np.array(0.02)) == 0.0
 
 
-def test_the_fast_table_is_the_table() -> None:
+def test_the_fast_table_is_the_table():
     cosines = RNG.uniform(0.2, 0.95, 20_000)
     table = fitted(cosines, np.sqrt(cosines))
     lookup, scale = table.lookup(2048)
@@ -76,8 +74,6 @@ def test_the_fast_table_is_the_table() -> None:
         (np.full(5000, np.nan), np.ones(5000), "usable pixels"),
     ],
 )
-def test_a_scatter_without_a_curve_is_refused(
-    cosines: np.ndarray, values: np.ndarray, what: str
-) -> None:
+def test_a_scatter_without_a_curve_is_refused(cosines, values, what):
     with pytest.raises(InputError, match=what):
         fit_channel(cosines, values, name="red")
