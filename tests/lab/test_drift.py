@@ -2,12 +2,59 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from gelpolight_core.lab.drift import CONFIDENCE, drifts
+from gelpolight_core.lab.drift import CONFIDENCE, LEAST_DAYS, drifts
 from gelpolight_core.lab.trend import MONTH_DAYS
-from tests.studies.drift import WITHIN_DAY_PERCENT, days_to_alarm, false_alarms, light
+
+SCATTER_PERCENT, WITHIN_DAY_PERCENT = 0.1, 0.02
+MONTHLY_PERCENT = 1.0
+DAYS = 365
+
+
+def light(
+    rng: np.random.Generator, days: int, *, stable: int, monthly: float
+) -> NDArray[np.float64]:
+    """Return the light (days, 3) in percent; the red LED drifts after `stable` days."""
+    scatter = rng.normal(0.0, SCATTER_PERCENT, (days, 3))
+    drift = monthly / MONTH_DAYS * np.maximum(np.arange(days) - stable, 0.0)
+    seen: NDArray[np.float64] = scatter + drift[:, None] * (1.0, 0.0, 0.0)
+    return seen
+
+
+def alarms(values: NDArray[np.float64]) -> Iterator[NDArray[np.bool_]]:
+    """Yield on each day, from the first test on, which values (days, n) are reported."""
+    for count in range(LEAST_DAYS, len(values) + 1):
+        lines = drifts(
+            np.arange(count, dtype=np.float64), values[:count], np.full(count, WITHIN_DAY_PERCENT)
+        )
+        yield np.array([line.alarm for line in lines])
+
+
+def false_alarms(years: int) -> NDArray[np.int64]:
+    """Return the number of alarms that begin in each of some years without a drift."""
+    counts = []
+    for year in range(years):
+        rng = np.random.default_rng([1, year])
+        shown = np.array(list(alarms(light(rng, DAYS, stable=DAYS, monthly=0.0))))
+        begun = shown.any(axis=1).astype(int)
+        counts.append(int((np.diff(begun, prepend=0) > 0).sum()))
+    return np.array(counts)
+
+
+def days_to_alarm(trials: int, stable: int) -> NDArray[np.int64]:
+    """Return after how many days of drift the red LED is reported, after some stable days."""
+    found = []
+    for trial in range(trials):
+        rng = np.random.default_rng([2, stable, trial])
+        values = light(rng, stable + 60, stable=stable, monthly=MONTHLY_PERCENT)
+        first = next((day for day, on in enumerate(alarms(values), LEAST_DAYS) if on[0]), 10**6)
+        found.append(first - 1 - stable)
+    return np.array(found)
 
 
 def test_one_percent_a_month_of_one_led_is_reported_within_two_weeks() -> None:
@@ -17,7 +64,7 @@ def test_one_percent_a_month_of_one_led_is_reported_within_two_weeks() -> None:
 
 
 def test_constant_light_raises_no_alarm_in_years() -> None:
-    # tests/studies/drift.py simulates 1,000 years.
+    # Among 1,000 years there are 6.
     assert false_alarms(8).sum() == 0
 
 
