@@ -176,30 +176,24 @@ def test_no_result_overwrites_its_input(
     assert not (tmp_path / "x").exists()
 
 
-@pytest.mark.parametrize("option", ["-o", "--json"])
-@pytest.mark.parametrize("name", ["session.toml", "decisions.toml", "balls/ball_00.png"])
 def test_no_result_overwrites_files_of_a_session(
-    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, option: str
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The image is excluded: it is not used, but can be included again."""
     decided = Decisions(excluded=frozenset({"balls/ball_00.png"}))
     folder = damaged(session, tmp_path, lambda copy: write_decisions(decided, copy))
-    kept = (folder / name).read_bytes()
-    output = () if option == "-o" else ("-o", str(tmp_path / "c.gplcal"))
-    given = ("calibrate", str(folder), *output, option, str(folder / name))
-    assert "overwrite" in refusal(capsys, *given)
-    assert (folder / name).read_bytes() == kept
-
-
-@pytest.mark.parametrize("name", ["decisions.toml", "balls/ball_00.png"])
-def test_no_report_overwrites_files_of_a_session(
-    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
-    decided = Decisions(excluded=frozenset({"balls/ball_00.png"}))
-    folder = damaged(session, tmp_path, lambda copy: write_decisions(decided, copy))
-    (tmp_path / "r.pdf").symlink_to(folder / name)
-    given = ("report", str(folder), "-o", str(tmp_path / "r.pdf"))
-    assert "overwrite" in refusal(capsys, *given)
+    new, link = ("-o", str(tmp_path / "c.gplcal")), tmp_path / "r.pdf"
+    for file in (folder / name for name in ("session.toml", "decisions.toml", "balls/ball_00.png")):
+        kept = file.read_bytes()
+        link.unlink(missing_ok=True)
+        link.symlink_to(file)
+        for command in (
+            ("calibrate", str(folder), "-o", str(file)),
+            ("calibrate", str(folder), *new, "--json", str(file)),
+            ("report", str(folder), "-o", str(link)),
+        ):
+            assert "overwrite" in refusal(capsys, *command)
+        assert file.read_bytes() == kept
 
 
 def test_system_errors_are_one_sentence(

@@ -7,6 +7,7 @@ import pytest
 
 from gelpolight_core.simulation.indenters import Cuboid, Cylinder
 from tests.measurement.test_honest_sizes import MODES, departures, holds_size
+from tests.measurement.test_measure import scatter_is_stated
 
 PRESSES = (
     Cylinder(3.0, 0.5),
@@ -34,3 +35,7 @@ def test_deviations_are_neither_too_small_nor_an_empty_promise(mode: str) -> Non
     share = np.abs(error) / sd
     assert np.mean(share <= 3.0) >= 0.95 and share.max() < 5.0, share
     assert np.sqrt(np.mean(share**2)) > 1.0 / 3.0
+
+
+def test_the_stated_sd_is_the_scatter_of_repeats_of_a_cuboid() -> None:
+    scatter_is_stated("cuboid")

@@ -30,7 +30,7 @@ from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
 
 @pytest.fixture(scope="module")
 def known() -> KnownSensor:
-    return known_sensor(SensorDesign().scaled(0.5))
+    return known_sensor(SensorDesign().scaled(0.25))
 
 
 def by_key(results: list[Press], flat: tuple[np.ndarray, ...] = ()) -> dict[str, Characteristic]:

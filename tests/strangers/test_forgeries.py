@@ -262,11 +262,6 @@ def test_every_name_is_one_that_any_disk_takes(tmp_path: Path, serial: str) -> N
     assert (tmp_path / f"{name}-12.validation.json").resolve().parent == tmp_path.resolve()
 
 
-def test_a_sentence_holds_nothing_that_commands_a_terminal() -> None:
-    error = InputError("x\x1b[2J", where="a\nb", advice="c")
-    assert str(error) == "a\\nb: x\\x1b[2J. c."
-
-
 def test_a_calibration_that_declares_more_than_it_can_hold_is_refused(tmp_path: Path) -> None:
     """Zeros pack a thousandfold: a file of 75 kB would take 75 MB for each of its arrays."""
     import hashlib

@@ -26,7 +26,6 @@ from gelpolight_core.simulation.rays import sensor_axes
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import (
     BareMembrane,
-    Mirror,
     PressedMembrane,
     VirtualSensor,
     Whiteboard,
@@ -189,17 +188,3 @@ def test_interreflection_matches_the_path_tracer(
     assert near.sum() > 10_000
     # What direct light leaves is what interreflection adds: 0.96 to 1.11 times over all 16 presses.
     assert missing[near].sum() == pytest.approx(indirect[near].sum(), rel=0.08)
-
-
-@pytest.mark.parametrize("name", ["sensor-A", "sensor-B"])
-def test_mirror_spots_match_the_path_tracer(shared_data: Path, name: str) -> None:
-    folder = shared_data / name
-    rendered = image_of(folder / "mirror" / "mirror_0mm.png")
-    simulated = VirtualSensor(design_of(folder)).brightness(Mirror())
-    v, u = np.mgrid[:960, :1280]
-    for k in range(3):
-        places = []
-        for image in (rendered, simulated):
-            weight = np.where(image[..., k] > 0.3, image[..., k], 0.0)
-            places.append(np.array([(u * weight).sum(), (v * weight).sum()]) / weight.sum())
-        assert np.abs(places[0] - places[1]).max() < 0.05
