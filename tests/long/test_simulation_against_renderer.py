@@ -51,16 +51,15 @@ def design_of(folder: Path, *, bounces: int = 0) -> SensorDesign:
     for led in truth["leds"].values():
         x, y, z = axes @ (np.array(led["camera_mm"]) - foot)
         leds.append(LedDesign(x, y, -z, led["relative_power"]))
-    membrane: dict[str, Any] = truth["membrane"]
-    if membrane["kind"] == "diffuse":
-        coat = MembraneDesign(diffuse_reflectance=membrane["reflectance"], specular_weight=0.0)
-    else:
-        coat = MembraneDesign(
-            diffuse_reflectance=membrane["diffuse"],
-            specular_weight=membrane["spec_weight"],
-            roughness=membrane["alpha"],
-            specular_reflectance=0.91 * membrane["spec_scale"],
-        )
+    of: dict[str, Any] = truth["membrane"]
+    coat = {"diffuse_reflectance": of.get("reflectance"), "specular_weight": 0.0}
+    if of["kind"] != "diffuse":
+        coat = {
+            "diffuse_reflectance": of["diffuse"],
+            "specular_weight": of["spec_weight"],
+            "roughness": of["alpha"],
+            "specular_reflectance": 0.91 * of["spec_scale"],
+        }
     return SensorDesign(
         serial=folder.name,
         camera=CameraDesign(
@@ -74,20 +73,7 @@ def design_of(folder: Path, *, bounces: int = 0) -> SensorDesign:
         layers=layers,
         leds=tuple(leds),
         ring=LedRing(),
-        membrane=MembraneDesign(
-            **{
-                name: getattr(coat, name)
-                for name in (
-                    "diffuse_reflectance",
-                    "specular_weight",
-                    "specular_reflectance",
-                    "roughness",
-                )
-            },
-            variation=0.0,
-            speck_count=0,
-            bounces=bounces,
-        ),
+        membrane=MembraneDesign(**coat, variation=0.0, speck_count=0, bounces=bounces),
         photometry=PhotometryDesign(
             crosstalk=tuple(tuple(row) for row in truth["crosstalk_camera_from_led"])
         ),

@@ -34,29 +34,9 @@ from gelpolight_core.report.evaluation import (
     evaluation_table,
     write_evaluation_files,
 )
+from tests.measurement.maps import measurement, on_grid
 
 HEADER = "file,shape,diameter_mm,side_mm,height_mm\n"
-
-
-def measurement(shape: str, size: float, height: float) -> Measurement:
-    sides = (size, size) if shape == "cuboid" else None
-    key = "side_mm" if shape == "cuboid" else "diameter_mm"
-    return Measurement(
-        shape=shape,
-        diameter_mm=None if sides else size,
-        side_mm=sides,
-        height_mm=height,
-        centre_mm=(0.0, 0.0),
-        yaw_deg=None,
-        drape_decay_mm=0.7,
-        sd={key: (0.01, 0.01) if sides else 0.01, "height_mm": 0.005},
-        edge_radius_mm=0.1,
-        blur_mm=0.02,
-        baseline_mm=0.0,
-        residual_rms_mm=0.003,
-        correlated_pixels=1.0,
-        outline_mm=np.zeros((1, 2)),
-    )
 
 
 def press(
@@ -128,19 +108,8 @@ def heights(radius: float) -> HeightMap:
         distance, cylinder_radius_mm=radius, height_mm=1.0, decay_mm=0.7, edge_radius_mm=0.08
     )
     noise = 0.003 * np.random.default_rng(0).standard_normal(depth.shape)
-    return HeightMap(
-        depth_mm=(depth + noise).astype(np.float32),
-        x_mm=place,
-        y_mm=place,
-        pitch_mm=0.08,
-        normals=None,
-        flags=np.zeros(depth.shape, np.uint8),
-        calibration_id="T-1",
-        model="full",
-        source="",
-        depth_scale_sd=0.004,
-        lateral_scale_sd=1e-4,
-    )
+    made = on_grid((depth + noise).astype(np.float32), place, place)
+    return replace(made, depth_scale_sd=0.004, lateral_scale_sd=1e-4)
 
 
 def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
-import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from recorded import noisy, write_recording
-from written import KINDS, RECORD, Written, calibration
+from written import KINDS, Written, calibration
 
 from app.workspace.workspace import Workspace
 from gelpolight_core.batch.results import FILE, FrameRow, finished_frames, keep_rows
@@ -22,7 +20,6 @@ from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.reader import Recording
-from gelpolight_core.records.records import NAME, Records
 
 BLOCK = 64
 
@@ -116,40 +113,3 @@ def test_a_recording_without_any_block_of_what_was_not_on_the_disk_gives_no_wron
                 assert np.array_equal(frame.rgb, images[frame.number])
                 found += 1
         assert found >= 1  # a block can hold the end of a frame and the beginning of the next
-
-
-@pytest.mark.parametrize("journal", ["whole", "cut", "gone"])
-def test_records_cut_off_within_a_change_have_all_that_was_kept_before(
-    tmp_path: Path, journal: str
-) -> None:
-    """The journal is on the disk before anything of the file is changed: SQLite waits for it."""
-    path, cut = tmp_path / NAME, tmp_path / "cut"
-    with Records.open(path) as records:
-        for _ in range(3):
-            records.add(RECORD)
-    cut.mkdir()
-    connection = sqlite3.connect(path, isolation_level=None)
-    # So small a cache that pages go to the file before the change is done.
-    connection.execute(
-        "PRAGMA cache_size = 1" if journal == "whole" else "PRAGMA cache_size = 5000"
-    )
-    connection.execute("BEGIN IMMEDIATE")
-    connection.executemany(
-        "INSERT INTO sensors (serial, first_seen) VALUES (?, 'x')",
-        [(f"s{k}" * 50,) for k in range(300)],
-    )
-    for file in (path, path.with_name(f"{NAME}-journal")):
-        if file.exists():
-            shutil.copy(file, cut / file.name)
-    connection.execute("ROLLBACK")
-    connection.close()
-    left = cut / f"{NAME}-journal"
-    assert left.exists()
-    if journal == "cut":
-        left.write_bytes(left.read_bytes()[: left.stat().st_size // 2])
-    elif journal == "gone":
-        left.unlink()
-    with Records.open(cut / NAME) as records:
-        assert not records.notice
-        assert len(records.measurements()) == 3
-        assert {r.serial for r in records.measurements()} == {"A"}

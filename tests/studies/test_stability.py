@@ -63,11 +63,6 @@ def test_the_papers_model_says_where_shadows_leave_its_assumptions() -> None:
         assert ("shadow of an LED" in result.message) is says
 
 
-def test_names_are_one_each() -> None:
-    assert len({case.name for case in CASES}) == len(CASES)
-    assert {LARGEST, *QUICK} <= {case.name for case in CASES}
-
-
 def _case(run) -> Case:  # type: ignore[no-untyped-def]
     return Case("subject", "x", "required", run)
 
@@ -108,14 +103,6 @@ def test_an_image_is_tried_in_every_mode() -> None:
     assert [mode.name for mode in seen.modes] == ["best", "balanced", "fast", "paper"]
     row = run_case(_case(lambda: seen)).row
     assert all(row[f"{mode.name}_um"] == mode.error_um for mode in seen.modes)
-
-
-def test_ctrl_c_stops_the_cases() -> None:
-    def stop() -> Seen:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_case(_case(stop))
 
 
 def test_the_table_and_the_figure_hold_every_case_that_was_asked_for(
