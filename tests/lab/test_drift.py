@@ -59,24 +59,23 @@ def days_to_alarm(trials: int, stable: int) -> NDArray[np.int64]:
 
 def test_one_percent_a_month_of_one_led_is_reported_within_two_weeks() -> None:
     # Daily values with a scatter of 0.1 %, after two weeks without drift.
-    days = days_to_alarm(40, stable=14)
+    days = days_to_alarm(20, stable=14)
     assert days.min() > 0 and days.max() <= 14
 
 
 def test_constant_light_raises_no_alarm_in_years() -> None:
-    # Among 1,000 years there are 6.
-    assert false_alarms(8).sum() == 0
+    # Of 1,000 simulated years, 6 have one.
+    assert false_alarms(4).sum() == 0
 
 
-@pytest.mark.parametrize("sds", [0.0, 0.05])
-def test_the_line_and_the_date_hold_the_truth_as_often_as_stated(sds: float) -> None:
+def test_the_line_and_the_date_hold_the_truth_as_often_as_stated() -> None:
     rng = np.random.default_rng(0)
     days = np.sort(rng.choice(60, 30, replace=False)).astype(np.float64)
     true, limit, held = 0.02, 2.0, 0
     scores = []
     for _ in range(300):
         values = 0.1 + true * (days - days[0])[:, None] + rng.normal(0.0, 0.1, (30, 1))
-        (line,) = drifts(days, values, np.full(30, sds))
+        (line,) = drifts(days, values, np.full(30, 0.05))
         scores.append((line.per_day - true) / line.per_day_sd)
         when, earliest, latest = line.reaches(limit)
         assert earliest < when < latest

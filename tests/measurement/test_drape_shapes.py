@@ -50,25 +50,6 @@ def test_the_membrane_leaves_a_ball_without_a_kink(
     assert 0.0 < edge < radius
 
 
-def test_the_blur_of_a_cylinder_is_that_of_a_gaussian() -> None:
-    from scipy.ndimage import gaussian_filter
-
-    pitch, blur = 0.02, 0.05
-    place = np.arange(-4.0, 4.0, pitch)
-    radius = np.hypot(place[:, None], place[None, :])
-    options = {
-        "cylinder_radius_mm": 1.5,
-        "height_mm": 1.0,
-        "decay_mm": 0.7,
-        "edge_radius_mm": 0.1,
-    }
-    truth = gaussian_filter(cylinder_depth(radius, **options), blur / pitch)
-    model = cylinder_depth(radius, **options, blur_mm=blur)
-    inner = slice(20, -20)
-    # The wall is taken as straight: its curvature changes the result by (blur / radius)**2.
-    assert np.abs(model - truth)[inner, inner].max() < 2e-3
-
-
 def obstacle_solution(indenter: Array, pitch: float, decay: float) -> Array:
     """Solve the membrane over an indenter on a quarter of the plane, by active sets."""
     rows, columns = indenter.shape

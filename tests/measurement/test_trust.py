@@ -57,7 +57,7 @@ def test_a_failed_calibration_makes_every_measurement_doubtful(
 
 def test_a_measurement_is_never_better_than_its_height_map(tmp_path: Path) -> None:
     """Walls too steep for the lights: heights were off by more than 3 sd and called ok."""
-    known = known_sensor(matt_design(0.25))
+    known = known_sensor(matt_design(0.5))
     for decay_mm, doubtful in ((0.18, True), (0.7, False)):
         surface = indenters.press(indenters.Cylinder(5.0, 1.0), x_mm=0.4, decay_mm=decay_mm)
         frame = known.sensor.frame(PressedMembrane(surface), stream="press")

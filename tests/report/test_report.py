@@ -158,24 +158,6 @@ def test_edits_by_hand_are_reported() -> None:
     assert "Edited by hand" not in dict(head_facts(c))
 
 
-def test_camera_settings_are_named_and_unknown_ones_left_out() -> None:
-    c = small()
-    texts = {
-        "name": "Camera A",
-        "identity": "usb-1",
-        "pixel_format": "YUYV",
-        "width": "640",
-        "height": "480",
-        "rate_hz": "0.0",
-        "control.exposure_ms": "12.5",
-        "control.gain_auto": "0",
-    }
-    made = replace(c.provenance, camera_settings=texts)
-    facts = dict(head_facts(replace(c, provenance=made)))
-    assert facts["Camera"] == "Camera A, 640 \N{MULTIPLICATION SIGN} 480 px, YUYV"
-    assert facts["Exposure"] == "12.5 ms" and facts["Automatic gain"] == "off"
-
-
 def test_a_figure_that_did_not_pass_comes_with_its_advice(tmp_path: Path) -> None:
     advice = "Press harder"
     tables = {

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.command_line.main import MENDABLE, main
+from app.command_line.main import main
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
@@ -38,13 +38,9 @@ def at(ms: float, um: float, **others: object) -> Point:
 
 
 def test_the_front_is_what_nothing_beats_in_both_time_and_error() -> None:
-    points = [at(10, 5), at(5, 9), at(20, 6), at(5, 8), at(40, 1)]
-    assert [(p.median_ms, p.rms_um) for p in pareto_front(points)] == [(5, 8), (10, 5), (40, 1)]
-
-
-def test_each_width_has_a_front_of_its_own() -> None:
-    small, large = at(2, 9, width=320), at(40, 50)
-    assert set(pareto_front([small, large])) == {small, large}
+    points = [at(10, 5), at(5, 9), at(20, 6), at(5, 8), at(40, 1), at(4, 9, width=320)]
+    front = {(p.median_ms, p.rms_um) for p in pareto_front(points)}
+    assert front == {(5, 8), (10, 5), (40, 1), (4, 9)}  # each width has one of its own
 
 
 def test_the_recommended_mode_keeps_the_rate_or_the_error() -> None:
@@ -122,14 +118,6 @@ def test_nineteen_of_twenty_intervals_hold_the_mean_and_one_press_has_none() -> 
     assert np.isnan(mean_within(errors[:1])[1]).all()
 
 
-def test_a_calibration_of_the_papers_model_has_this_mode_only(
-    two_presses: Path, small_calibration: Calibration
-) -> None:
-    paper = replace(small_calibration, model="paper").changed(full=None)
-    points = measure_session(two_presses, paper, repeats=1)
-    assert [point.mode for point in points] == ["paper"]
-
-
 def test_the_virtual_sensor_is_calibrated_at_each_width(
     small_session: Path,
     small_calibration: Calibration,
@@ -171,14 +159,6 @@ def test_one_calibration_is_measured_on_the_presses_of_a_session(
         rows = {row["mode"]: row for row in csv.DictReader(stream)}
     assert float(rows["best"]["rms_um"]) > 0.0 and rows["best"]["on_front"] == "True"
     assert (out / "work-precision.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_what_cannot_be_measured_is_refused_before_the_work(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["work-precision", "nowhere", "-o", str(tmp_path / "out")]) == MENDABLE
-    assert "session.toml" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
 
 
 def test_presses_of_another_sensor_are_refused(
