@@ -135,13 +135,14 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
 
 
 def test_the_full_model_gives_its_uncertainty(
-    press: Path,
-    small_calibration: Calibration,
+    virtual_session: Path,
+    virtual_calibration: Calibration,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    file, name, image = tmp_path / "full.gplcal", press.stem, str(press)
-    write_calibration(small_calibration, file)
+    file, name = tmp_path / "full.gplcal", "cylinder_s5_d100"
+    write_calibration(virtual_calibration, file)
+    image = str(virtual_session / "presses" / f"{name}.png")
     result = tmp_path / "m.json"
     assert main(["measure", str(file), image, "--shape", "cylinder", "--json", str(result)]) == 0
     assert "calibration 0.00" in capsys.readouterr().out
