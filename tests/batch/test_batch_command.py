@@ -7,7 +7,6 @@ import signal
 import sys
 from pathlib import Path
 
-import cv2
 import pytest
 
 from app.command_line import batch
@@ -42,18 +41,6 @@ def test_a_second_call_finds_everything_done(
     assert "6 depth maps in" in capsys.readouterr().out
     assert command(day) == 0
     assert "6 of them from earlier runs" in capsys.readouterr().out
-
-
-def test_a_bad_frame_is_named_and_counted_in_one_line(
-    command, day: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    image = day / "left" / "a.png"
-    cv2.imwrite(str(image), cv2.imread(str(image))[:50])
-    assert command(day) == MENDABLE
-    reported = capsys.readouterr()
-    assert "5 depth maps" in reported.out
-    assert "left/a.png: the image is 320x50x3, the calibration is for" in reported.err
-    assert "batch.csv: 1 of 6 frames could not be used" in reported.err
 
 
 def test_ctrl_c_ends_with_the_frames_at_hand(

@@ -56,11 +56,12 @@ def test_inspect_shows_provenance_and_quality(
 
 
 def test_a_press_becomes_a_depth_map_in_every_format(
-    calibration: Path, press: Path, tmp_path: Path
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["reconstruct", str(calibration), str(press), "-o", str(tmp_path / "out")]
     formats = "npz,tif,vtp,ply,stl,gsf,png,preview"
-    assert main([*arguments, "--format", formats, "--model", "paper"]) == 0
+    assert main([*arguments, "--format", formats, "--model", "paper", "--explain"]) == 0
+    assert "integration" in capsys.readouterr().out
     names = sorted(p.name for p in (tmp_path / "out").iterdir())
     endings = ("depth.png", "gsf", "npz", "ply", "png", "stl", "tif", "vtp")
     assert names == [f"{press.stem}.{e}" for e in endings]
@@ -108,14 +109,16 @@ def test_a_calibration_that_failed_is_reported_by_every_command(
     write_calibration(failed, file)
     write_remark(file, "accepted", "for teaching")
     commands = (
+        ["measure", str(file), str(press), "--tool", "cylinder", "--json", str(tmp_path / "t")],
         ["measure", str(file), str(press), "--shape", "cylinder", "--json", str(result)],
         ["reconstruct", str(file), str(press), "-o", str(tmp_path)],
     )
     for command in commands:
         assert main(command) == 0
         assert "FAIL: the calibration failed its quality check" in capsys.readouterr().err
+    (tool,) = json.loads((tmp_path / "t").read_text())["results"]
     m = json.loads(result.read_text())
-    assert m["verdict"] == "doubtful"
+    assert m["verdict"] == tool["verdict"] == "doubtful"
     assert m["reason"].startswith("the calibration failed its quality check (Half a pixel")
     height_map = gp.read_height_map(tmp_path / f"{press.stem}.npz")
     assert gp.measure(height_map, shape="cylinder").reason == m["reason"]
@@ -184,18 +187,6 @@ def test_the_benchmark_lists_the_time_of_each_step(
     assert {"name", "median_ms", "p95_ms", "bytes"} <= set(timing["steps"][0])
     done = [step["step"] for step in timing["plan"] if step["done"]]
     assert done == [step["name"] for step in timing["steps"]]
-
-
-def test_a_plan_is_explained(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = ["-o", str(tmp_path / "out")]
-    explained = ["reconstruct", str(calibration), str(press), *out, "--explain"]
-    assert main([*explained, "--effort", "balanced"]) == 0
-    shown = capsys.readouterr().out
-    assert press.name in shown
-    assert "integration" in shown
-    assert "left out" in shown
 
 
 def test_a_design_is_checked_from_its_file(

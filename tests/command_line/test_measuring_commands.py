@@ -44,24 +44,6 @@ def test_the_shape_is_detected_automatically(
     assert capsys.readouterr().out.splitlines()[0].split() == ["shape", "cylinder"]
 
 
-def test_several_images_are_measured_as_each_alone(
-    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    other = press.with_name("cylinder_s5_d050.png")
-    arguments = ("measure", str(calibration), "--shape", "cylinder", "--json")
-    contents = []
-    for number, images in enumerate(([press], [other], [press, other])):
-        file = tmp_path / f"{number}.json"
-        assert main([*arguments, str(file), *map(str, images)]) == 0
-        contents.append(json.loads(file.read_text()))
-    assert contents[2] == [
-        {"image": image.name} | alone
-        for image, alone in zip((press, other), contents[:2], strict=True)
-    ]
-    lines = capsys.readouterr().out.splitlines()
-    assert [line for line in lines if line.endswith(":")] == [f"{press}:", f"{other}:"]
-
-
 def test_an_image_that_cannot_be_measured_does_not_stop_the_others(
     calibration: Path,
     session: Path,
@@ -144,7 +126,6 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
         (["--tool", "distance", "--at", "1", "2", "3"], "Number of values: 3"),
         (["--tool", "distance", "--at", "1", "2", "3", "4", "5", "6"], "points: 3"),
         (["--tool", "rectangle", "--at", "1", "2"], "--size"),
-        (["--tool", "pit", "--at", "1", "2"], "--size"),
         (["--tool", "edge-radius", "--at", "1,2", "3,4", "--set", "level_mm=1"], "level_mm"),
         (
             ["--tool", "edge-radius", "--at", "1,2", "3,4", "--set", "width_mm=wide"],
@@ -155,8 +136,6 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
         (["--tool", "nowhere.json"], "nor a JSON file"),
         (["--shape", "ball", "--size", "1", "2"], "cannot be used with --shape"),
         (["--tool", "ball", "--truth", "truth.csv"], "--truth"),
-        (["--tool", "ball", "--edge-radius", "0"], "--edge-radius"),
-        (["--tool", "ball", "--tolerance", "5", "8"], "--tolerance"),
         (["--shape", "ball", "--tolerance", "5", "nan"], "--tolerance"),
     ],
 )

@@ -119,19 +119,6 @@ def test_whoever_has_the_certificate_alone_can_decide_again(
 def test_a_certificate_of_tools_is_refused(
     calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    tool = [
-        "--tool",
-        "step-height",
-        "--at",
-        "-6",
-        "-6",
-        "0,0",
-        "--size",
-        "1",
-        "1",
-        "10",
-        "--report",
-        str(tmp_path / "m.pdf"),
-    ]
-    line = refusal(capsys, "measure", str(calibration), str(press), *tool)
+    tool = "--tool step-height --at -6 -6 0,0 --size 1 1 10 --report".split()
+    line = refusal(capsys, "measure", str(calibration), str(press), *tool, str(tmp_path / "m.pdf"))
     assert "--report" in line

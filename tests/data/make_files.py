@@ -1,8 +1,4 @@
-"""Make one folder of files with the program of the current folder; README.md says how.
-
-It runs with this version of the program and with earlier ones: imports that were renamed since are
-looked up under both names.
-"""
+"""Make one folder of files with this state of the program; README.md says how."""
 
 from __future__ import annotations
 
@@ -12,30 +8,34 @@ import shutil
 import tempfile
 from dataclasses import replace
 from datetime import UTC, datetime
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import cv2
+from PySide6.QtCore import QByteArray
 
 from app.command_line.main import main as gelpolight
+from app.services.preferences import Limits
+from app.services.settings import Settings
+from app.workspace.indenters import write_indenters
+from app.workspace.workspace import Workspace
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.remarks import write_validation
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.result import compare
 from gelpolight_core.quantity import Quantity
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.records.entry import MeasurementRecord, verdict_of
+from gelpolight_core.records.records import Records
 from gelpolight_core.reference import Truth
+from gelpolight_core.session.decisions import Decisions, PlacedCircle, write_decisions
+from gelpolight_core.validation import Validation
 
 DESIGN = Path(__file__).with_name("small_sensor.toml")
 PRESS = "cylinder_s5_d100"
 TRUTH = Truth("cylinder", 5.0, height_mm=1.0)
-
-
-def named(*places: str) -> Any:
-    """Return the first object, given as module:name, that this version of the program has."""
-    for place in places:
-        module, name = place.split(":")
-        try:
-            return getattr(import_module(module), name)
-        except (ImportError, AttributeError):
-            continue
-    raise SystemExit(f"this version has none of {places}")
 
 
 def run(*words: object) -> None:
@@ -66,20 +66,17 @@ def keep_session(session: Path, target: Path, files: list[str]) -> None:
 
 def decide(session: Path, **decided: Any) -> None:
     """Write decisions about the images of a session."""
-    decisions = named("gelpolight_core.session.decisions:Decisions")
-    named("gelpolight_core.session.decisions:write_decisions")(decisions(**decided), session)
+    write_decisions(Decisions(**decided), session)
 
 
 def write_recording(session: Path, path: Path, calibration_id: str) -> None:
     """Record the background and the press, with a lost frame between them."""
-    header = named("gelpolight_core.recording.recording:RecordingHeader")
-    writer = named("gelpolight_core.recording.writer:RecordingWriter")
     path.parent.mkdir(parents=True, exist_ok=True)
-    description = header(
+    header = RecordingHeader(
         serial="small-1", calibration_id=calibration_id, source="virtual sensor", kind="virtual",
         settings={"exposure_us": 8000.0}, note="untouched, then pressed",
     )  # fmt: skip
-    with writer(path, description) as recording:
+    with RecordingWriter(path, header) as recording:
         images = ("background/background.png", f"presses/{PRESS}.png")
         for number, name in zip((4, 6), images, strict=True):
             recording.append(rgb_of(session / name), number, number / 30.0)
@@ -87,23 +84,17 @@ def write_recording(session: Path, path: Path, calibration_id: str) -> None:
 
 def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
     """Measure the press, store it twice, remove the second; return the measurement."""
-    measure_heightmap = named("gelpolight_core.measurement.indenter_tools:measure_heightmap")
-    reconstructor = named("gelpolight_core.reconstruction.reconstructor:Reconstructor")
-    records = named("gelpolight_core.records.records:Records")
-    entry = named("gelpolight_core.records.entry:MeasurementRecord")
-    verdict_of = named("gelpolight_core.records.entry:verdict_of")
-    compare = named("gelpolight_core.measurement.result:compare")
     image = rgb_of(session / f"presses/{PRESS}.png")
-    measurement = measure_heightmap(reconstructor(calibration).depth(image), shape="cylinder")
+    measurement = measure_heightmap(Reconstructor(calibration).depth(image), shape="cylinder")
     quantities = compare(measurement, TRUTH, (5.0, 8.0))
-    record = entry(
+    record = MeasurementRecord(
         serial="small-1", calibration_id=calibration.identity, shape=measurement.shape,
         quantities=quantities, verdict=verdict_of(quantities, doubtful=False),
         details=measurement.as_json(TRUTH), settings={"model": calibration.model},
         operator="A. Tester", picture=f"{PRESS}.png",
         note="first press",
     )  # fmt: skip
-    with records.open(workspace / "records.sqlite") as book:
+    with Records.open(workspace / "records.sqlite") as book:
         book.add(record)
         book.remove(book.add(replace(record, note="by mistake", time=datetime.now(UTC))))
     return measurement
@@ -111,11 +102,6 @@ def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
 
 def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: Path) -> None:
     """Write the lab's indenters, the validation of the calibration and the one in use."""
-    from app.workspace.indenters import write_indenters
-    from app.workspace.workspace import Workspace
-    from gelpolight_core.calibration.remarks import write_validation
-    from gelpolight_core.validation import Validation
-
     write_indenters([Truth("cylinder", 5.0, height_mm=1.0, name="Pin A"),
                      Truth("cuboid", 4.0, second_mm=6.0, name="Block")], workspace)  # fmt: skip
     lengths = (
@@ -129,25 +115,17 @@ def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: P
 
 def write_settings(path: Path) -> None:
     """Write the settings of the window."""
-    from PySide6.QtCore import QByteArray
-
-    settings = named("app.services.settings:Settings", "app.shell.settings:Settings")(path)
-    limits = named("app.services.preferences:Limits", "app.services.settings:Limits")
+    settings = Settings(path)
     settings.prefer(theme="dark", last_page="measure", reconstruction="full/best")
-    settings.limits = limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
+    settings.limits = Limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
     settings.keep_camera("usb-1", {"gain": "2.5"})
     settings.keep_window_state(QByteArray(b"geometry"), QByteArray(b"state"))
-    for add in ("add_recent", "add_recent_session"):
-        if hasattr(settings, add):
-            kind = ["sessions"] if add == "add_recent" else []
-            getattr(settings, add)(*kind, Path("/lab/session"))
+    settings.add_recent("sessions", Path("/lab/session"))
     settings.save()
 
 
 def make_open(out: Path, scratch: Path) -> None:
     """Make the files of an open sensor."""
-    from gelpolight_core.calibration.file import read_calibration
-
     session, workspace = scratch / "session", out / "workspace"
     path = workspace / "sensors/small-1/first.gplcal"
     path.parent.mkdir(parents=True)
@@ -191,7 +169,7 @@ def make_closed(out: Path, scratch: Path) -> None:
         *(f"balls/ball_{n:02d}.png" for n in range(3)),
     ]
     keep_session(session, sensor / "sessions/closed", kept)
-    circle = named("gelpolight_core.session.decisions:PlacedCircle")(96.5, 80.25, 14.0)
+    circle = PlacedCircle(96.5, 80.25, 14.0)
     decide(
         sensor / "sessions/closed",
         excluded=frozenset({"balls/ball_02.png"}),

@@ -74,11 +74,13 @@ def test_an_installed_package_adds_a_format_a_tool_and_a_camera(installed: Path)
 def test_a_faulty_package_is_named_in_one_sentence_and_left_out(installed: Path) -> None:
     faulty = "".join(f"[gelpolight.{group}]\nbad-{group} = bad_lab:thing\n" for group in GROUPS)
     install(installed, "bad_lab", faulty)
-    for content in ("raise RuntimeError('no such device')", "thing = 3"):
+    for content, group, *command in (
+        ("raise RuntimeError('no such device')", "cameras", "cameras"),
+        ("thing = 3", "exports", "reconstruct", "--help"),
+    ):
         (installed / "bad_lab.py").write_text(content)
-        for command, group in (("cameras", "cameras"), ("reconstruct", "exports")):
-            done = gelpolight(installed, command, *["--help"][: command == "reconstruct"])
-            assert done.returncode == 0, done.stderr
-            (line,) = (x for x in done.stderr.splitlines() if f"bad-{group}" in x)
-            assert "bad_lab" in line
-            assert "Traceback" not in done.stderr
+        done = gelpolight(installed, *command)
+        assert done.returncode == 0, done.stderr
+        (line,) = (x for x in done.stderr.splitlines() if f"bad-{group}" in x)
+        assert "bad_lab" in line
+        assert "Traceback" not in done.stderr

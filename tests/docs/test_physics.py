@@ -16,11 +16,3 @@ def test_every_module_that_a_chapter_names_is_there(name: str) -> None:
     text = (DOCS / name).read_text("utf-8")
     for path in re.findall(r"`((?:gelpolight_core|app)/[\w./]*)`", text):
         assert (DOCS.parent / path).exists(), path
-
-
-@pytest.mark.parametrize("name", CHAPTERS)
-def test_formulas_can_be_read_without_anything_that_is_loaded(name: str) -> None:
-    """No TeX: the pages are read on machines without a network."""
-    text = (DOCS / name).read_text("utf-8")
-    assert "$" not in re.sub(r"```.*?```", "", text, flags=re.DOTALL)
-    assert r"\frac" not in text

@@ -37,23 +37,11 @@ def change(values: list[float], sd: float = 0.01) -> StateChange:
 
 def sensor(days: int, per_day: float, *, calibration: str = "C-1") -> list[Sample]:
     """Return two looks a day at a sensor whose red LED drifts."""
-    rng = np.random.default_rng(4)
-    return [
-        sample_of_frames(
-            [
-                change(
-                    [
-                        per_day * (day + hours / 24.0) + rng.normal(0.0, 0.05),
-                        *rng.normal(0.0, 0.05, 5),
-                    ]
-                )
-            ],
-            calibration,
-            BEGIN + timedelta(days=day, hours=hours),
-        )
-        for day in range(days)
-        for hours in (0, 7)
-    ]
+    rng, samples = np.random.default_rng(4), []
+    for day in (n + hours / 24.0 for n in range(days) for hours in (0, 7)):
+        seen = change([*(np.eye(6)[0] * per_day * day + rng.normal(0.0, 0.05, 6))])
+        samples.append(sample_of_frames([seen], calibration, BEGIN + timedelta(days=day)))
+    return samples
 
 
 def test_samples_come_back_as_they_were_and_damage_costs_one_line(tmp_path: Path) -> None:

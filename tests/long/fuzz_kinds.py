@@ -7,7 +7,6 @@ import json
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import cv2
@@ -115,8 +114,7 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
             Kind(f"{end} image", f"p.{end}", _encoded(end), read_image, (*BYTES, spoil.numbered))
             for end in ("jpg", "bmp", "webp")
         ),
-        Kind("records", "records.sqlite", _records(folder), _use_records,
-             (*BYTES, *(partial(_forged_records, folder / "forge.sqlite"),) * 4)),
+        Kind("records", "records.sqlite", _records(folder), _use_records, BYTES),
         Kind("true depth", "t.npz", (_true_depth(),), read_true_depth,
              (*BYTES, *(spoil.forged_archive,) * 3)),
         Kind("height map", "map.npz", (_height_map(folder),), read_npz,
@@ -125,10 +123,6 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
              (*BYTES, *(spoil.forged_archive,) * 5)),
         *(Kind(name, file, (data,), use, TEXT) for name, file, data, use in texts),
     )  # fmt: skip
-
-
-def _forged_records(place: Path, rng: object, data: bytes) -> bytes:
-    return spoil.forged_records(rng, data, place)  # type: ignore[arg-type]
 
 
 def _calibrations(folder: Path) -> tuple[bytes, ...]:

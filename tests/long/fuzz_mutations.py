@@ -7,12 +7,10 @@ import io
 import json
 import random
 import re
-import sqlite3
 import struct
 import zipfile
 import zlib
 from collections.abc import Callable
-from pathlib import Path
 
 Mutation = Callable[[random.Random, bytes], bytes]
 
@@ -202,44 +200,3 @@ def forged_png(rng: random.Random, data: bytes) -> bytes:
         struct.pack(">I", len(b)) + k + b + struct.pack(">I", zlib.crc32(k + b)) for k, b in chunks
     )
     return data[:8] + b"".join(parts)
-
-
-def forged_records(rng: random.Random, data: bytes, place: Path) -> bytes:
-    """Return records into which somebody wrote what no measurement is."""
-    place.write_bytes(data)
-    connection = sqlite3.connect(place, isolation_level=None)
-    try:
-        connection.execute("PRAGMA foreign_keys = OFF")
-        for _ in range(rng.choice((1, 2))):
-            try:
-                connection.execute(_statement(rng))
-            except sqlite3.Error:
-                continue  # this one was refused by the database itself
-    finally:
-        connection.close()
-    return place.read_bytes()
-
-
-def _statement(rng: random.Random) -> str:
-    table, columns = rng.choice((
-        ("measurements", ("time", "serial", "calibration_id", "shape", "settings", "details",
-                          "note", "removed", "verdict", "id")),
-        ("quantities", ("name", "value", "sd", "truth", "limit_percent", "position")),
-        ("sensors", ("serial", "first_seen")),
-    ))  # fmt: skip
-    value = rng.choice((
-        "NULL", "x'ff00ff'", "9e999", "-9e999", "1e308", "5e-324", "0", "'text'", "''",
-        "zeroblob(100000)",
-        "CAST(x'ff' AS TEXT)", "'[[[1]]]'", f"'{'[' * 5000}'", "'{\"a\": NaN}'", "char(27)",
-        "'9999-99-99'", "'0001-01-01T00:00:00+23:59'", "9223372036854775807", "'=1+1'", "char(0)",
-    ))  # fmt: skip
-    return rng.choice((
-        *(f"UPDATE {table} SET {rng.choice(columns)} = {value}",) * 6,
-        f"ALTER TABLE {table} RENAME COLUMN {rng.choice(columns)} TO other",
-        f"CREATE TRIGGER t AFTER INSERT ON {table} BEGIN DELETE FROM {table}; END",
-        f"ALTER TABLE {table} RENAME TO gone",
-        "CREATE VIEW more AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x FROM c)"
-        " SELECT x FROM c",
-        f"PRAGMA user_version = {rng.choice(WHOLE[:9])}", "PRAGMA application_id = 5",
-        "PRAGMA journal_mode = WAL", f"DROP TABLE {table}",
-    ))  # fmt: skip

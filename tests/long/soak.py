@@ -1,151 +1,159 @@
-"""Let a random person use the program for an hour, and print whether it bears that.
+"""Let a random person use the program on the virtual sensor: ``soak.py FOLDER MINUTES SEED``.
 
-    xvfb-run -a -s "-screen 0 1920x1200x24" python tests/long/soak.py --minutes 60 --seed 1
-    ... --calibration sensor.gplcal    of the virtual sensor; without it there is no live depth
-
-The real program runs on the virtual sensor. Every half minute everything that is open is closed,
-and the Inspect page is left in peace for a while, in which it is measured: memory, threads, open
-files, objects and timers, frames shown in a second, how late the user interface is, what the log
-says, and the room on disk. Every action is written to actions.log in the scratch folder. The exit
-status is 1 where memory grows, the rate falls, the program hangs or the log holds an error; the
-files are kept then.
+Every half minute everything that is open is closed, and the Inspect page is measured at rest.
+FOLDER holds ``sensor.gplcal`` of a quarter of the virtual sensor's size, and takes what is written:
+actions.log, hung.log, and rests.json for ``test_soak.py``.
 """
 
 from __future__ import annotations
 
-import argparse
 import faulthandler
+import gc
+import json
+import logging
 import os
-import shutil
+import random
 import sys
-import tempfile
 import threading
 import time
+from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 
-from probes import Lateness, Spent
-from PySide6.QtCore import QTimer
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+FOLDER, MINUTES, SEED = Path(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
+for place in ("CONFIG_HOME", "DATA_HOME", "STATE_HOME", "DOCUMENTS_DIR"):
+    (FOLDER / place.lower()).mkdir(parents=True)
+    os.environ[f"XDG_{place}"] = str(FOLDER / place.lower())
+os.environ["HOME"] = str(FOLDER)
+# With threads, Mesa's renderer keeps the memory of its largest drawings: tens of megabytes an hour.
+os.environ["LP_NUM_THREADS"] = "0"
 
-WORKS_S, MEASURED_S = 20.0, 6.0
+from PySide6.QtCore import QModelIndex, QPoint, Qt, QTimer  # noqa: E402
+from PySide6.QtGui import QAction  # noqa: E402
+from PySide6.QtTest import QTest  # noqa: E402
+from PySide6.QtWidgets import (  # noqa: E402
+    QAbstractButton,
+    QAbstractItemView,
+    QAbstractSlider,
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QDialog,
+    QFileDialog,
+    QGraphicsView,
+    QLineEdit,
+    QMenu,
+    QScrollBar,
+    QTabBar,
+    QWidget,
+)
+from shiboken6 import isValid  # noqa: E402
+
+from app import desktop  # noqa: E402
+from app.measure.press_view import PressView  # noqa: E402
+from app.measure.work import Work  # noqa: E402
+from app.services.jobs import Jobs  # noqa: E402
+from app.shell.main_window import MainWindow  # noqa: E402
+from app.shell.memory import give_back  # noqa: E402
+from app.sources.bench import Bench  # noqa: E402
+from app.view3d.interactor import Interactor  # noqa: E402
+from app.widgets.qt_tree import below  # noqa: E402
+from gelpolight_core.design.sensor_design import SensorDesign  # noqa: E402
+
+WORKS_S, SETTLES_S, MEASURED_S, HUNG_S = 20.0, 5.0, 6.0, 60.0
 # A rest that is not reached by then is measured as it is.
 LONGEST_UNREST_S = 240.0
-HUNG_S = 60.0
-LOOK_MS = 200
-SETTLES_S = 5.0
-RATE_HZ = 15.0
-SIZE = 1400, 900
-KEPT_RECORDINGS = 4
-LEFT = ("calibrate.leave", "protocol.leave", "protocol.leave_result", "inspect.stop")
+PAUSE_MS = 40, 450
+RATE_HZ, SIZE = 15.0, (1400, 900)
+LEFT = Qt.MouseButton.LeftButton
+LEAVE = ("calibrate.leave", "protocol.leave", "inspect.stop")
+# What would end the run, take away its calibration, or keep the machine busy for many minutes.
+LEFT_ALONE = (
+    "file.quit",
+    "sensors.remove",
+    "precision.",
+    "preferences.",
+    "bench.rate",
+    "help.board_",
+)
+CANVAS = QGraphicsView, Interactor
+ITEMS = QComboBox, QAbstractSpinBox, QAbstractSlider, QTabBar
+CONTROLS = (QAbstractButton, *ITEMS, QLineEdit, QAbstractItemView, *CANVAS)
+KEYS = Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home
+TEXTS = "A 1", "press 7", "0.5", "-3", "none", "x" * 60
+NEAR_THE_END = 12  # actions in a dialog
+ERRANDS = (
+    tuple(f"calibrate.{name}" for name in ("lay", "capture", "captures", "live", "next")),
+    ("navigation.button.calibrate", "start.demo", "question.open", "setup.accept", "calibrate.lay"),
+    ("navigation.button.calibrate", "start.recent.0", "calibrate.captures", "calibrate.next"),
+    ("navigation.button.measure", "measure.propose", "measure.tool.distance", "protocol.bench"),
+    ("navigation.button.inspect", "inspect.record", "inspect.pause", "inspect.record"),
+)
 
 
 class Soak:
-    """Acts and rests by turns until the time is over.
+    """Acts at random and rests by turns until the time is over."""
 
-    Parameters
-    ----------
-    options : Namespace
-        Of the command.
-    scratch : Path
-        Folder for everything that is written.
-    hung : file
-        Takes where the program hangs.
-    """
-
-    def __init__(self, options: argparse.Namespace, scratch: Path, hung: int) -> None:
-        # Heavy, and only after the folders of the user are set.
-        from soak_figures import HEAD
-
-        self.options, self.scratch, self._hung = options, scratch, hung
-        self.rows: list = []
-        self.spent = Spent()
-        self._shown = 0
-        self._began_s = time.monotonic()
-        print(HEAD, flush=True)
-
-    def begin(self) -> None:
-        """Take the window, and let a person come."""
-        from soak_figures import LogWatch
-        from soak_person import Person
-
-        from app.shell.main_window import MainWindow
-        from app.sources.bench import Bench
-
+    def __init__(self) -> None:
         windows = QApplication.topLevelWidgets()
         self.window = next(w for w in windows if isinstance(w, MainWindow))
         self.context = self.window.context
-        self.log = LogWatch(self.context.log)
-        (self.scratch / "saved").mkdir()
-        self._actions = (self.scratch / "actions.log").open("w", encoding="utf-8")
-        self.person = Person(self.window, self.scratch, self._actions, self.options.seed)
-        self.context.source.bench = Bench()
-        self.context.source.bench.adjust(rate_hz=RATE_HZ)
-        self._calibration: Path | None = None
-        self._lateness = Lateness()
-        self._look_after = QTimer(self.window)
-        self._look_after.timeout.connect(self._still_alive)
-        self._look_after.start(1000)
-        self.window.page("inspect").depth.shown.connect(self._count)
-        self._rest()
-
-    def _count(self, _shown: object) -> None:
-        self._shown += 1
-
-    def _still_alive(self) -> None:
-        faulthandler.dump_traceback_later(HUNG_S, file=self._hung)
-
-    def _later(self, seconds: float, what: object) -> None:
-        QTimer.singleShot(int(1e3 * seconds), self.window, what)
-
-    def _rest(self) -> None:
-        self.person.rest()
-        self.person.note("rest")
-        self._rests_by_s = time.monotonic() + LONGEST_UNREST_S
-        self._close_next()
-
-    def _close_next(self) -> None:
-        """Close what is open, one thing at a time, until nothing is, and nothing is computed."""
-        if (self._closed() and not self._computes()) or time.monotonic() > self._rests_by_s:
-            self._arrange()
-            self._later(SETTLES_S, self._begin_to_measure)
-        else:
-            self._later(1e-3 * LOOK_MS, self._close_next)
-
-    def _closed(self) -> bool:
-        """Close the uppermost menu or dialog, or show Inspect; whether there was nothing to do."""
-        dialogs = [w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog)]
-        popup = QApplication.activePopupWidget()
-        upper = (
-            popup
-            or QApplication.activeModalWidget()
-            or next((dialog for dialog in dialogs if dialog.isVisible()), None)
+        self.random, self.resting, self.dialog_age, self.shown = random.Random(SEED), True, 0, 0
+        self.next: deque[Callable[[], object]] = deque()
+        self.rows: list[tuple[float, ...]] = []
+        self.began_s = time.monotonic()
+        self.actions = (FOLDER / "actions.log").open("w")
+        self.hung = (FOLDER / "hung.log").open("w")
+        self.context.source.bench = Bench(SensorDesign().scaled(0.25))
+        workspace = self.context.workspace
+        self.calibration = workspace.import_calibration(FOLDER / "sensor.gplcal")
+        self.window.page("inspect").live_depth.shown.connect(self.count)
+        self.alive = QTimer(self.window)
+        self.alive.timeout.connect(
+            lambda: faulthandler.dump_traceback_later(HUNG_S, file=self.hung)
         )
+        self.alive.start(1000)
+        self.rest()
+
+    def count(self, _shown: object) -> None:
+        self.shown += 1
+
+    def later(self, seconds: float, act: Callable[[], object]) -> None:
+        QTimer.singleShot(int(1e3 * seconds), self.window, act)
+
+    # Rest
+
+    def rest(self) -> None:
+        self.resting = True
+        self.next.clear()
+        self.unrest_ends_s = time.monotonic() + LONGEST_UNREST_S
+        self.close_next()
+
+    def close_next(self) -> None:
+        """Close what is open, one thing at a time, until nothing is, and nothing is computed."""
+        dialogs = (w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog))
+        upper = QApplication.activePopupWidget() or QApplication.activeModalWidget()
+        upper = upper or next((dialog for dialog in dialogs if dialog.isVisible()), None)
+        works = [*below(self.window, Jobs), *below(self.window, Work)]
         if upper is not None:
             upper.close()
         elif self.window.page_name != "inspect":
-            self.person.press("navigation.button.inspect")
-        else:
-            return True
-        return False
+            self.press("navigation.button.inspect")
+        elif not any(part.busy for part in works) or time.monotonic() > self.unrest_ends_s:
+            self.arrange()
+            self.later(SETTLES_S, lambda: setattr(self, "shown", 0))
+            self.later(SETTLES_S + MEASURED_S, self.measure)
+            return
+        self.later(0.2, self.close_next)
 
-    def _computes(self) -> bool:
-        from app.measure.work import Work
-        from app.services.jobs import Jobs
-        from app.widgets.qt_tree import below
-
-        parts = [*below(self.window, Jobs), *below(self.window, Work)]
-        return any(part.busy for part in parts)
-
-    def _arrange(self) -> None:
-        """Put away sessions, runs and images, and show the same scene as at every rest."""
-        from app.measure.press_view import PressView
-        from app.widgets.qt_tree import below
-
-        for kind in (QAction, QAbstractButton):
-            for name in LEFT:
-                for part in list(below(self.window, kind, name)):
-                    part.trigger() if kind is QAction else part.click()
+    def arrange(self) -> None:
+        """Leave sessions, runs and images, and show the same scene as at every rest."""
+        for name in LEAVE:
+            for action in list(below(self.window, QAction, name)):
+                action.trigger()
+            for button in list(below(self.window, QAbstractButton, name)):
+                button.click()
         for press_view in list(below(self.window, PressView)):
             press_view.release()
         page, source = self.window.page("inspect"), self.context.source
@@ -154,105 +162,198 @@ class Soak:
             page.pause_action.trigger()
         self.window.showNormal()
         self.window.resize(*SIZE)
-        page.findChild(QAction, "inspect.layout").trigger()
-        self._use_calibration()
+        if self.context.workspace.in_use != self.calibration:
+            self.context.workspace.use(self.calibration)
+            self.context.requests.calibrations_changed.emit()
         source.choose_virtual_sensor()
         for fault in tuple(source.bench.conditions.faults):
             source.bench.switch(fault, False)
         source.bench.lay("ball")
         source.bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
 
-    def _use_calibration(self) -> None:
-        """Put the calibration into use: most of what a frame costs is its own."""
-        wanted, workspace = self.options.calibration, self.context.workspace
-        if wanted is None:
+    def measure(self) -> None:
+        gc.collect()  # what refers to itself only waits for that, and is no leak
+        give_back()
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        memory_mb = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+        minutes = (time.monotonic() - self.began_s) / 60.0
+        counts = threading.active_count(), len(QApplication.allWidgets())
+        self.rows.append((minutes, memory_mb, self.shown / MEASURED_S, *counts))
+        self.note(str(self.rows[-1]))
+        if minutes < MINUTES:
+            self.resting = False
+            self.act()
+            self.later(WORKS_S, self.rest)
             return
-        if self._calibration is None or not self._calibration.is_file():
-            self._calibration = workspace.import_calibration(wanted)
-        if workspace.in_use != self._calibration:
-            workspace.use(self._calibration)
-            self.context.requests.calibrations_changed.emit()
-
-    def _begin_to_measure(self) -> None:
-        self._shown = 0
-        self._lateness.late_ms.clear()
-        self._later(MEASURED_S, self._measure)
-
-    def _measure(self) -> None:
-        from soak_figures import measured
-
-        late = self._lateness.late_ms
-        row = measured(self._began_s, self._shown / MEASURED_S, late, self.log, self.scratch)
-        self.rows.append(row)
-        print(row.reported(), flush=True)
-        found = sorted(self.scratch.rglob("*.gplrec"), key=lambda path: path.stat().st_mtime)
-        for path in found[:-KEPT_RECORDINGS]:
-            path.unlink()
-        if row.minutes < self.options.minutes:
-            self.person.begin()
-            self._later(WORKS_S, self._rest)
-            return
-        self._lateness.timer.stop()
-        self._look_after.stop()
-        self.log.look()
-        self.person.note("close")
+        self.alive.stop()
+        faulthandler.cancel_dump_traceback_later()
+        records = self.context.log.recent.since(0)
+        # A message to the user that something is impossible is no error of the program.
+        errors = [r.text for r in records if r.level >= logging.ERROR]
+        errors = [e for e in errors if "services.toasts" not in e or "fault of this program" in e]
+        (FOLDER / "rests.json").write_text(json.dumps({"rows": self.rows, "errors": errors}))
         self.window.close()
 
+    # Work
 
-def conclude(soak: Soak, status: int, hung: Path) -> bool:
-    """Print what came out; return whether all is well."""
-    from soak_figures import conclude as conclude_figures
+    def note(self, what: str) -> None:
+        print(f"{time.monotonic() - self.began_s:9.2f} {what}", file=self.actions, flush=True)
 
-    output, wrong = conclude_figures(soak.rows)
-    wrong += [f"in the log: {text}" for text in soak.log.errors]
-    if status != 0:
-        wrong.append(f"the program's exit status is {status}")
-    if hung.stat().st_size:
-        wrong.append(f"it hung for {HUNG_S:.0f} s:\n{hung.read_text()}")
-    left = [t.name for t in threading.enumerate() if t is not threading.main_thread()]
-    print(f"{soak.person.actions} actions in {len(soak.rows)} rounds; {soak.spent.reported()}")
-    print(f"threads at the end: {', '.join(left) or 'none but the first'}")
-    for text, count in soak.log.others.most_common():
-        print(f"warned or refused {count} times: {text}")
-    print("\n".join(output))
-    print("\n".join(f"WRONG: {sentence}" for sentence in wrong) or "Nothing is wrong.")
-    return not wrong
+    def act(self) -> None:
+        if self.resting:
+            return
+        # Before the action: a menu or dialog that it opens may wait within it for what follows.
+        self.later(1e-3 * self.random.randint(*PAUSE_MS), self.act)
+        popup, modal = QApplication.activePopupWidget(), QApplication.activeModalWidget()
+        if self.next:
+            self.next.popleft()()
+        elif popup is not None:
+            self.at_popup(popup)
+        elif modal is not None:
+            self.at_dialog(modal)
+        else:
+            self.dialog_age = 0
+            work = (self.touch_page, self.touch_window, self.errand, self.shortcut, self.menu,
+                    self.resize)  # fmt: skip
+            self.random.choices(work, (50, 15, 25, 10, 5, 3))[0]()
+
+    def touch_page(self) -> None:
+        self.touch(self.window.page(self.window.page_name or "sensors"))
+
+    def touch_window(self) -> None:
+        self.touch(self.window)
+
+    def touch(self, root: QWidget) -> None:
+        """Use a control, of a kind that is chosen first: there are more spin boxes than views."""
+        kinds: dict[type, list[QWidget]] = {}
+        for widget in below(root, QWidget):
+            kind = next((k for k in CONTROLS if isinstance(widget, k)), None)
+            if kind is not None and can_be_used(widget):
+                kinds.setdefault(kind, []).append(widget)
+        if kinds:
+            self.use(self.random.choice(kinds[self.random.choice(list(kinds))]))
+
+    def press(self, name: str) -> None:
+        """Use the control or action of a name, if there is one that can be used."""
+        for widget in below(self.window, QWidget, name):
+            if can_be_used(widget):
+                self.use(widget)
+                return
+        for action in below(self.window, QAction, name):
+            if action.isEnabled():
+                self.note(f"action {name}")
+                action.trigger()
+                return
+
+    def errand(self) -> None:
+        for name in self.random.choice(ERRANDS):
+            self.next.append(lambda name=name: self.press(name))
+
+    def use(self, widget: QWidget) -> None:
+        """Use a control as its kind is used."""
+        self.note(f"{type(widget).__name__} {widget.objectName() or '(no name)'}")
+        if isinstance(widget, QAbstractButton):
+            middle = widget.rect().center()
+            QTest.mouseClick(
+                widget, LEFT, pos=QPoint(10, middle.y()) if widget.isCheckable() else middle
+            )
+        elif isinstance(widget, ITEMS):
+            QTest.keyClick(widget, self.random.choice(KEYS))
+        elif isinstance(widget, QLineEdit):
+            widget.selectAll()
+            QTest.keyClicks(widget, self.random.choice(TEXTS))
+            QTest.keyClick(widget, Qt.Key.Key_Return)
+        elif isinstance(widget, QAbstractItemView):
+            self.use_item(widget)
+        else:
+            self.drag(widget)
+
+    def use_item(self, view: QAbstractItemView) -> None:
+        model, top = view.model(), QModelIndex()
+        if model is None or model.rowCount(top) == 0:
+            return
+        index = model.index(self.random.randrange(model.rowCount(top)), 0, top)
+        view.scrollTo(index)
+        QTest.mouseClick(view.viewport(), LEFT, pos=view.visualRect(index).center())
+
+    def drag(self, view: QWidget) -> None:
+        """Drag over a view within the next moments."""
+        target = view.viewport() if isinstance(view, QGraphicsView) else view
+        sides = max(1, target.width()), max(1, target.height())
+        places = [QPoint(*map(self.random.randrange, sides)) for _ in range(4)]
+        button = self.random.choice((LEFT, LEFT, LEFT, Qt.MouseButton.RightButton))
+        steps = [(QTest.mousePress, button, places[0]), (QTest.mouseRelease, button, places[-1])]
+
+        def act(step: Callable[..., object], button: Qt.MouseButton, place: QPoint) -> None:
+            if isValid(target) and target.isVisible():
+                step(target, button, pos=place)
+
+        def move(place: QPoint) -> None:
+            if isValid(target) and target.isVisible():
+                QTest.mouseMove(target, place)
+
+        moves = [lambda place=place: move(place) for place in places]
+        self.next.extend((lambda: act(*steps[0]), *moves, lambda: act(*steps[1])))
+
+    def at_popup(self, popup: QWidget) -> None:
+        view = next(below(popup, QAbstractItemView), None)
+        if isinstance(popup, QMenu) and self.random.random() < 0.8:
+            actions = [a for a in popup.actions() if may_be_used(a) and not a.isSeparator()]
+            if actions:
+                action = self.random.choice(actions)
+                self.note(f"menu {action.objectName() or action.text()}")
+                QTest.mouseClick(popup, LEFT, pos=popup.actionGeometry(action).center())
+                return
+        elif view is not None and self.random.random() < 0.8:
+            self.use_item(view)
+            return
+        self.note("Escape from a menu")
+        QTest.keyClick(popup, Qt.Key.Key_Escape)
+
+    def at_dialog(self, dialog: QWidget) -> None:
+        self.dialog_age += 1
+        line = next(below(dialog, QLineEdit, "fileNameEdit"), None)
+        if isinstance(dialog, QFileDialog) and line is not None and self.dialog_age < 3:
+            line.setText(str(FOLDER / f"{len(self.rows)}-{self.random.randrange(1000)}"))
+            QTest.keyClick(line, Qt.Key.Key_Return)
+        elif self.dialog_age > NEAR_THE_END or self.random.random() < 0.15:
+            self.note(f"Escape from {dialog.objectName() or type(dialog).__name__}")
+            QTest.keyClick(dialog, Qt.Key.Key_Escape)
+        else:
+            self.touch(dialog)
+
+    def shortcut(self) -> None:
+        actions = [a for a in below(self.window, QAction) if not a.shortcut().isEmpty()]
+        actions = [a for a in actions if may_be_used(a)]
+        if actions:
+            action = self.random.choice(actions)
+            self.note(f"{action.shortcut().toString()} ({action.objectName()})")
+            QTest.keySequence(self.window, action.shortcut())
+
+    def menu(self) -> None:
+        bar = self.window.menuBar()
+        action = self.random.choice(bar.actions())
+        QTest.mouseClick(bar, LEFT, pos=bar.actionGeometry(action).center())
+
+    def resize(self) -> None:
+        self.window.resize(self.random.randint(1000, 1900), self.random.randint(700, 1150))
 
 
-def main() -> None:
-    """Run the program, and exit with 1 where something is wrong."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=0, help="of the actions")
-    parser.add_argument("--calibration", type=Path, help="of the virtual sensor")
-    parser.add_argument("--scratch", type=Path, help="folder for all that is written, kept")
-    options = parser.parse_args()
-    scratch = options.scratch or Path(tempfile.mkdtemp(prefix="gelpolight-soak-"))
-    scratch.mkdir(parents=True, exist_ok=True)
-    for name in ("CONFIG_HOME", "DATA_HOME", "STATE_HOME", "CACHE_HOME", "DOCUMENTS_DIR"):
-        (scratch / name.lower()).mkdir(exist_ok=True)
-        os.environ[f"XDG_{name}"] = str(scratch / name.lower())
-    os.environ["HOME"] = str(scratch)
-    # With threads, Mesa's renderer in software keeps the room of its largest drawings, the more of
-    # it the busier the machine: tens of megabytes an hour that are not the program's.
-    os.environ.setdefault("LP_NUM_THREADS", "0")
-    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-    from app import desktop
+def may_be_used(part: QAction | QWidget) -> bool:
+    """Return whether a person of a soak may use an action or a control."""
+    return part.isVisible() and part.isEnabled() and not part.objectName().startswith(LEFT_ALONE)
 
-    hung = scratch / "hung.log"
-    application = desktop.make_application()
-    with hung.open("w") as place:
-        soak = Soak(options, scratch, place.fileno())
-        QTimer.singleShot(2000, application, soak.begin)
-        status = desktop.run([])
-        faulthandler.cancel_dump_traceback_later()
-    well = conclude(soak, status, hung)
-    if well and options.scratch is None:
-        shutil.rmtree(scratch)
-    else:
-        print(f"kept: {scratch}")
-    sys.exit(0 if well else 1)
+
+def can_be_used(widget: QWidget) -> bool:
+    """Return whether a control may be used and is no part of another."""
+    part = isinstance(widget, QScrollBar) or widget.objectName().startswith("qt_")
+    inner = isinstance(widget, QLineEdit) and isinstance(
+        widget.parentWidget(), QAbstractSpinBox | QComboBox
+    )
+    return may_be_used(widget) and not (part or inner or widget.visibleRegion().isEmpty())
 
 
 if __name__ == "__main__":
-    main()
+    application, soaks = desktop.make_application(), []
+    QTimer.singleShot(2000, application, lambda: soaks.append(Soak()))
+    sys.exit(desktop.run([]))

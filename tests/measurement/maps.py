@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import zoom
 
+from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Array = NDArray[np.float64]
@@ -41,6 +42,15 @@ def on_grid(depth: Array, x: Array, y: Array, flags: NDArray[np.uint8] | None = 
     flags = np.zeros(depth.shape, np.uint8) if flags is None else flags
     pitch = float(x[1] - x[0])
     return HeightMap(depth, x, y, pitch, None, flags, "T-1", "full", "made.png")
+
+
+def measurement(shape: str, size: float, height: float) -> Measurement:
+    """Return what a fit could have found."""
+    sides = (size, size) if shape == "cuboid" else None
+    sd = {"side_mm": (0.01, 0.01)} if sides else {"diameter_mm": 0.01}
+    diameter, outline = None if sides else size, np.zeros((3, 2))
+    return Measurement(shape, diameter, sides, height, (0.0, 0.0), None, 0.7,
+                       sd | {"height_mm": 0.005}, 0.1, 0.02, 0.0, 0.003, 1.0, outline)  # fmt: skip
 
 
 def stated(count: int, sigma_mm: float, *, model_mm: float = 0.0) -> dict[str, object]:

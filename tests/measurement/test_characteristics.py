@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from measurement.test_evaluation import measurement, press
 from scipy.ndimage import gaussian_filter1d
 
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -26,11 +25,13 @@ from gelpolight_core.session.images import write_image
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor
+from tests.measurement.maps import measurement
+from tests.measurement.test_evaluation import press
 
 
 @pytest.fixture(scope="module")
 def known() -> KnownSensor:
-    return known_sensor(SensorDesign().scaled(0.5))
+    return known_sensor(SensorDesign().scaled(0.25))
 
 
 def by_key(results: list[Press], flat: tuple[np.ndarray, ...] = ()) -> dict[str, Characteristic]:

@@ -50,38 +50,6 @@ def test_the_membrane_leaves_a_ball_without_a_kink(
     assert 0.0 < edge < radius
 
 
-def test_a_filleted_edge_lies_below_a_sharp_one_and_inside_its_nominal_wall() -> None:
-    radius = np.linspace(0.0, 6.0, 1201)
-    options = {"cylinder_radius_mm": 2.0, "height_mm": 1.0, "decay_mm": 0.7}
-    sharp = cylinder_depth(radius, **options)
-    round_edge = cylinder_depth(radius, **options, edge_radius_mm=0.1)
-    assert np.all(round_edge <= sharp + 1e-12)
-    assert round_edge[radius < 1.9].min() == pytest.approx(1.0, abs=1e-12)
-    # The drape of a fillet looks like that of a cylinder smaller by about half the fillet.
-    assert np.interp(0.5, round_edge[::-1], radius[::-1]) == pytest.approx(
-        np.interp(0.5, sharp[::-1], radius[::-1]) - 0.045, abs=0.02
-    )
-
-
-def test_the_blur_of_a_cylinder_is_that_of_a_gaussian() -> None:
-    from scipy.ndimage import gaussian_filter
-
-    pitch, blur = 0.02, 0.05
-    place = np.arange(-4.0, 4.0, pitch)
-    radius = np.hypot(place[:, None], place[None, :])
-    options = {
-        "cylinder_radius_mm": 1.5,
-        "height_mm": 1.0,
-        "decay_mm": 0.7,
-        "edge_radius_mm": 0.1,
-    }
-    truth = gaussian_filter(cylinder_depth(radius, **options), blur / pitch)
-    model = cylinder_depth(radius, **options, blur_mm=blur)
-    inner = slice(20, -20)
-    # The wall is taken as straight: its curvature changes the result by (blur / radius)**2.
-    assert np.abs(model - truth)[inner, inner].max() < 2e-3
-
-
 def obstacle_solution(indenter: Array, pitch: float, decay: float) -> Array:
     """Solve the membrane over an indenter on a quarter of the plane, by active sets."""
     rows, columns = indenter.shape

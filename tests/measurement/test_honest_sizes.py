@@ -7,13 +7,12 @@ corners of its own.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from maps import on_grid
 from scipy.ndimage import gaussian_filter
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.indenter_tools import measure_heightmap, mode_error
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.result import Measurement
@@ -22,8 +21,10 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Cuboid, Cylinder, press
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane
 from gelpolight_core.studies.known_sensor import KnownSensor, known_sensor, matt_design
+from tests.measurement.maps import on_grid
 
-DECAY_MM = 0.7
+DECAY_MM, PITCH_MM = 0.7, 0.04
+MODES = "best", "balanced", "fast", "paper"
 
 
 def measured(
@@ -35,7 +36,7 @@ def measured(
     edge_radius_mm: float | None = None,
 ) -> Measurement:
     """Measure the true surface, blurred and with noise of 0.2 um."""
-    surface = press(indenter, yaw_deg=20.0, decay_mm=DECAY_MM)
+    surface = press(indenter, yaw_deg=20.0, decay_mm=DECAY_MM, pitch_mm=PITCH_MM)
     depth = gaussian_filter(surface.depth_mm.astype(float), blur_mm / surface.pitch_mm)
     depth += 2e-4 * np.random.default_rng(0).standard_normal(depth.shape)
     # A reconstruction's errors hang together over the drape.
@@ -59,20 +60,43 @@ def sizes(measurement: Measurement) -> list[tuple[float, float]]:
     return list(zip(measurement.side_mm, measurement.sd["side_mm"], strict=True))
 
 
-@pytest.mark.parametrize(("depth_mm", "edge_mm"), [(0.3, 0.05), (1.0, 0.1)])
-def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide(
-    depth_mm: float, edge_mm: float
-) -> None:
+@cache
+def sensor() -> KnownSensor:
+    """Return a matt virtual sensor of 320x240 pixels with its exact calibration."""
+    return known_sensor(matt_design(0.25))
+
+
+@cache
+def frame(indenter: Cylinder | Cuboid, number: int) -> np.ndarray:
+    """Return the image of a press; the number chooses its place."""
+    place = {"x_mm": 1.5 - number, "y_mm": 0.5 * number - 1.0, "yaw_deg": 13.0 * number}
+    surface = press(indenter, **place, decay_mm=DECAY_MM)
+    return sensor().sensor.frame(PressedMembrane(surface), stream=f"press {number}")
+
+
+def departures(mode: str, indenter: Cylinder | Cuboid, number: int) -> list[tuple[float, float]]:
+    """Return how far height and sizes of a press are from the truth, and their deviations."""
+    options = {"model": "paper"} if mode == "paper" else {"effort": mode}
+    reconstructor = Reconstructor(sensor().calibration, **options)
+    image = frame(indenter, number)
+    heightmap = reconstructor.depth(image, normals=False, uncertainty=mode == "best")
+    result = measure_heightmap(heightmap, shape=type(indenter).__name__.lower())
+    size = 2.0 * indenter.reach_mm
+    height = result.height_mm - indenter.depth_mm, result.sd["height_mm"]
+    return [height, *((value - size, sd) for value, sd in sizes(result))]
+
+
+def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide() -> None:
     """The corners hold the membrane further out: a fit without that found a rounder edge."""
-    found = measured(Cuboid(5.0, depth_mm, edge_mm), "cuboid", blur_mm=0.03)
+    found = measured(Cuboid(5.0, 1.0, 0.1), "cuboid", blur_mm=0.03)
     for size, sd in sizes(found):
         assert abs(size - 5.0) < 0.065
         assert abs(size - 5.0) < 2.0 * sd
         assert sd < 0.15
-    assert found.height_mm == pytest.approx(depth_mm, abs=0.001)
+    assert found.height_mm == pytest.approx(1.0, abs=0.001)
 
 
-@pytest.mark.parametrize("blur_mm", [0.02, 0.07, 0.11])
+@pytest.mark.parametrize("blur_mm", [0.04, 0.11])
 def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm: float) -> None:
     """What the grid alone does not explain of a blur was taken for a rounder edge."""
     found = measured(Cylinder(5.0, 0.5, 0.08), "cylinder", blur_mm=blur_mm)
@@ -81,23 +105,29 @@ def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm: float) -> None:
     assert found.blur_mm == pytest.approx(blur_mm, abs=0.01)
 
 
-@pytest.mark.parametrize("edge_mm", [0.0, 0.08, 0.15, 0.3, 0.5])
 @pytest.mark.parametrize("kind", [Cylinder, Cuboid])
 def test_a_rounded_edge_does_not_make_an_object_smaller_than_it_states(
-    kind: type[Cylinder | Cuboid], edge_mm: float
+    kind: type[Cylinder | Cuboid],
 ) -> None:
     """Edges of 0.15 to 0.5 mm were measured 60 to 400 um too small, and called ok.
 
     Where edge and blur cannot be told apart, the deviation says so; where they can, the size is
     right.
     """
+    holds_size(kind, 0.3, 0.015, known=True)
+    holds_size(kind, 0.3, 0.07, known=False)
+
+
+def holds_size(
+    kind: type[Cylinder | Cuboid], edge_mm: float, blur_mm: float, *, known: bool
+) -> None:
+    """Measure an object of 5 mm with a rounded edge."""
     shape = kind.__name__.lower()
-    for blur_mm, known in ((0.015, True), (0.07, True), (0.07, False)):
-        found = measured(kind(5.0, 1.0, edge_mm), shape, blur_mm=blur_mm, known=known)
-        for size, sd in sizes(found):
-            assert abs(size - 5.0) < 3.0 * sd or found.verdict == "doubtful"
-            if known and blur_mm < 0.02 and edge_mm > 0.1:
-                assert abs(size - 5.0) < 0.02
+    found = measured(kind(5.0, 1.0, edge_mm), shape, blur_mm=blur_mm, known=known)
+    for size, sd in sizes(found):
+        assert abs(size - 5.0) < 3.0 * sd or found.verdict == "doubtful"
+        if known and blur_mm < 0.02 and edge_mm > 0.1:
+            assert abs(size - 5.0) < 0.02
 
 
 def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported() -> None:
@@ -113,76 +143,20 @@ def test_a_stated_edge_radius_is_used_and_a_wrong_one_reported() -> None:
     assert wrong.verdict == "doubtful"
 
 
-@pytest.mark.parametrize(("shape", "radius_mm"), [("ball", 0.1), ("cylinder", -0.1)])
-def test_an_edge_radius_that_cannot_be_is_refused(shape: str, radius_mm: float) -> None:
-    with pytest.raises(InputError):
-        measured(Cylinder(5.0, 1.0, 0.1), shape, blur_mm=0.02, edge_radius_mm=radius_mm)
-
-
-def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board(sensor: KnownSensor) -> None:
-    surface = press(Cylinder(3.0, 0.5), decay_mm=DECAY_MM)
-    frame = sensor.sensor.frame(PressedMembrane(surface), stream="blur")
-    heightmap = Reconstructor(sensor.calibration).depth(frame, normals=False)
+def test_the_blur_of_a_map_is_that_of_its_nodes_and_of_the_board() -> None:
+    image = frame(Cylinder(3.0, 0.5), 2)
+    heightmap = Reconstructor(sensor().calibration).depth(image, normals=False)
     known = mode_error(replace(heightmap, image_blur_mm=0.5 * heightmap.pitch_mm))
     unknown = mode_error(replace(heightmap, image_blur_mm=None))
     assert known.blur_mm2 == pytest.approx(unknown.blur_mm2 + (0.5 * heightmap.pitch_mm) ** 2)
     assert known.blur_sd_mm2 < 0.2 * unknown.blur_sd_mm2
 
 
-@pytest.fixture(scope="module")
-def sensor() -> KnownSensor:
-    """Return a matt virtual sensor of 320x240 pixels with its exact calibration."""
-    return known_sensor(matt_design(0.25))
-
-
-MODES = ("best", "balanced", "fast", "paper")
-
-
-@pytest.fixture(scope="module")
-def departures(sensor: KnownSensor) -> dict[str, np.ndarray]:
-    """Departures from the truth in standard deviations, and these in mm: (measured, 2)."""
-    found: dict[str, list[tuple[float, float]]] = {mode: [] for mode in MODES}
-    full = Reconstructor(sensor.calibration)
-    of = {mode: full.at_effort(mode) for mode in MODES if mode != "paper"}
-    of["paper"] = Reconstructor(sensor.calibration, model="paper")
-    for n, indenter in enumerate(
-        [
-            Cylinder(3.0, 0.5),
-            Cuboid(4.0, 1.0, 0.1),
-            Cuboid(5.0, 0.3, 0.1),
-            Cylinder(5.0, 1.5),
-            Cylinder(5.0, 1.0, 0.3),
-            Cuboid(5.0, 1.0, 0.5),
-        ]
-    ):
-        shape, depth = type(indenter).__name__.lower(), indenter.depth_mm
-        size = 2.0 * indenter.reach_mm
-        place = {"x_mm": 1.5 - n, "y_mm": 0.5 * n - 1.0, "yaw_deg": 13.0 * n}
-        surface = press(indenter, **place, decay_mm=DECAY_MM)
-        frame = sensor.sensor.frame(PressedMembrane(surface), stream=f"press {n}")
-        for mode, reconstructor in of.items():
-            heightmap = reconstructor.depth(frame, normals=False, uncertainty=mode == "best")
-            result = measure_heightmap(heightmap, shape=shape)
-            pairs = [(result.height_mm - depth, result.sd["height_mm"])]
-            pairs += [(value - size, sd) for value, sd in sizes(result)]
-            found[mode] += pairs
-    return {mode: np.array(pairs) for mode, pairs in found.items()}
-
-
 @pytest.mark.parametrize("mode", MODES)
-def test_sizes_are_right_within_what_they_state(
-    departures: dict[str, np.ndarray], mode: str
-) -> None:
-    error, sd = departures[mode].T
-    share = np.abs(error) / sd
-    assert np.mean(share <= 3.0) >= 0.95, share
-    assert share.max() < 5.0
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_the_stated_sd_is_no_empty_promise(departures: dict[str, np.ndarray], mode: str) -> None:
-    error, sd = departures[mode].T
-    assert np.sqrt(np.mean((error / sd) ** 2)) > 1.0 / 3.0
+def test_sizes_are_right_within_what_they_state(mode: str) -> None:
+    for indenter in (Cylinder(3.0, 0.5), Cuboid(5.0, 1.0, 0.5)):
+        error, sd = np.array(departures(mode, indenter, 2)).T
+        assert (np.abs(error) < 3.0 * sd).all(), error / sd
 
 
 def test_a_calibration_says_less_of_walls_steeper_than_its_balls() -> None:

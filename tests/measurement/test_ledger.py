@@ -14,28 +14,14 @@ from hypothesis import strategies as st
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reference import Truth
+from tests.measurement.maps import measurement
 
 
-def measurement(height: float = 1.0 / 3.0) -> Measurement:
+def measured(height: float = 1.0 / 3.0) -> Measurement:
     spread = {"side_mm": (0.1 / 3, 0.01), "height_mm": 1e-3 / 7, "yaw_deg": None}
-    return Measurement(
-        shape="cuboid",
-        diameter_mm=None,
-        side_mm=(4.0 / 3.0, 5.0 / 7.0),
-        height_mm=height,
-        centre_mm=(0.1, -0.2),
-        yaw_deg=12.3,
-        drape_decay_mm=0.7,
-        sd=spread,
-        edge_radius_mm=0.08,
-        blur_mm=None,
-        baseline_mm=-1e-5,
-        residual_rms_mm=0.003,
-        correlated_pixels=9.5,
-        outline_mm=np.random.default_rng(0).standard_normal((5, 2)),
-        noise_sd=None,
-        calibration_sd=spread,
-    )
+    outline = np.random.default_rng(0).standard_normal((5, 2))
+    found = replace(measurement("cuboid", 4.0 / 3.0, height), outline_mm=outline, blur_mm=None)
+    return replace(found, sd=spread, calibration_sd=spread, side_mm=(4.0 / 3.0, 5.0 / 7.0))
 
 
 def same(a: Measurement, b: Measurement) -> bool:
@@ -60,12 +46,12 @@ def test_a_measurement_comes_back_to_the_last_bit(
 ) -> None:
     path = tmp_path_factory.mktemp("ledger") / "m.jsonl"
     ledger = Ledger(path, "calibration full")
-    ledger.keep("a", measurement(height))
+    ledger.keep("a", measured(height))
     ledger.keep("b", "no object is pressed")
     again = Ledger(path, "calibration full")
     found = again.find("a")
     assert isinstance(found, Measurement)
-    assert same(found, measurement(height))
+    assert same(found, measured(height))
     assert again.find("b") == "no object is pressed"
     assert again.find("c") is None
 
@@ -88,12 +74,12 @@ def test_another_image_shape_or_calibration_is_measured_anew(tmp_path: Path, ima
 def test_a_line_cut_short_by_a_crash_costs_that_line_only(tmp_path: Path, cut: int) -> None:
     path = tmp_path / "m.jsonl"
     ledger = Ledger(path, "n")
-    ledger.keep("a", measurement())
-    ledger.keep("b", measurement())
+    ledger.keep("a", measured())
+    ledger.keep("b", measured())
     path.write_bytes(path.read_bytes()[:-cut])
     torn = Ledger(path, "n")
     assert torn.find("b") is None or cut == 1
-    torn.keep("c", replace(measurement(), height_mm=math.pi))
+    torn.keep("c", replace(measured(), height_mm=math.pi))
     whole = Ledger(path, "n")
     found = whole.find("c")
     assert isinstance(whole.find("a"), Measurement)

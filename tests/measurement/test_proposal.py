@@ -14,6 +14,7 @@ from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, press
 from gelpolight_core.simulation.surface import PressedSurface
+from tests.measurement.maps import on_grid
 
 PITCH = 0.08
 X = np.arange(-9.0, 9.0, PITCH)
@@ -28,21 +29,7 @@ def map_of(*surfaces: PressedSurface, noise_mm: float = 0.003) -> HeightMap:
         row = (Y - surface.y0_mm) / surface.pitch_mm
         grid = np.meshgrid(column.astype(np.float32), row.astype(np.float32))
         depth += cv2.remap(surface.depth_mm.astype(np.float32), *grid, cv2.INTER_LINEAR)
-    return whole(depth, X, Y)
-
-
-def whole(depth: np.ndarray, x: np.ndarray, y: np.ndarray) -> HeightMap:
-    return HeightMap(
-        depth_mm=depth.astype(np.float32),
-        x_mm=x,
-        y_mm=y,
-        pitch_mm=float(x[1] - x[0]),
-        normals=None,
-        flags=np.zeros(depth.shape, np.uint8),
-        calibration_id="T-1",
-        model="full",
-        source="made.png",
-    )
+    return on_grid(depth.astype(np.float32), X, Y)
 
 
 @pytest.mark.parametrize(
@@ -98,5 +85,5 @@ def test_true_surfaces_of_another_renderer_are_recognised(
     stride = max(round(0.08 / pitch), 1)
     depth = depth[::stride, ::stride]
     x, y = (a + stride * pitch * np.arange(n) for a, n in ((x0, depth.shape[1]), (y0, len(depth))))
-    found = propose(whole(depth, x, y))
+    found = propose(on_grid(depth.astype(np.float32), x, y))
     assert (None if found is None else found.candidates) == expected

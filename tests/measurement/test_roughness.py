@@ -97,13 +97,6 @@ def test_the_filter_passes_what_the_standard_says(length_mm: float) -> None:
     assert np.ptp(middle) / 2.0 == pytest.approx(passed_by_standard(length_mm), abs=0.002)
 
 
-def test_a_map_with_errors_gives_the_parameters_theirs() -> None:
-    clean = profile_roughness(wave(0.4))
-    noisy = profile_roughness(wave(0.4, **stated(40, 1e-3)))
-    assert clean[0].sd is None
-    assert 0.0 < noisy[0].sd < 0.2 * noisy[0].value
-
-
 def test_a_line_that_is_too_short_or_has_gaps_is_refused() -> None:
     profile = wave(0.4)
     with pytest.raises(InputError, match="shorter than two cut-offs"):

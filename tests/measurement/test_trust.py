@@ -7,10 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.command_line.main import main
 from app.measure.measuring import apply_tool
 from gelpolight_core import measure, read_height_map, write_height_map
-from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.finding import QualityTable, Verdict, judge
 from gelpolight_core.measurement.evaluation_run import press_measurement
 from gelpolight_core.measurement.indenter_tools import Cylinder
@@ -55,21 +53,6 @@ def test_a_failed_calibration_makes_every_measurement_doubtful(
     assert on_page.figures == alone.figures
     if not doubtful:
         assert on_page.verdict == alone.verdict
-
-
-def test_the_command_names_the_figure_that_failed(
-    small_session: Path,
-    small_calibration: Calibration,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    file, press = tmp_path / "c.gplcal", str(small_session / "presses" / PRESS)
-    write_calibration(judged_as(small_calibration, 41.7), file)
-    for arguments in (("--shape", "cylinder"), ("--tool", "cylinder")):
-        assert main(["measure", str(file), press, *arguments]) == 0
-        (verdict,) = [x for x in capsys.readouterr().out.splitlines() if "verdict" in x]
-        assert "doubtful" in verdict
-        assert "Depth off the ball: 41.7 %" in verdict
 
 
 def test_a_measurement_is_never_better_than_its_height_map(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import configparser
-import importlib.util
 import os
 import re
 import subprocess
@@ -16,7 +15,6 @@ import frozen_start
 import pytest
 
 from app.command_line.main import OPENED
-from app.context.pages import all_pages
 from app.shell.documentation import find_documentation
 from app.workspace.entries import ENDING as CALIBRATION
 from gelpolight_core.recording.recording import ENDING as RECORDING
@@ -29,10 +27,6 @@ SITE = "/build/venv/lib/python3.11/site-packages/"
 
 def taken(place: str, source: str = "") -> bool:
     return parts.is_wanted((place, source or SITE + place, "BINARY"))
-
-
-def test_every_folder_of_resources_is_taken_along() -> None:
-    assert {p.name for p in (ROOT / "resources").iterdir() if p.is_dir()} == set(parts.RESOURCES)
 
 
 def test_every_resource_lies_where_the_program_looks_for_it() -> None:
@@ -93,12 +87,6 @@ def test_nothing_that_the_program_imports_is_left_out() -> None:
     # A cluster needs an installation: its workers import the program by themselves.
     left_out = set(parts.LEFT_OUT_MODULES) - {"distributed", "dask"}
     assert not imported & left_out
-
-
-def test_every_page_is_in_a_package_that_is_taken_whole() -> None:
-    modules = {module for page in all_pages() for module in page.modules}
-    assert {module.split(".")[0] for module in modules} <= set(parts.PACKAGES)
-    assert all(importlib.util.find_spec(module) for module in modules)
 
 
 def _sources() -> str:

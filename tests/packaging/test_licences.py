@@ -132,27 +132,6 @@ def test_a_file_that_belongs_to_nobody_is_refused(
         collect(monkeypatch, tmp_path, package(tmp_path, License="MIT"), "libreadline.so.8")
 
 
-def test_the_theme_of_the_documentation_is_listed_and_its_pages_are_ours(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (tmp_path / "assets").mkdir()
-    (tmp_path / "assets" / "LICENSE").write_text("Permission is hereby granted", "utf-8")
-    monkeypatch.setattr(licences, "OURS", (tmp_path,))
-    monkeypatch.setattr(licences, "THEME", tmp_path / "assets")
-    pages = [
-        ("site/index.html", str(tmp_path / "index.html")),
-        ("site/assets/bundle.js", str(tmp_path / "assets" / "bundle.js")),
-    ]
-    builder = package(tmp_path, License_Expression="MIT")
-    builder.name, builder.files = "pyinstaller", []
-    monkeypatch.setattr(licences, "distributions", lambda: [builder])
-    found = {part.name: part for part in licences.collect(pages)}
-    theme = found.pop("Material for MkDocs")
-    assert list(found) == ["pyinstaller"]
-    assert (theme.licence, theme.places) == ("MIT", ["site/assets/bundle.js"])
-    assert "Permission is hereby granted" in licences.written([theme])
-
-
 def test_every_dependency_of_the_program_may_be_shipped() -> None:
     lock = (ROOT / "packaging" / "requirements.lock").read_text("utf-8")
     names = [

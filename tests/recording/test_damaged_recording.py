@@ -5,11 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import resource
-import signal
 import struct
-import subprocess
-import sys
-import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +19,6 @@ from gelpolight_core.recording import layout, reader
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import VERSION, RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -108,46 +102,6 @@ def test_a_newer_version_is_refused_in_one_line(whole: bytes, place: Path) -> No
     place.write_bytes(newer)
     with pytest.raises(InputError, match=f"has version {VERSION + 1}, but this program"):
         Recording.open(place)
-
-
-WRITE_FOR_EVER = """
-import sys
-from pathlib import Path
-from recorded import noisy
-from gelpolight_core.recording.recording import RecordingHeader
-from gelpolight_core.recording.writer import RecordingWriter
-
-writer = RecordingWriter(Path(sys.argv[1]), RecordingHeader(serial="A"))
-for number in range(10**6):
-    writer.append(noisy(number % 50, (120, 160)), number, float(number))
-    print(number, flush=True)
-"""
-
-
-def test_a_killed_program_loses_no_confirmed_frame(tmp_path: Path) -> None:
-    path = tmp_path / "a.gplrec"
-    program = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(WRITE_FOR_EVER), str(path)],
-        stdout=subprocess.PIPE,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])},
-        text=True,
-    )
-    assert program.stdout is not None
-    for line in program.stdout:
-        if int(line) >= 40:
-            break
-    program.send_signal(signal.SIGKILL)
-    output = [int(line) for line in program.stdout.read().split()]
-    program.stdout.close()
-    program.wait()
-    with Recording.open(path) as recording:
-        assert recording.truncated
-        assert len(recording) > max([40, *output])
-        for index in range(len(recording)):
-            frame = recording.frame(index)
-            assert frame.number == index
-            assert np.array_equal(frame.rgb, noisy(index % 50, (120, 160)))
 
 
 def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path: Path) -> None:

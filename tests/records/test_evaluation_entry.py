@@ -5,32 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.press import Press
-from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.records.evaluation_entry import add_once, evaluation_record
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.reference import Truth
+from tests.measurement.maps import measurement
 
-FIT = Measurement(
-    shape="cylinder",
-    diameter_mm=5.0,
-    side_mm=None,
-    height_mm=1.0,
-    centre_mm=(0.0, 0.0),
-    yaw_deg=None,
-    drape_decay_mm=0.7,
-    sd={"diameter_mm": 0.02, "height_mm": 0.004},
-    edge_radius_mm=0.08,
-    blur_mm=0.05,
-    baseline_mm=0.0,
-    residual_rms_mm=0.001,
-    correlated_pixels=10.0,
-    outline_mm=np.zeros((3, 2)),
-)
+FIT = measurement("cylinder", 5.0, 1.0)
 
 
 def evaluation(*errors: tuple[float, float], failed: int = 0) -> Evaluation:

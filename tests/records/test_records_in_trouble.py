@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sqlite3
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -20,7 +16,6 @@ from gelpolight_core.records import schema
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.records import NAME, Records
 
-ROOT = Path(__file__).resolve().parents[2]
 RECORD = MeasurementRecord(
     "A-1",
     "c1",
@@ -28,33 +23,6 @@ RECORD = MeasurementRecord(
     (Quantity("diameter_mm", 3.05, 0.01, 3.0),),
     time=datetime(2026, 1, 1, tzinfo=UTC),
 )
-
-ADD_FOR_EVER = """
-import sys
-import time
-from pathlib import Path
-from gelpolight_core.quantity import Quantity
-from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.records import Records
-
-records = Records.open(Path(sys.argv[1]))
-while True:
-    values = tuple(Quantity(f"q{k}_mm", 1.0) for k in range(20))
-    print(records.add(MeasurementRecord("A", "c", "cylinder", values)), flush=True)
-    # No two people are so quick that a third program finds no moment to look.
-    time.sleep(0.003)
-"""
-
-
-def adding(path: Path) -> subprocess.Popen[str]:
-    """Start a program that stores measurements and prints the number of each."""
-    return subprocess.Popen(
-        [sys.executable, "-c", ADD_FOR_EVER, str(path)],
-        stdout=subprocess.PIPE,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        text=True,
-    )
 
 
 @pytest.mark.parametrize("link", [Path.symlink_to, Path.hardlink_to])
@@ -76,31 +44,6 @@ def test_no_records_appear_where_a_dangling_link_points(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="link"):
         Records.open(tmp_path / NAME)
     assert not (tmp_path / "elsewhere.sqlite").exists()
-
-
-def test_a_killed_program_loses_or_splits_no_measurement(tmp_path: Path) -> None:
-    """Two at the same time, both killed while writing."""
-    path = tmp_path / NAME
-    programs = [adding(path), adding(path)]
-    output: set[int] = set()
-    for program in programs:
-        assert program.stdout is not None
-        for _ in range(8):
-            output.add(int(program.stdout.readline()))
-    for program in programs:
-        program.send_signal(signal.SIGKILL)
-    for program in programs:
-        assert program.stdout is not None
-        output.update(int(line) for line in program.stdout.read().split())
-        program.stdout.close()
-        program.wait()
-    assert len(output) >= 16
-    with Records.open(path) as records:
-        assert not records.notice
-        found = records.measurements()
-        assert output <= {record.id for record in found}
-        assert all(len(record.quantities) == 20 for record in found)
-        records.add(RECORD)
 
 
 def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path: Path) -> None:

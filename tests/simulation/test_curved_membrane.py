@@ -23,11 +23,9 @@ from gelpolight_core.design.parts import (
     SessionDesign,
 )
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.simulation import interreflection
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter, press
-from gelpolight_core.simulation.lamps import PointLamp
 from gelpolight_core.simulation.session import pressed_membrane, simulate_session
-from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
+from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
 APEX_MM, RIM_MM = 2.0, 13.0
 AXIS_MM = (0.6, -0.9)
@@ -175,33 +173,6 @@ def test_a_ball_in_the_cap_lies_at_the_stated_depth_under_its_centre() -> None:
     assert surface.depth_mm.max() > depth + 0.01
 
 
-def test_a_cap_lights_itself_by_the_geometric_series(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(interreflection, "_STEPS", (4, 1, 1))
-    monkeypatch.setattr(interreflection, "_PATHS", (256, 256, 256))
-    apex, rim, reflectance = 1.2, 2.0, 0.9
-    sphere = (rim**2 + apex**2) / (2.0 * apex)
-    # From a point of its sphere, a lamp lights the cap evenly: 1/r^2 and both cosines cancel.
-    lamp = PointLamp(*AXIS_MM, 2.0 * sphere - apex, diameter_mm=0.0)
-    membrane = replace(
-        PLAIN, working_diameter_mm=2.0 * rim, apex_height_mm=apex, diffuse_reflectance=reflectance
-    )
-    images = []
-    for bounces in (0, 30):
-        design = replace(
-            DESIGN,
-            layers=replace(DESIGN.layers, elastomer_refractive_index=1.0),
-            membrane=replace(membrane, bounces=bounces),
-        ).scaled(0.5)
-        one = VirtualSensor(design, lamps=(lamp, lamp, lamp))
-        images.append(one.brightness(BareMembrane())[..., 0] / one.exposure)
-    inside = images[0] > 0.9 * images[0].max()
-    # The form factor is the cap's share of the sphere's area.
-    share = apex / (2.0 * sphere)
-    gain = images[1][inside] / images[0][inside]
-    # 400 nodes of 256 paths, each of which finds the cap or not.
-    assert gain.mean() == pytest.approx(1.0 / (1.0 - reflectance * share), rel=0.01)
-
-
 def test_a_session_of_a_curved_sensor_has_its_shape_and_no_whiteboard(tmp_path: Path) -> None:
     out = tmp_path / "curved"
     design = replace(
@@ -225,16 +196,3 @@ def test_a_session_of_a_curved_sensor_has_its_shape_and_no_whiteboard(tmp_path: 
         depth = map_coordinates(truth["depth_mm"], at, order=1)[0]
     # Cells of 0.27 mm: linear interpolation of the cap is wrong by 1/8 of its bend over one.
     assert depth == pytest.approx(float(row["height_mm"]), abs=4e-4)
-
-
-def test_a_press_on_the_cap_changes_the_image_only_around_it(sensor: VirtualSensor) -> None:
-    bare = sensor.brightness(BareMembrane())
-    surface = press(Cylinder(3.0, 0.8), x_mm=-5.0, y_mm=-3.0, rest=PLAIN)
-    pressed = sensor.brightness(PressedMembrane(surface))
-    change = np.abs(pressed - bare).max(axis=2) > 1e-3 * bare.max()
-    rows, columns = np.nonzero(change)
-    u, v = seen((-5.0, -3.0, height(-5.0, -3.0)))[0]
-    away = np.hypot(columns - u, rows - v) * 0.05
-    assert change.sum() > 3000
-    # Half its size, six decay lengths, and its shadow.
-    assert away.max() < 1.5 + 6.0 * 0.7 + 1.0

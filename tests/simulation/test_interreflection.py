@@ -75,24 +75,11 @@ def in_the_dent(reflectance: float, bounces: int) -> np.ndarray:
     return light.maps[0][np.hypot(cells[None], cells[:, None]) < OPENING_MM - 0.2]
 
 
-@pytest.mark.parametrize("reflectance", [0.5, 0.95])
-def test_a_spherical_dent_is_brighter_by_the_sum_of_the_geometric_series(
-    reflectance: float,
-) -> None:
-    # From any point of a sphere, a part of it has its share of the area as form factor.
-    share = 0.5 * (1.0 - math.cos(math.radians(HALF_ANGLE_DEG)))
-    expected = reflectance / (1.0 - reflectance * share) - reflectance
-    found = in_the_dent(reflectance, bounces=30)
-    # One node of 256 paths has noise of 6 %, and there are 121.
-    assert found.mean() == pytest.approx(expected, rel=0.015)
-    # Even all over the dent.
-    assert found.std() < 0.08 * expected
-
-
 def test_each_further_reflection_adds_its_term_of_the_series() -> None:
     share = 0.5 * (1.0 - math.cos(math.radians(HALF_ANGLE_DEG)))
     sums = np.array([in_the_dent(0.8, bounces).mean() for bounces in (1, 2, 3, 4)])
     terms = np.diff(sums, prepend=0.0)
+    # From any point of a sphere, a part of it has its share of the area as form factor.
     expected = 0.8 * (0.8 * share) ** np.arange(1, 5)
     assert terms[:3] == pytest.approx(expected[:3], rel=0.03)
     # Fewer paths are that long.
@@ -133,10 +120,6 @@ def test_the_lower_face_returns_the_sum_over_mirror_images() -> None:
         received = (0.8 * lit * 0.5 * (s + p) * cosine**2 / (math.pi * r2)).sum() * step**2
         i, j = (round((v - light.first_mm) / light.pitch_mm) for v in (at_mm[1], at_mm[0]))
         assert light.maps[0, i, j] == pytest.approx(0.8 * received, rel=0.05)
-
-
-class Stopped(Exception):
-    """The exception that the test uses to stop the work."""
 
 
 def wall(height_mm: float) -> PressedSurface:

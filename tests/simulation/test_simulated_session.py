@@ -18,7 +18,9 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.boards import board_views
+from gelpolight_core.simulation.indenters import Cuboid, press
 from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.simulation.virtual_sensor import VirtualSensor
 
 SCALE = 0.25
 DESIGN = replace(
@@ -147,6 +149,16 @@ def test_progress_can_stop_the_work(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         simulate_session(DESIGN, tmp_path / "out", scale=SCALE, progress=stop)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_press_and_a_sensor_that_are_being_made_can_be_stopped() -> None:
+    def stop() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        press(Cuboid(5.0, 1.0), interrupt=stop)
+    with pytest.raises(KeyboardInterrupt):
+        VirtualSensor(DESIGN.scaled(SCALE), interrupt=stop)
 
 
 def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(

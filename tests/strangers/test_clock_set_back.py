@@ -93,9 +93,3 @@ def test_a_run_goes_on_where_it_was_left(tmp_path: Path, clock: type[Clock]) -> 
     assert again.done == run.wanted[:3]
     assert again.next() == run.wanted[3]
     assert again.progress.refused == 3
-    twice = [again.take_back(run.wanted[0])]
-    again.accept(run.wanted[0], [noisy(7)])
-    clock.shown += timedelta(microseconds=1)
-    twice.append(again.take_back(run.wanted[0]))
-    assert all(path is not None and path.is_file() for path in twice)
-    assert twice[0] != twice[1]

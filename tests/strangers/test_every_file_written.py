@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import errno
-import os
 import resource
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -36,15 +34,6 @@ def full(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def refusing(number: int) -> Callable[..., None]:
-    """Return what refuses whatever it is asked."""
-
-    def refuse(*_: object, **__: object) -> None:
-        raise OSError(number, os.strerror(number))
-
-    return refuse
-
-
 def changed_size(kind: Written, folder: Path) -> int:
     """Write the newer file; return its size, of several that of the smallest."""
     before = tree(folder)
@@ -71,32 +60,3 @@ def test_a_disk_that_is_full_at_any_byte_leaves_the_older_file(
         assert tree(real) == before
     kind.write(real, 1)
     assert tree(real).keys() == tree(tried).keys()
-
-
-FAULTS = [
-    ("fsync", errno.ENOSPC, "full|No space left"),
-    ("fsync", errno.EIO, "cannot be written"),
-    ("replace", errno.EROFS, "read-only"),
-]
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_a_disk_that_fails_at_the_last_moment_leaves_the_older_file(
-    kind: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kind.write(tmp_path, 0)
-    before = tree(tmp_path)
-    for call, number, words in FAULTS:
-        with monkeypatch.context() as patch:
-            patch.setattr(os, call, refusing(number))
-            if call == "replace":
-                patch.setattr(os, "link", refusing(number))
-            try:
-                kind.write(tmp_path, 1)
-            except InputError as refusal:
-                assert words.split("|")[0] in str(refusal) or words.split("|")[-1] in str(refusal)
-                assert tree(tmp_path) == before
-            else:
-                assert call == "replace"  # what is appended takes the place of nothing
-                return
-    kind.write(tmp_path, 1)

@@ -10,6 +10,7 @@ import tracemalloc
 import zipfile
 import zlib
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import cv2
@@ -63,17 +64,12 @@ ABSENT: dict[str, Callable[[Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", [*READERS, *ABSENT])
 def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    """It counts as no file where there need be none."""
     os.mkfifo(tmp_path / name)
-    with pytest.raises(InputError):
-        READERS[name](tmp_path / name)
-
-
-@pytest.mark.parametrize("name", ABSENT)
-def test_a_pipe_counts_as_no_file_where_there_need_be_none(tmp_path: Path, name: str) -> None:
-    os.mkfifo(tmp_path / name)
-    ABSENT[name](tmp_path / name)
+    with nullcontext() if name in ABSENT else pytest.raises(InputError):
+        (READERS | ABSENT)[name](tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -96,17 +92,19 @@ ENDLESS = (
 )
 
 
-@pytest.mark.parametrize("text", ENDLESS)
-def test_a_text_that_takes_for_ever_or_too_deep_is_refused_at_once(text: str) -> None:
+@pytest.mark.parametrize(
+    ("parse", "text"),
+    [
+        *((parse_toml, text.encode()) for text in ENDLESS),
+        *((parse_json, text) for text in ("NaN", "Infinity", "1e999", "[" * 10**5, "9" * 5000)),
+    ],
+)
+def test_a_text_that_takes_for_ever_or_is_no_number_is_refused_at_once(
+    parse: Callable[[object], object], text: object
+) -> None:
     # It was hours.
     with pytest.raises(ValueError, match=r"\w"):
-        parse_toml(text.encode())
-
-
-@pytest.mark.parametrize("text", ["NaN", "Infinity", "1e999", "[" * 10**5, "9" * 5000])
-def test_a_number_that_is_none_is_no_json(text: str) -> None:
-    with pytest.raises(ValueError, match=r"\w"):
-        parse_json(text)
+        parse(text)
 
 
 def npy(head: str, body: bytes = b"") -> bytes:
@@ -260,11 +258,6 @@ def test_every_name_is_one_that_any_disk_takes(tmp_path: Path, serial: str) -> N
     assert name.split(".")[0].upper() not in ("CON", "NUL")
     (tmp_path / f"{name}-12.validation.json").write_text("")
     assert (tmp_path / f"{name}-12.validation.json").resolve().parent == tmp_path.resolve()
-
-
-def test_a_sentence_holds_nothing_that_commands_a_terminal() -> None:
-    error = InputError("x\x1b[2J", where="a\nb", advice="c")
-    assert str(error) == "a\\nb: x\\x1b[2J. c."
 
 
 def test_a_calibration_that_declares_more_than_it_can_hold_is_refused(tmp_path: Path) -> None:

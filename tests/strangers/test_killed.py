@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from killing import lines_until_killed
+from recorded import noisy
 
 from app.workspace.indenters import read_indenters
 from app.workspace.workspace import Workspace
@@ -12,6 +14,7 @@ from gelpolight_core.batch.results import finished_frames
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol_run import open_run
+from gelpolight_core.recording.reader import Recording
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 
@@ -23,7 +26,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from recorded import noisy
-from written import calibration
+from written import RECORD, calibration
 from app.workspace.indenters import first_indenters, write_indenters
 from app.workspace.workspace import Workspace
 from gelpolight_core.batch.results import FrameRow, keep_rows
@@ -32,6 +35,8 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
@@ -44,6 +49,7 @@ run = begin_run(root / "run", Protocol(), serial="A", calibration="c")
 ledger = Ledger(root / "measured.jsonl", "c")
 session, workspace = read_session(root / "session"), Workspace(root / "workspace")
 made = calibration()
+recording = RecordingWriter(root / "r.gplrec", RecordingHeader())
 
 def progress(kind, number):
     print(kind, number, flush=True)
@@ -51,6 +57,9 @@ def progress(kind, number):
 for number, press in enumerate(run.wanted):
     run.accept(press, [noisy(number)])
     progress("press", press.file)
+    recording.append(noisy(number), number, float(number))
+    progress("recorded", number)
+    progress("record", workspace.records.add(RECORD))
     run.refuse(press, "nothing is pressed")
     progress("refusal", number)
     ledger.keep(f"k{number}", "no object is pressed")
@@ -94,6 +103,10 @@ def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path: Path) -> N
     assert all(ledger.find(f"k{number}") for number in by_kind.get("measurement", []))
     finished = finished_frames(tmp_path)
     assert all((f"a{number}", "s") in finished for number in by_kind.get("frame", []))
+    with Recording.open(tmp_path / "r.gplrec") as recording:
+        assert len(recording) >= len(by_kind.get("recorded", []))
+        for index in range(len(recording)):
+            assert np.array_equal(recording.frame(index).rgb, noisy(index))
     session = read_session(tmp_path / "session")
     assert len(session.ball_radii_mm) >= len(by_kind.get("radius", []))
     workspace = Workspace(tmp_path / "workspace")
@@ -101,5 +114,9 @@ def test_what_was_reported_is_there_and_all_files_are_whole(tmp_path: Path) -> N
         assert read_indenters(workspace.folder)
     entries = {entry.path.name for entry in workspace.entries() if not entry.broken}
     assert set(by_kind.get("calibration", [])) <= entries
+    with workspace.records as records:
+        assert not records.notice
+        kept = {str(record.id) for record in records.measurements()}
+    assert set(by_kind.get("record", [])) <= kept
     if workspace.in_use is not None:
         read_calibration(workspace.in_use)

@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import os
-import shutil
-import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from recorded import noisy, write_recording
-from written import KINDS, RECORD, Written, calibration
+from recorded import noisy
+from written import KINDS, Written, calibration
 
 from app.workspace.workspace import Workspace
-from gelpolight_core.batch.results import FILE, FrameRow, finished_frames, keep_rows
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
-from gelpolight_core.recording import layout
-from gelpolight_core.recording.reader import Recording
-from gelpolight_core.records.records import NAME, Records
-
-BLOCK = 64
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -70,86 +60,3 @@ def test_half_a_file_under_its_first_name_is_no_file_of_anybody(tmp_path: Path) 
         assert workspace.in_use == path
         assert open_run(folder).done == run.wanted[:1]
         assert workspace.protocols() == (folder,)
-
-
-def lines_before(content: bytes, size: int) -> int:
-    """Return how many whole lines are in the first bytes of a file."""
-    return content[:size].count(b"\n")
-
-
-def test_frames_of_a_batch_cut_anywhere_keep_every_whole_line_and_go_on(tmp_path: Path) -> None:
-    path = tmp_path / FILE
-    keep_rows([FrameRow(f"a{k}", "s", "a.png") for k in range(3)], tmp_path)
-    content = path.read_bytes()
-    for size in range(1, len(content) + 1, 3):
-        path.write_bytes(content[:size])
-        whole = lines_before(content, size)
-        expected = {(f"a{k}", "s") for k in range(whole)}
-        assert finished_frames(tmp_path) == expected
-        keep_rows([FrameRow("new", "s", "a.png")], tmp_path)
-        # A line of which only the end was missing is whole again now.
-        assert finished_frames(tmp_path) - {(f"a{whole}", "s")} == expected | {("new", "s")}
-
-
-def test_a_recording_without_any_block_of_what_was_not_on_the_disk_gives_no_wrong_frame(
-    tmp_path: Path,
-) -> None:
-    """The disk writes in an order of its own: any block may be missing while later ones are there.
-
-    The link to a frame can be there without the frame.
-    """
-    path = tmp_path / "a.gplrec"
-    images = write_recording(path, frames=3, shape=(16, 16))
-    whole = path.read_bytes()
-    first = whole.index(layout.FRAME_MAGIC)
-    for place in range(first, len(whole), BLOCK):
-        spoilt = bytearray(whole)
-        spoilt[place : place + BLOCK] = bytes(len(spoilt[place : place + BLOCK]))
-        path.write_bytes(spoilt)
-        found = 0
-        with Recording.open(path) as recording:
-            for index in range(len(recording)):
-                try:
-                    frame = recording.frame(index)
-                except InputError:
-                    continue
-                assert np.array_equal(frame.rgb, images[frame.number])
-                found += 1
-        assert found >= 1  # a block can hold the end of a frame and the beginning of the next
-
-
-@pytest.mark.parametrize("journal", ["whole", "cut", "gone"])
-def test_records_cut_off_within_a_change_have_all_that_was_kept_before(
-    tmp_path: Path, journal: str
-) -> None:
-    """The journal is on the disk before anything of the file is changed: SQLite waits for it."""
-    path, cut = tmp_path / NAME, tmp_path / "cut"
-    with Records.open(path) as records:
-        for _ in range(3):
-            records.add(RECORD)
-    cut.mkdir()
-    connection = sqlite3.connect(path, isolation_level=None)
-    # So small a cache that pages go to the file before the change is done.
-    connection.execute(
-        "PRAGMA cache_size = 1" if journal == "whole" else "PRAGMA cache_size = 5000"
-    )
-    connection.execute("BEGIN IMMEDIATE")
-    connection.executemany(
-        "INSERT INTO sensors (serial, first_seen) VALUES (?, 'x')",
-        [(f"s{k}" * 50,) for k in range(300)],
-    )
-    for file in (path, path.with_name(f"{NAME}-journal")):
-        if file.exists():
-            shutil.copy(file, cut / file.name)
-    connection.execute("ROLLBACK")
-    connection.close()
-    left = cut / f"{NAME}-journal"
-    assert left.exists()
-    if journal == "cut":
-        left.write_bytes(left.read_bytes()[: left.stat().st_size // 2])
-    elif journal == "gone":
-        left.unlink()
-    with Records.open(cut / NAME) as records:
-        assert not records.notice
-        assert len(records.measurements()) == 3
-        assert {r.serial for r in records.measurements()} == {"A"}

@@ -41,25 +41,6 @@ def session(tmp_path: Path) -> Path:
     return folder
 
 
-def test_two_programs_that_capture_into_one_session_keep_both_images(session: Path) -> None:
-    one, two = Project(session), Project(session)
-    one._next_name = lambda folder, suffix=".png": "ball_001.png"  # type: ignore[method-assign]
-    assert one.add_capture("balls", [noisy(1)]) == "ball_001.png"
-    names = iter(["ball_001.png", "ball_002.png"])  # it looked before the other one had written
-    two._next_name = lambda folder, suffix=".png": next(names)  # type: ignore[method-assign]
-    assert two.add_capture("balls", [noisy(2)]) == "ball_002.png"
-    assert len(list((session / "balls").iterdir())) == 2
-
-
-def test_a_new_file_never_takes_the_place_of_another(tmp_path: Path) -> None:
-    path = tmp_path / "a"
-    write_atomically(path, lambda stream: stream.write(b"one"), new=True)
-    with pytest.raises(NameTakenError, match="A file with this name"):
-        write_atomically(path, lambda stream: stream.write(b"two"), new=True)
-    assert path.read_bytes() == b"one"
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_a_new_file_is_written_on_a_disk_that_knows_no_links(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from app.command_line.main import MENDABLE, main
-from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.simulation.session import session_toml
 from gelpolight_core.studies.stability import Case, Mode, Outcome, Seen, run_case, seen_once
 from gelpolight_core.studies.stability_cases import all_cases
 from gelpolight_core.studies.trial import judged, standard_press, standard_sensor
-from tests.studies import extreme_sessions
-from tests.studies.extreme_sessions import LENGTHS, session_cases, state_wrongly
 
 CASES = all_cases()
 RIGHT, WRONG = Mode("best", True, 1.0, 2.0), Mode("fast", False, 3.0, 2.0)
@@ -68,11 +63,6 @@ def test_the_papers_model_says_where_shadows_leave_its_assumptions() -> None:
         assert ("shadow of an LED" in result.message) is says
 
 
-def test_names_are_one_each() -> None:
-    assert len({case.name for case in CASES}) == len(CASES)
-    assert {LARGEST, *QUICK} <= {case.name for case in CASES}
-
-
 def _case(run) -> Case:  # type: ignore[no-untyped-def]
     return Case("subject", "x", "required", run)
 
@@ -113,43 +103,6 @@ def test_an_image_is_tried_in_every_mode() -> None:
     assert [mode.name for mode in seen.modes] == ["best", "balanced", "fast", "paper"]
     row = run_case(_case(lambda: seen)).row
     assert all(row[f"{mode.name}_um"] == mode.error_um for mode in seen.modes)
-
-
-@pytest.mark.parametrize("length", LENGTHS)
-def test_each_stated_length_is_stated_wrongly_alone(length: str, tmp_path: Path) -> None:
-    path = tmp_path / "session.toml"
-    before = session_toml(standard_sensor().sensor.design)
-    path.write_text(before)
-    state_wrongly(length, 5.0, tmp_path)
-    changed = [
-        (a, b)
-        for a, b in zip(before.splitlines(), path.read_text().splitlines(), strict=True)
-        if a != b
-    ]
-    assert len(changed) == (len(standard_sensor().sensor.design.balls) if "ball" in length else 1)
-    for a, b in changed:
-        old, new = (float(line.split("=")[1]) for line in (a, b))
-        assert new == pytest.approx(1.05 * old, rel=1e-4)
-
-
-def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    whole = SensorDesign()
-    fewer = replace(whole, balls=whole.balls[:5])
-    monkeypatch.setattr(extreme_sessions, "SensorDesign", lambda: fewer)
-    case = next(c for c in session_cases() if c.name == "session_scale_0.125")
-    result = run_case(case)
-    assert result.outcome is not Outcome.FAILED, result.message
-    assert len(result.seen.modes) == 4
-
-
-def test_ctrl_c_stops_the_cases() -> None:
-    def stop() -> Seen:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_case(_case(stop))
 
 
 def test_the_table_and_the_figure_hold_every_case_that_was_asked_for(
