@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import quality_lines, stage_progress
-from app.command_line.options import Command, option, output, place, result
+from app.command_line.options import Command, number, option, output, place, result
 from app.command_line.reconstructing import load_reconstructor, model, read_frame, report_failure
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration, write_calibration
@@ -155,7 +155,7 @@ def _now() -> str:
 
 def _length(text: str) -> float:
     """Return a length in mm."""
-    value = float(text)
+    value = number(text)
     if not 1e-4 <= value <= 1000.0:
         raise argparse.ArgumentTypeError(tr("{text} is not a possible length").format(text=text))
     return value

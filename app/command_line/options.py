@@ -12,6 +12,7 @@ from typing import Any, Self, get_args, get_origin, get_type_hints
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.number import read_number
 from gelpolight_core.translation import tr
 
 
@@ -107,10 +108,18 @@ def _reading(kind: Any) -> dict[str, Any]:
     if isinstance(kind, UnionType):
         return _reading(parts[0])
     if get_origin(kind) is list:
-        return {"nargs": "+", "type": parts[0]}
+        return {"nargs": "+"} | _reading(parts[0])
     if get_origin(kind) is tuple and Ellipsis not in parts:
-        return {"nargs": len(parts), "type": parts[0]}
-    return {"type": kind}
+        return {"nargs": len(parts)} | _reading(parts[0])
+    return {"type": number if kind is float else kind}
+
+
+def number(text: str) -> float:
+    """Return the number of a text, as argparse asks for it."""
+    try:
+        return read_number(text, "")
+    except InputError as error:
+        raise argparse.ArgumentTypeError(f"{error.found}. {error.advice}") from error
 
 
 def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -50,7 +50,9 @@ class CommandParser(Parser):
             self._command = ""
             command.add_arguments(self)
             self.set_defaults(command=command)
-        return super().parse_known_args(args, namespace)
+        # A blank tells argparse that "-2,5" is a value; "-2.5" it knows.
+        values = [re.sub(r"^(?=-\d*,\d+$)", " ", value) for value in args or ()]
+        return super().parse_known_args(values, namespace)
 
 
 def build_parser() -> argparse.ArgumentParser:

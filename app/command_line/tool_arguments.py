@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from gelpolight_core.measurement.indenter_tools import AUTO
 from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
+from gelpolight_core.number import read_number
 from gelpolight_core.translation import tr
 
 
@@ -119,9 +120,10 @@ class ToolArguments(Command):
             if types[name] == "Rectangle":
                 a, b, yaw = (*self.size, 0.0)[:3]
                 content[name] = {"centre_mm": content[name], "sides_mm": (a, b), "yaw_deg": yaw}
+        kinds = {field.name: str(field.type) for field in fields(TOOLS[tool])}
         for text in self.set:
             key, _, value = text.partition("=")
-            content[key] = _value(value)
+            content[key] = _value(value, kinds.get(key, ""), f"--set {key}")
         return content
 
     def _refuse(self, *names: str) -> None:
@@ -137,13 +139,14 @@ class ToolArguments(Command):
                 )
 
 
-def _value(text: str) -> Any:
-    """Return a number, several numbers, or a word."""
+def _value(text: str, kind: str, where: str) -> Any:
+    """Return the number of a field of numbers; of another one several numbers, or a word."""
+    if "float" in kind:
+        return read_number(text, where)
     try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
+        return [read_number(part, where) for part in text.split(",")]
+    except InputError:
         return text
-    return numbers[0] if len(numbers) == 1 else numbers
 
 
 def read_tools(path: Path) -> Any:

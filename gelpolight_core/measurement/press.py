@@ -14,6 +14,7 @@ from gelpolight_core.io.reading import brief, is_file_name
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.number import read_number
 from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, percent_error
 from gelpolight_core.reference import RANGE_MM, Truth, checked_day
 from gelpolight_core.session.session import (
@@ -260,10 +261,7 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
 
 def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHORTEST_MM) -> float:
     text = record.get(key, "")
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = read_number(text, f"{where}, {key}") if text else math.nan
     if least_mm <= value <= LONGEST_MM:
         return value
     found = tr("{key} is '{text}'") if text else tr("{key} is empty")
