@@ -48,8 +48,8 @@ def read_number(text: str, where: str | Path, *, decimals: int | None = None) ->
     if grouped:
         whole, sign, rest = grouped.groups("")
         readings.append(whole.replace(sign, "") + rest.replace(",", "."))
-        found, advice = tr("{text}: {readings}?"), Remedy.WRITE_POINT
+        found, advice = tr("{text} could be {readings}"), Remedy.WRITE_POINT
     elif readings:
-        found = tr("{text}: at most {n} decimals")
+        found = tr("{text} has more than {n} decimals")
     both = joined(tr(" or "), readings)
     raise InputError(found.format(text=brief(text), n=decimals, readings=both), where, advice)

@@ -120,7 +120,7 @@ class ToolArguments(Command):
             if types[name] == "Rectangle":
                 a, b, yaw = (*self.size, 0.0)[:3]
                 content[name] = {"centre_mm": content[name], "sides_mm": (a, b), "yaw_deg": yaw}
-        kinds = {field.name: str(field.type) for field in fields(TOOLS[tool])}
+        kinds = {f.name: str(f.type) for f in fields(TOOLS[tool])}  # type: ignore[arg-type]
         for text in self.set:
             key, _, value = text.partition("=")
             content[key] = _value(value, kinds.get(key, ""), f"--set {key}")
