@@ -59,7 +59,7 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
     refused, waiting = "", False
     _typed: str | None = None  # what is typed, instead of the number and the text for the lowest
     _of = 0.0  # the number for which it is shown
-    _lowest, _tip, _size = "", "", QSize()
+    _lowest, _size = "", QSize()
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**{"decimals": 0, "keyboardTracking": False, **given})
@@ -122,6 +122,13 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
         if self._typed is None:
             self._size = super().sizeHint()
         return self._size
+
+    def event(self, event: QEvent) -> bool:
+        """Show why the text is refused under the mouse, in place of the usual tip."""
+        if event.type() == QEvent.Type.ToolTip and self.refused:
+            self._say()
+            return True
+        return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Type over the text of the lowest number, and use what is typed at Return."""
@@ -195,18 +202,16 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
             super().setSpecialValueText(self._lowest)
 
     def _mark(self, refused: str) -> None:
-        if refused and not self.refused:
-            self._tip = self.toolTip()
-        if refused or self.refused:
-            self.setToolTip(plain_tip(refused) if refused else self._tip)
         self.refused = refused
+        self.setAccessibleDescription(refused)
         set_property(self, "refused", bool(refused))
         if refused:
             self._says.start()  # when the focus is where it goes, which would hide the tip
 
     def _say(self) -> None:
         if self.refused and self.isVisible():
-            QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.toolTip(), self)
+            at = self.mapToGlobal(self.rect().bottomLeft())
+            QToolTip.showText(at, plain_tip(self.refused), self)
 
 
 def _application() -> QCoreApplication:
