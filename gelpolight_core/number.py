@@ -10,8 +10,10 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import brief
 from gelpolight_core.translation import joined, tr
 
-_NUMBER = re.compile(r"[+-]?(?=[.,]?\d)(0|[1-9]\d*)?([.,]\d*)?(e[+-]?\d+)?", re.ASCII | re.I)
-_GROUPED = re.compile(r"([+-]?[1-9]\d{0,2}([.,' \xa0\u202f])\d{3}(?:\2\d{3})*)([.,]\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(?=[.,]?\d)(0|[1-9]\d*)?([.,]\d*)?(e[+-]?\d+)?", re.A | re.I)
+_GROUPED = re.compile(
+    r"([+-]?[1-9]\d{0,2}([.,' \xa0\u202f])\d{3}(?:\2\d{3})*)((?!\2)[.,]\d+)?", re.A
+)
 
 
 def read_number(text: str, where: str | Path, *, decimals: int | None = None) -> float:

@@ -233,7 +233,7 @@ def _completed(
 
 
 def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
-    size = "side" if shape == "cuboid" else "diameter"
+    size, other = ("side", "diameter") if shape == "cuboid" else ("diameter", "side")
 
     def optional(key: str) -> float:
         return _length(record, key, where, 0.0) if record.get(key) else 0.0
@@ -250,6 +250,10 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         due=checked_day(record.get("due", ""), where),
         serial=record.get("serial", ""),
     )
+    if text := record.get(f"{other}_mm"):
+        found = tr("{key} is '{text}', which is no size of a {shape}")
+        found = found.format(key=f"{other}_mm", text=brief(text), shape=shape)
+        raise InputError(found, where, Remedy.WRITE_POINT)
     names = record.get("region", ""), record.get("repeat", "")
     if not record.get("position_sd_mm"):
         return Press(file, truth, *names)
