@@ -13,7 +13,7 @@ from typing import Any, Self, get_args, get_origin, get_type_hints
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.number import read_number
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import joined, tr
 
 
 def place(metavar: str, help: str = "") -> Any:
@@ -57,9 +57,9 @@ class Command:
     """A command of the command line with its arguments."""
 
     @classmethod
-    def add_arguments(cls, parser: argparse.ArgumentParser) -> None:
-        """Add the fields to a parser."""
-        types = get_type_hints(cls)
+    def add_arguments(cls, parser: argparse.ArgumentParser) -> set[str]:
+        """Add the fields to a parser, and return the names of the options with two values."""
+        types, pairs = get_type_hints(cls), set[str]()
         alternatives: Any = None
         for f in fields(cls):
             kind, given = types[f.name], f.metadata["given"]
@@ -74,7 +74,10 @@ class Command:
             elif kind is not bool and NoneType not in get_args(kind) and "default" not in given:
                 given = given | {"required": True}
             flags = f.metadata["flags"] or (f"--{f.name.replace('_', '-')}",)
-            target.add_argument(*flags, dest=f.name, **_reading(kind) | given)
+            added = target.add_argument(*flags, dest=f.name, **_reading(kind) | given)
+            if added.nargs == 2:
+                pairs.update(flags)
+        return pairs
 
     @classmethod
     def of(cls, parsed: argparse.Namespace) -> Self:
@@ -108,7 +111,7 @@ def _reading(kind: Any) -> dict[str, Any]:
     if isinstance(kind, UnionType):
         return _reading(parts[0])
     if get_origin(kind) is list:
-        return {"nargs": "+"} | _reading(parts[0])
+        return {"nargs": "+", "type": _one_of_several if parts[0] is float else parts[0]}
     if get_origin(kind) is tuple and Ellipsis not in parts:
         return {"nargs": len(parts)} | _reading(parts[0])
     return {"type": number if kind is float else kind}
@@ -120,6 +123,16 @@ def number(text: str) -> float:
         return read_number(text, "")
     except InputError as error:
         raise argparse.ArgumentTypeError(f"{error.found}. {error.advice}") from error
+
+
+def _one_of_several(text: str) -> float:
+    """Return one of any number of numbers, between which a comma could stand, too."""
+    value = number(text)
+    if "," in text:
+        readings = joined(tr(" or "), (text.replace(",", sign) for sign in ". "))
+        found = tr("{text} could be {readings}").format(text=text, readings=readings)
+        raise argparse.ArgumentTypeError(f"{found}. {Remedy.WRITE_POINT.format()}")
+    return value
 
 
 def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:

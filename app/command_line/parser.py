@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -39,6 +39,7 @@ class CommandParser(Parser):
     def __init__(self, *, command: str, **options: Any) -> None:
         super().__init__(**options)
         self._command = command
+        self._pairs = set[str]()
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
@@ -48,11 +49,25 @@ class CommandParser(Parser):
             module, _, name = self._command.partition(".")
             command = getattr(import_module(f"app.command_line.{module}"), name)
             self._command = ""
-            command.add_arguments(self)
+            self._pairs = command.add_arguments(self)
             self.set_defaults(command=command)
-        # A blank tells argparse that "-2,5" is a value; "-2.5" it knows.
-        values = [re.sub(r"^(?=-\d*,\d+$)", " ", value) for value in args or ()]
-        return super().parse_known_args(values, namespace)
+        return super().parse_known_args(separated(args or (), self._pairs), namespace)
+
+
+def separated(arguments: Sequence[str], pairs: Collection[str]) -> list[str]:
+    """Return arguments with the two values of ``--from -5,2`` apart, but not ``--square 2,5``.
+
+    A negative number gets a blank, so that argparse takes it for a value.
+    """
+    parts: list[str] = []
+    for before, text, after in zip(("", *arguments), arguments, (*arguments[1:], ""), strict=False):
+        alone = before in pairs and not _NUMBER.fullmatch(after)
+        parts += text.split(",") if alone and _PAIR.fullmatch(text) else [text]
+    return [f" {part}" if part[:1] == "-" and _NUMBER.fullmatch(part) else part for part in parts]
+
+
+_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?", re.IGNORECASE)
+_PAIR = re.compile(r"[-+\d.e]+,[-+\d.e]+", re.IGNORECASE)
 
 
 def build_parser() -> argparse.ArgumentParser:
