@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import quality_lines, stage_progress
-from app.command_line.options import Command, number, option, output, place, result
+from app.command_line.options import Command, option, output, place, result
 from app.command_line.reconstructing import load_reconstructor, model, read_frame, report_failure
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration, write_calibration
@@ -24,6 +24,7 @@ from gelpolight_core.in_place.import_session import Stated, import_session
 from gelpolight_core.in_place.preset import preset_named, presets
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.user import user_name
+from gelpolight_core.number import read_number
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.sensor_calibration import Calibration
@@ -155,7 +156,7 @@ def _now() -> str:
 
 def _length(text: str) -> float:
     """Return a length in mm."""
-    value = number(text)
+    value = read_number(text, tr("length in mm"))
     if not 1e-4 <= value <= 1000.0:
         raise argparse.ArgumentTypeError(tr("{text} is not a possible length").format(text=text))
     return value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
@@ -65,7 +65,7 @@ class Command:
             kind, given = types[f.name], f.metadata["given"]
             if "flags" not in f.metadata:
                 optional = {"nargs": "?"} if NoneType in get_args(kind) else {}
-                parser.add_argument(f.name, **_reading(kind) | optional | given)
+                parser.add_argument(f.name, **_reading(kind, f.name) | optional | given)
                 continue
             target = parser
             if f.metadata["one_of"]:
@@ -74,7 +74,7 @@ class Command:
             elif kind is not bool and NoneType not in get_args(kind) and "default" not in given:
                 given = given | {"required": True}
             flags = f.metadata["flags"] or (f"--{f.name.replace('_', '-')}",)
-            added = target.add_argument(*flags, dest=f.name, **_reading(kind) | given)
+            added = target.add_argument(*flags, dest=f.name, **_reading(kind, flags[0]) | given)
             if added.nargs == 2:
                 pairs.update(flags)
         return pairs
@@ -103,36 +103,45 @@ class Command:
             refuse_unwritable(path)
 
 
-def _reading(kind: Any) -> dict[str, Any]:
+def _reading(kind: Any, where: str) -> dict[str, Any]:
     """Return how argparse reads the values of a type."""
     if kind is bool:
         return {"action": "store_true"}
     parts = [part for part in get_args(kind) if part is not NoneType]
     if isinstance(kind, UnionType):
-        return _reading(parts[0])
+        return _reading(parts[0], where)
     if get_origin(kind) is list:
-        return {"nargs": "+", "type": _one_of_several if parts[0] is float else parts[0]}
+        return {"nargs": "+"} | _reading(parts[0], where)
     if get_origin(kind) is tuple and Ellipsis not in parts:
-        return {"nargs": len(parts)} | _reading(parts[0])
-    return {"type": number if kind is float else kind}
+        return {"nargs": len(parts)} | _reading(parts[0], where)
+    return {"type": partial(read_number, where=where) if kind is float else kind}
 
 
-def number(text: str) -> float:
-    """Return the number of a text, as argparse asks for it."""
-    try:
-        return read_number(text, "")
-    except InputError as error:
-        raise argparse.ArgumentTypeError(f"{error.found}. {error.advice}") from error
+def separated_values(texts: Sequence[str], counts: Container[int], where: str) -> list[float]:
+    """Return several numbers. A comma is a decimal sign, or is between two of them.
 
+    Parameters
+    ----------
+    texts : sequence of str
+        The arguments.
+    counts : container of int
+        How many numbers there can be: this tells which of the two a comma is.
+    where : str
+        The option, for the message.
 
-def _one_of_several(text: str) -> float:
-    """Return one of any number of numbers, between which a comma could stand, too."""
-    value = number(text)
-    if "," in text:
-        readings = joined(tr(" or "), (text.replace(",", sign) for sign in ". "))
-        found = tr("{text} could be {readings}").format(text=text, readings=readings)
-        raise argparse.ArgumentTypeError(f"{found}. {Remedy.WRITE_POINT.format()}")
-    return value
+    Raises
+    ------
+    InputError
+        If both are possible, or a text is not a number.
+    """
+    apart = [part for text in texts for part in text.split(",")]
+    readings = [found for found in (list(texts), apart) if len(found) in counts]
+    if len(readings) == 2 and readings[0] != readings[1]:
+        both = (" ".join(found).replace(",", ".") for found in readings)
+        found = tr("{text} could be {readings}")
+        found = found.format(text=" ".join(texts), readings=joined(tr(" or "), both))
+        raise InputError(found, where, Remedy.WRITE_POINT)
+    return [read_number(text, where) for text in (readings or [apart])[0]]
 
 
 def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -57,13 +57,17 @@ class CommandParser(Parser):
 def separated(arguments: Sequence[str], pairs: Collection[str]) -> list[str]:
     """Return arguments with the two values of ``--from -5,2`` apart, but not ``--square 2,5``.
 
-    A negative number gets a blank, so that argparse takes it for a value.
+    A negative value gets a blank, which tells argparse that it is no option.
     """
     parts: list[str] = []
     for before, text, after in zip(("", *arguments), arguments, (*arguments[1:], ""), strict=False):
         alone = before in pairs and not _NUMBER.fullmatch(after)
         parts += text.split(",") if alone and _PAIR.fullmatch(text) else [text]
-    return [f" {part}" if part[:1] == "-" and _NUMBER.fullmatch(part) else part for part in parts]
+    values = _NUMBER, _PAIR
+    return [
+        f" {part}" if part[:1] == "-" and any(kind.fullmatch(part) for kind in values) else part
+        for part in parts
+    ]
 
 
 _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?", re.IGNORECASE)

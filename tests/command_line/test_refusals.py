@@ -378,24 +378,39 @@ def test_an_option_that_could_be_another_number_is_refused(
 ) -> None:
     assert main(["board", "-o", str(tmp_path / "ours.pdf"), "--square", "2,5"]) == 0
     assert "2.5 mm" in capsys.readouterr().out
-    with pytest.raises(SystemExit) as left:
-        main(["board", "-o", str(tmp_path / "none.pdf"), "--square", square])
-    assert left.value.code == MENDABLE
-    assert f"argument --square: {found}" in capsys.readouterr().err
+    again = "board", "-o", str(tmp_path / "none.pdf"), "--square", square
+    assert f"--square: {found}" in refusal(capsys, *again)
     assert not (tmp_path / "none.pdf").exists()
 
 
-def test_a_comma_between_values_is_told_from_one_before_decimals(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+@pytest.mark.parametrize(
+    "at",
+    [
+        ["-2.5", "3", "1.5", "-.5"],
+        ["-2,5", "3", "1,5", "-,5"],
+        ["-2.5,3", "1.5,-.5"],
+        ["-2.5", "3", "1.5,-.5"],
+    ],
+)
+def test_a_comma_between_values_is_told_from_one_before_decimals(at: list[str]) -> None:
     parser, files = build_parser(), ["a.gplcal", "press.png"]
-    arguments = ["--from", "-5,2", "--to", "-.52", "3,5"]
-    profile = parser.parse_args(["profile", *files, *arguments, "-o", "cut.csv"])
+    arguments = ["--from", "-5,2", "--to", "-.52", "3,5", "-o", "cut.csv"]
+    profile = parser.parse_args(["profile", *files, *arguments])
     assert (tuple(profile.start), tuple(profile.end)) == ((-5.0, 2.0), (-0.52, 3.5))
-    arguments = ["--tool", "scratch", "--at", "-2.5", "3", "1.5", "-.5", "--set", "width_mm=0,4"]
+    arguments = ["--tool", "scratch", "--at", *at, "--set", "width_mm=0,4"]
     parsed = parser.parse_args(["measure", *files, *arguments])
     (tool,) = parsed.command.of(parsed).tools()
     assert (tool.start_mm, tool.end_mm, tool.width_mm) == ((-2.5, 3.0), (1.5, -0.5), 0.4)
-    with pytest.raises(SystemExit):
-        parser.parse_args(["measure", *files, "--tool", "distance", "--at", "1,2", "-3,4"])
-    assert "argument --at: 1,2 could be 1.2 or 1 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "found"),
+    [
+        (["pit", "--at", "1", "2", "--size", "1,5", "2"], "1,5 2 could be 1.5 2 or 1 5 2"),
+        (["circle", "--at", "1,5", "2,5", "3", "4", "5", "6"], "could be 1.5 2.5 3 4 5 6 or 1 5"),
+    ],
+)
+def test_a_comma_that_could_be_both_is_refused(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], found: str
+) -> None:
+    assert found in refusal(capsys, "measure", "a.gplcal", "press.png", "--tool", *arguments)
