@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import locale
 import os
 import signal
 import socket
@@ -177,6 +178,8 @@ def make_application() -> QApplication:
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontCreateNativeWidgetSiblings)
     QSurfaceFormat.setDefaultFormat(surface_format())
     application = QApplication(sys.argv[:1])
+    # Qt has set the system's: C libraries would then write, and expect, a decimal comma.
+    locale.setlocale(locale.LC_NUMERIC, "C")
     application.setApplicationName(APPLICATION)
     application.setApplicationDisplayName("GelPoLight Studio")
     application.setApplicationVersion(__version__)

@@ -26,6 +26,7 @@ class Remedy(StrEnum):
     REMOVE_OPTION = marked("Remove this option")
     ONE_OF = marked("Choose one of {names}")
     TRUTH_ROW = marked("Put each image beside truth.csv, and give it one row with its true size")
+    WRITE_POINT = marked("Write decimals with a point, and nothing between thousands")
     SAVE_CSV = marked("Save it again as CSV in UTF-8")
     REPAIR_FILE = marked("Correct or restore the file, or move it away")
     COPY_AGAIN = marked("Copy the file again, or choose another one")

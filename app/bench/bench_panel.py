@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QGroupBox, QLabel, QWidget
 from app.sources.bench import FAULTS, FLAT, PRESSED, Bench, Conditions, Scene
 from app.widgets.buttons import tool_button
 from app.widgets.forms import Form
-from app.widgets.inputs import Slider, SpinBox
+from app.widgets.inputs import NumberField, Slider
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
@@ -42,8 +42,8 @@ class BenchPanel(QWidget):
         # The list shows long names in full; the box may be narrower.
         items.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         items.setMinimumContentsLength(10)
-        self._pose = named(SpinBox(), "bench.pose", tr("Pose of the checkerboard"))
-        self._pose.valueChanged.connect(lambda number: self._show_pose(number - 1))
+        self._pose = named(NumberField(), "bench.pose", tr("Pose of the checkerboard"))
+        self._pose.valueChanged.connect(lambda number: self._show_pose(int(number) - 1))
         self._pose_row = QWidget()
         hbox(
             self._pose,

@@ -31,7 +31,7 @@ from app.calibrate.setup_values import USUAL_RADIUS_MM
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from app.sources.bench import Scene
-from app.widgets.inputs import DoubleSpinBox
+from app.widgets.inputs import NumberField
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor import BACKGROUND, LENS, LIGHTS
@@ -215,9 +215,7 @@ class BallsStep(ImageStep):
 
     def build(self) -> None:
         """Create what only this step shows."""
-        self.radius = DoubleSpinBox(
-            minimum=0.1, maximum=1000.0, decimals=3, suffix=tr(" mm"), keyboardTracking=False
-        )
+        self.radius = NumberField(minimum=0.1, maximum=1000.0, decimals=3, suffix=tr(" mm"))
         named(
             self.radius,
             "calibrate.radius",
@@ -283,11 +281,11 @@ class BallsStep(ImageStep):
     @property
     def typing(self) -> bool:
         """Whether a diameter is being typed, so that the field still has the old value."""
-        return self.radius.valueFromText(self.radius.text()) != self.radius.value()
+        return self.radius.waiting
 
     def commit(self) -> None:
         """Use a typed diameter even without Enter: it belongs to the image shown now."""
-        self.radius.interpretText()
+        self.radius.take()
 
     def on_bench(self, scene: Scene) -> None:
         """Use the radius of the ball on the virtual bench."""
@@ -313,8 +311,7 @@ class BallsStep(ImageStep):
 
     def refresh(self) -> None:
         """Update to changed results, also after undo."""
-        if not self.typing:
-            self._show_radius()
+        self._show_radius()
         super().refresh()
 
     def arm(self, *, force: bool = False) -> None:

@@ -25,6 +25,7 @@ from app.context.source_button import show_settings_of_source
 from app.services.file_dialogs import ask_save
 from app.widgets.buttons import push_button
 from app.widgets.forms import Form
+from app.widgets.inputs import refusal
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.meaning import make_bold, set_property, show_meaning
@@ -62,7 +63,7 @@ class SetupForm(QScrollArea):
         hbox(None, (holder, 20), None, of=inside)
         self._title, self._task = PlainLabel(), PlainLabel(wrap=True)
         make_bold(self._title, size=1.35)
-        self.values = Form(SetupValues(), "setup", at_once=True)
+        self.values = Form(SetupValues(), "setup")
         # Rows that wrap have no height of their own in a scroll area.
         self.values.rows.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
         self.values.changed.connect(self._on_changed)
@@ -80,7 +81,7 @@ class SetupForm(QScrollArea):
         )
         vbox(*buttons, of=self._prints, margins=0, spacing=8)
         self.problem = named(PlainLabel(wrap=True), "setup.problem", tr("What is missing"))
-        self.accept = push_button("setup.accept", "", lambda: self.accepted.emit(self.stated()))
+        self.accept = push_button("setup.accept", "", self._on_accept)
         self.accept.setAccessibleName(tr("Start the calibration"))
         self.accept.setMinimumHeight(38)
         set_property(self.accept, "primary", True)
@@ -144,6 +145,12 @@ class SetupForm(QScrollArea):
         """Show why the entered values were not applied."""
         self.problem.setText(sentence)
         show_meaning(self.problem, "fail")
+
+    def _on_accept(self) -> None:
+        if fault := refusal(self):
+            self.show_problem(fault)
+        else:
+            self.accepted.emit(self.stated())
 
     def _on_changed(self, name: str, value: object) -> None:
         """Fill in what is known about a kind of sensor."""

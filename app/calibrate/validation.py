@@ -153,7 +153,7 @@ class ValidationStep(Step):
     def build(self) -> None:
         """Create the form of the pressed object and the button that records."""
         known = Truth(size_mm=5.0)
-        self.form = Form(known, "validation", at_once=True, only=ASKED, narrow=True)
+        self.form = Form(known, "validation", only=ASKED, narrow=True)
         self.calibration = named(
             PlainLabel(wrap=True), "validation.calibration", tr("Calibration to validate")
         )

@@ -8,14 +8,13 @@ from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
     QWidget,
 )
 
 from app.sources.source import Setting
-from app.widgets.inputs import ComboBox, DoubleSpinBox
+from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.session.camera_controls import CONTROLS
@@ -97,14 +96,13 @@ class ControlRows(QWidget):
         )
         return box
 
-    def _number(self, control: Setting) -> QDoubleSpinBox:
-        box = named(DoubleSpinBox(), f"camera.{control.key}", control.label)
+    def _number(self, control: Setting) -> NumberField:
         step = control.step or 0.1
-        box.setDecimals(0 if step == round(step) else 1)
+        box = NumberField(decimals=0 if step == round(step) else 1)
+        named(box, f"camera.{control.key}", control.label)
         box.setSingleStep(step)
         box.setRange(control.low, control.high)
         box.setSuffix(f" {control.unit}" if control.unit else "")
-        box.setKeyboardTracking(False)
         tip = tr("From {low:g} to {high:g} {unit}")
         tip = tip.format(low=control.low, high=control.high, unit=control.unit)
         box.setToolTip(plain_tip(tip.rstrip()))
@@ -112,10 +110,8 @@ class ControlRows(QWidget):
 
         def show(now: Setting) -> None:
             box.setEnabled(now.writable)
-            typing = box.hasFocus() and box.lineEdit().isModified()
-            if not typing:
-                with QSignalBlocker(box):
-                    box.setValue(now.value)
+            with QSignalBlocker(box):
+                box.setValue(now.value)
 
         self._show[control.key] = show
         return box

@@ -24,6 +24,7 @@ from gelpolight_core.in_place.import_session import Stated, import_session
 from gelpolight_core.in_place.preset import preset_named, presets
 from gelpolight_core.io.atomic import write_json
 from gelpolight_core.io.user import user_name
+from gelpolight_core.number import read_number
 from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.in_place.calibration import ClosedSensor
 from gelpolight_core.sensor_calibration import Calibration
@@ -155,7 +156,7 @@ def _now() -> str:
 
 def _length(text: str) -> float:
     """Return a length in mm."""
-    value = float(text)
+    value = read_number(text, tr("length in mm"))
     if not 1e-4 <= value <= 1000.0:
         raise argparse.ArgumentTypeError(tr("{text} is not a possible length").format(text=text))
     return value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 import tempfile
 import traceback
@@ -67,7 +66,7 @@ def _run(given: list[str]) -> int:
             if not file.is_file():
                 raise InputError(tr("The file does not exist"), file, Remedy.CHECK_NAME)
         return _open_desktop(given)
-    parsed = build_parser().parse_args(split_numbers(given))
+    parsed = build_parser().parse_args(given)
     if parsed.command is None:
         return _open_desktop([DEMO])
     command = parsed.command.of(parsed)
@@ -89,19 +88,6 @@ def _open_desktop(arguments: list[str]) -> int:
             Remedy.INSTALL.format(package="gelpolight-studio[gui]"),
         ) from error
     return run(arguments)
-
-
-def split_numbers(arguments: list[str]) -> list[str]:
-    """Split numbers such as ``-1,2``, which argparse would read as an option."""
-    return [
-        part
-        for argument in arguments
-        for part in (argument.split(",") if _NUMBERS.fullmatch(argument) else [argument])
-    ]
-
-
-_NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
-_NUMBERS = re.compile(f"{_NUMBER}(,{_NUMBER})+", re.IGNORECASE)
 
 
 def _open_closed_streams() -> None:

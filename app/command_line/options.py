@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,8 @@ from typing import Any, Self, get_args, get_origin, get_type_hints
 
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.atomic import refuse_unwritable
-from gelpolight_core.translation import tr
+from gelpolight_core.number import read_number
+from gelpolight_core.translation import joined, tr
 
 
 def place(metavar: str, help: str = "") -> Any:
@@ -56,15 +57,15 @@ class Command:
     """A command of the command line with its arguments."""
 
     @classmethod
-    def add_arguments(cls, parser: argparse.ArgumentParser) -> None:
-        """Add the fields to a parser."""
-        types = get_type_hints(cls)
+    def add_arguments(cls, parser: argparse.ArgumentParser) -> set[str]:
+        """Add the fields to a parser, and return the names of the options with two values."""
+        types, pairs = get_type_hints(cls), set[str]()
         alternatives: Any = None
         for f in fields(cls):
             kind, given = types[f.name], f.metadata["given"]
             if "flags" not in f.metadata:
                 optional = {"nargs": "?"} if NoneType in get_args(kind) else {}
-                parser.add_argument(f.name, **_reading(kind) | optional | given)
+                parser.add_argument(f.name, **_reading(kind, f.name) | optional | given)
                 continue
             target = parser
             if f.metadata["one_of"]:
@@ -73,7 +74,10 @@ class Command:
             elif kind is not bool and NoneType not in get_args(kind) and "default" not in given:
                 given = given | {"required": True}
             flags = f.metadata["flags"] or (f"--{f.name.replace('_', '-')}",)
-            target.add_argument(*flags, dest=f.name, **_reading(kind) | given)
+            added = target.add_argument(*flags, dest=f.name, **_reading(kind, flags[0]) | given)
+            if added.nargs == 2:
+                pairs.update(flags)
+        return pairs
 
     @classmethod
     def of(cls, parsed: argparse.Namespace) -> Self:
@@ -99,18 +103,45 @@ class Command:
             refuse_unwritable(path)
 
 
-def _reading(kind: Any) -> dict[str, Any]:
+def _reading(kind: Any, where: str) -> dict[str, Any]:
     """Return how argparse reads the values of a type."""
     if kind is bool:
         return {"action": "store_true"}
     parts = [part for part in get_args(kind) if part is not NoneType]
     if isinstance(kind, UnionType):
-        return _reading(parts[0])
+        return _reading(parts[0], where)
     if get_origin(kind) is list:
-        return {"nargs": "+", "type": parts[0]}
+        return {"nargs": "+"} | _reading(parts[0], where)
     if get_origin(kind) is tuple and Ellipsis not in parts:
-        return {"nargs": len(parts), "type": parts[0]}
-    return {"type": kind}
+        return {"nargs": len(parts)} | _reading(parts[0], where)
+    return {"type": partial(read_number, where=where) if kind is float else kind}
+
+
+def separated_values(texts: Sequence[str], counts: Container[int], where: str) -> list[float]:
+    """Return several numbers. A comma is a decimal sign, or is between two of them.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        The arguments.
+    counts : container of int
+        How many numbers there can be: this tells which of the two a comma is.
+    where : str
+        The option, for the message.
+
+    Raises
+    ------
+    InputError
+        If both are possible, or a text is not a number.
+    """
+    apart = [part for text in texts for part in text.split(",")]
+    readings = [found for found in (list(texts), apart) if len(found) in counts]
+    if len(readings) == 2 and readings[0] != readings[1]:
+        both = (" ".join(found).replace(",", ".") for found in readings)
+        found = tr("{text} could be {readings}")
+        found = found.format(text=" ".join(texts), readings=joined(tr(" or "), both))
+        raise InputError(found, where, Remedy.WRITE_POINT)
+    return [read_number(text, where) for text in (readings or [apart])[0]]
 
 
 def refuse_overwriting(results: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -39,6 +39,7 @@ class CommandParser(Parser):
     def __init__(self, *, command: str, **options: Any) -> None:
         super().__init__(**options)
         self._command = command
+        self._pairs = set[str]()
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
@@ -48,9 +49,29 @@ class CommandParser(Parser):
             module, _, name = self._command.partition(".")
             command = getattr(import_module(f"app.command_line.{module}"), name)
             self._command = ""
-            command.add_arguments(self)
+            self._pairs = command.add_arguments(self)
             self.set_defaults(command=command)
-        return super().parse_known_args(args, namespace)
+        return super().parse_known_args(separated(args or (), self._pairs), namespace)
+
+
+def separated(arguments: Sequence[str], pairs: Collection[str]) -> list[str]:
+    """Return arguments with the two values of ``--from -5,2`` apart, but not ``--square 2,5``.
+
+    A negative value gets a blank, which tells argparse that it is no option.
+    """
+    parts: list[str] = []
+    for before, text, after in zip(("", *arguments), arguments, (*arguments[1:], ""), strict=False):
+        alone = before in pairs and not _NUMBER.fullmatch(after)
+        parts += text.split(",") if alone and _PAIR.fullmatch(text) else [text]
+    values = _NUMBER, _PAIR
+    return [
+        f" {part}" if part[:1] == "-" and any(kind.fullmatch(part) for kind in values) else part
+        for part in parts
+    ]
+
+
+_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?", re.IGNORECASE)
+_PAIR = re.compile(r"[-+\d.e]+,[-+\d.e]+", re.IGNORECASE)
 
 
 def build_parser() -> argparse.ArgumentParser:

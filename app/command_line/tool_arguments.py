@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Container
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from app.command_line.options import Command, option
+from app.command_line.options import Command, option, separated_values
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.measurement.indenter_tools import AUTO
 from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.measurement.tool import POINTS, places
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
+from gelpolight_core.number import read_number
 from gelpolight_core.translation import tr
 
 
@@ -28,7 +30,7 @@ class ToolArguments(Command):
         one_of=True,
         metavar="NAME",
     )
-    at: list[float] = option(
+    at: list[str] = option(
         tr(
             "the tool's points in mm, in the order of the clicks on the Measure page; of a tool "
             "with a rectangle, its centre; with --shape, a point on the object to measure, where "
@@ -37,7 +39,7 @@ class ToolArguments(Command):
         metavar="X Y",
         default=[],
     )
-    size: list[float] = option(
+    size: list[str] = option(
         tr(
             "sides A B in mm of the area of rectangle, pit and step height; a third number is its "
             "rotation in degrees"
@@ -72,7 +74,7 @@ class ToolArguments(Command):
 
     def seed(self) -> tuple[float, float] | None:
         """Return the point on the object to measure, if one is given."""
-        points = self._points()
+        points = self._points((2,))
         if len(points) > 1:
             raise InputError(
                 tr("Number of points: {n} instead of one").format(n=len(points)),
@@ -81,21 +83,25 @@ class ToolArguments(Command):
             )
         return points[0] if points else None
 
-    def _points(self) -> list[tuple[float, float]]:
-        if len(self.at) % 2:
+    def _points(self, counts: Container[int]) -> list[tuple[float, float]]:
+        """Return the points, of so many numbers."""
+        numbers = separated_values(self.at, counts, "--at")
+        if len(numbers) % 2:
             raise InputError(
-                tr("Number of values: {n}, but each point needs two").format(n=len(self.at)),
+                tr("Number of values: {n}, but each point needs two").format(n=len(numbers)),
                 "--at",
                 Remedy.CORRECT_VALUE,
             )
-        return list(zip(self.at[::2], self.at[1::2], strict=True))
+        return list(zip(numbers[::2], numbers[1::2], strict=True))
 
     def _geometry(self, tool: str) -> dict[str, Any]:
         """Return the tool's geometry in the form of :func:`tool_from_dict`."""
         types = {field.name: str(field.type) for field in places(TOOLS[tool])}
         where = tr("Measuring tool {name}").format(name=tool)
-        points = self._points()
-        if POINTS in types.values():
+        several = POINTS in types.values()
+        points = self._points(range(6, 10_000, 2) if several else (2 * len(types),))
+        size = separated_values(self.size, (2, 3), "--size")
+        if several:
             content: dict[str, Any] = dict.fromkeys(types, points)
         else:
             if len(points) > len(types):
@@ -109,7 +115,7 @@ class ToolArguments(Command):
             content = dict(zip(types, points, strict=False))
         if "Rectangle" not in types.values():
             self._refuse("size")
-        elif len(self.size) not in (2, 3):
+        elif len(size) not in (2, 3):
             raise InputError(
                 tr("The size in mm is missing"),
                 where,
@@ -117,11 +123,12 @@ class ToolArguments(Command):
             )
         for name in content:
             if types[name] == "Rectangle":
-                a, b, yaw = (*self.size, 0.0)[:3]
+                a, b, yaw = (*size, 0.0)[:3]
                 content[name] = {"centre_mm": content[name], "sides_mm": (a, b), "yaw_deg": yaw}
+        kinds = {f.name: str(f.type) for f in fields(TOOLS[tool])}  # type: ignore[arg-type]
         for text in self.set:
             key, _, value = text.partition("=")
-            content[key] = _value(value)
+            content[key] = _value(value, kinds.get(key, ""), f"--set {key}")
         return content
 
     def _refuse(self, *names: str) -> None:
@@ -137,13 +144,14 @@ class ToolArguments(Command):
                 )
 
 
-def _value(text: str) -> Any:
-    """Return a number, several numbers, or a word."""
+def _value(text: str, kind: str, where: str) -> Any:
+    """Return the number of a field of numbers; of another one several numbers, or a word."""
+    if "float" in kind:
+        return read_number(text, where)
     try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
+        return [read_number(part, where) for part in text.split(",")]
+    except InputError:
         return text
-    return numbers[0] if len(numbers) == 1 else numbers
 
 
 def read_tools(path: Path) -> Any:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QDialogButtonBox, QSpinBox, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QWidget
 
 from app.context.context import AppContext
 from app.live.banner import SHOWN_FROM
@@ -161,12 +161,10 @@ def export_dialog(
     form.inputs["folder"].setMinimumWidth(360)
     form.show_row("part", count > 1)
     dialog = form_dialog(form, "inspect.export.dialog", tr("Export the depth"), chosen, parent)
-    first_box, last_box = (cast(QSpinBox, form.inputs[name]) for name in ("first", "last"))
-    first_box.setMaximum(last)
-    last_box.setMaximum(last)
+    form.limit("first", 1, last)
 
     def check() -> None:
-        last_box.setMinimum(form.value.first)
+        form.limit("last", form.value.first, last)
         save = dialog.buttons.button(QDialogButtonBox.StandardButton.Save)
         save.setEnabled(bool(form.value.formats))
 

@@ -173,7 +173,7 @@ class StreamDialog(Dialog):
             ),
             wrap=True,
         )
-        self.form = Form(Receivers(), "stream", at_once=True)
+        self.form = Form(Receivers(), "stream")
         self.state = named(PlainLabel(wrap=True), "stream.state", tr("State of the stream"))
         self.button = push_button(
             "stream.start", "", self._toggle, accessible=tr("Start or stop the stream")

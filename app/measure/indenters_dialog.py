@@ -35,7 +35,7 @@ class IndentersDialog(Dialog):
         self.indenters = indenters
         self._typed = list(indenters)
         self.names = named(QListWidget(), "measure.indenters.names", tr("Known objects"))
-        self.form = Form(NEW, "measure.indenters", at_once=True)
+        self.form = Form(NEW, "measure.indenters")
         self.problem = named(
             PlainLabel(wrap=True), "measure.indenters.problem", tr("Errors in the list")
         )

@@ -79,7 +79,7 @@ class Inspector(QWidget):
         self.budget = Fold("measure.budget", tr("Uncertainty budget"), self.sources)
         self.reason = named(PlainLabel(wrap=True), "measure.reason", tr("Why it is doubtful"))
         self.reference = ReferenceForm(on_reference, on_edit)
-        self.remarks = Form(Remarks(user_name()), "measure", at_once=True)
+        self.remarks = Form(Remarks(user_name()), "measure")
         self.bench = Fold("measure.bench", tr("Virtual bench"), bench)
         words = tr("Freeze the image and detect the object when a press is steady")
         self.auto = named(QCheckBox(tr("Freeze when steady")), "measure.auto", words)

@@ -35,6 +35,7 @@ from app.services.file_dialogs import ask_open, ask_save
 from app.services.jobs import Jobs
 from app.widgets.actions import action_button, icon_button, make_action, undo_actions
 from app.widgets.buttons import Slot
+from app.widgets.inputs import refusal
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError, Remedy
@@ -334,6 +335,9 @@ class PressView(QWidget):
         """Save the result of the chosen tool to the records."""
         result, heightmap = self.work.result, self.work.heightmap
         if result is None or heightmap is None or self._best is None:
+            return
+        if fault := refusal(self.inspector.reference):
+            self.context.toasts.show(fault, "warn")
             return
         record = record_of(
             result,

@@ -123,7 +123,7 @@ class ProtocolSetup(QScrollArea):
         hint = PlainLabel(tr("Click one, or several with Ctrl. Ctrl+A chooses all."), wrap=True)
         show_meaning(hint, "muted")
         top.addRow(tr("Diameter or side"), vbox(self.objects, hint, spacing=2))
-        self.presses = Form(Presses(), "protocol", at_once=True)
+        self.presses = Form(Presses(), "protocol")
         self.presses.changed.connect(lambda _name, _value: self._count())
         self.summary = named(
             PlainLabel(wrap=True), "protocol.summary", tr("Number of objects and presses, and time")

@@ -11,7 +11,7 @@ from app.measure.figures_text import UNITS
 from app.measure.state import PressState
 from app.widgets.buttons import Slot, tool_button
 from app.widgets.forms import Form
-from app.widgets.inputs import ComboBox, DoubleSpinBox
+from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.reference import LENGTHS, Truth
@@ -50,7 +50,7 @@ class ReferenceForm(QWidget):
         edit = tool_button(
             "measure.reference.edit", tr("Edit…"), on_edit, tip=tr("Edit the known objects")
         )
-        self.form = Form(Truth(""), "measure.reference", at_once=True, only=LENGTHS)
+        self.form = Form(Truth(""), "measure.reference", only=LENGTHS)
         for made in self.form.inputs.values():
             made.setMinimumWidth(LEAST_PX)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
@@ -91,7 +91,7 @@ class ReferenceForm(QWidget):
             self._offer()
         self.setEnabled(bool(state.kind))
         self.form.rename_row("size_mm", state.asked or tr("Size"))
-        if isinstance(made := self.form.inputs["size_mm"], DoubleSpinBox):
+        if isinstance(made := self.form.inputs["size_mm"], NumberField):
             made.setSuffix(UNITS.get(state.unit, f" {state.unit}"))
 
     def state(self, stated: Truth) -> None:

@@ -93,6 +93,7 @@ QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {base}; co
     selection-background-color: {highlight}; selection-color: {highlighted}; }}
 QLineEdit:focus, QAbstractSpinBox:focus, QComboBox:focus, QPlainTextEdit:focus {{
     border-color: {accent}; }}
+QAbstractSpinBox[refused="true"] {{ border-color: {fail}; color: {fail}; }}
 QLineEdit:disabled, QAbstractSpinBox:disabled, QComboBox:disabled {{ background: {window};
     color: {disabled}; }}
 QAbstractSpinBox {{ padding-right: 18px; }}

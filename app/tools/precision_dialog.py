@@ -13,7 +13,7 @@ from app.context.context import AppContext
 from app.services.file_dialogs import ask_folder
 from app.tools.work_dialog import WorkDialog
 from app.widgets.buttons import push_button
-from app.widgets.inputs import ComboBox, DoubleSpinBox
+from app.widgets.inputs import ComboBox, NumberField
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
@@ -89,10 +89,9 @@ class PrecisionDialog(WorkDialog):
         self.words.setMinimumHeight(2 * self.words.fontMetrics().lineSpacing())
         self.save.setToolTip(plain_tip(tr("Table as CSV, and figure as PNG")))
 
-    def _wish(self, name: str, label: str, suffix: str) -> DoubleSpinBox:
-        box = named(DoubleSpinBox(), f"precision.{name}", label, label)
+    def _wish(self, name: str, label: str, suffix: str) -> NumberField:
+        box = named(NumberField(decimals=1), f"precision.{name}", label, label)
         box.setRange(0.0, 10_000.0)
-        box.setDecimals(1)
         box.setSpecialValueText(tr("any"))
         box.setSuffix(suffix)
         box.valueChanged.connect(self._recommend)

@@ -7,6 +7,7 @@ from typing import Any
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPushButton, QWidget
 
+from app.widgets.inputs import refusal
 from app.widgets.layout import vbox
 from app.widgets.naming import named
 
@@ -57,3 +58,8 @@ class Dialog(QDialog):
         for button in add:
             self.buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
         vbox(*parts, self.buttons, of=self)
+
+    def accept(self) -> None:
+        """Accept what is entered, unless a number in it is refused."""
+        if not refusal(self):
+            super().accept()

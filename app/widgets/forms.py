@@ -11,7 +11,6 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialogButtonBox,
-    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QLabel,
@@ -21,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from app.theme.icons import icon
 from app.widgets.dialog import Dialog
-from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
+from app.widgets.inputs import ComboBox, NumberField, Slider
 from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox
 from app.widgets.naming import named
@@ -40,8 +39,6 @@ class Form(QWidget, Generic[V]):
         The first value.
     name : str
         Start of the object names of the inputs. The name of the field follows.
-    at_once : bool, optional
-        Whether a number counts while it is typed.
     only : tuple of str, optional
         The fields that are shown, if not all.
     narrow : bool, optional
@@ -69,12 +66,10 @@ class Form(QWidget, Generic[V]):
         value: V,
         name: str,
         *,
-        at_once: bool = False,
         only: tuple[str, ...] = (),
         narrow: bool = False,
     ) -> None:
         super().__init__()
-        self._at_once = at_once
         self.inputs: dict[str, QWidget] = {}
         self._show: dict[str, Callable[[Any], object]] = {}
         self._when: dict[str, When] = {}
@@ -113,7 +108,7 @@ class Form(QWidget, Generic[V]):
     def limit(self, name: str, low: float, high: float) -> None:
         """Change the range of a number without a signal."""
         made = self.inputs[name]
-        assert isinstance(made, QDoubleSpinBox)
+        assert isinstance(made, NumberField)
         with QSignalBlocker(made):
             made.setRange(low, high)
 
@@ -167,15 +162,12 @@ class Form(QWidget, Generic[V]):
                 bar.valueChanged.connect(lambda v: change(v / scale))
                 self._show[name] = lambda v: bar.setValue(round(scale * v))
                 return bar
-            spin = SpinBox() if isinstance(f.default, int) else DoubleSpinBox()
-            if isinstance(spin, DoubleSpinBox):
-                spin.setDecimals(meta["decimals"])
+            spin, whole = NumberField(decimals=meta["decimals"]), isinstance(f.default, int)
             spin.setRange(low, high)
             spin.setSingleStep(meta["step"])
             spin.setSuffix(meta["unit"])
             spin.setSpecialValueText(meta["none"])
-            spin.setKeyboardTracking(self._at_once)
-            spin.valueChanged.connect(change)
+            spin.valueChanged.connect(lambda v: change(int(v) if whole else v))
             self._show[name] = spin.setValue
             return spin
         if isinstance(f.default, bool):

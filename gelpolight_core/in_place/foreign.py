@@ -18,6 +18,7 @@ from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.io.npy import read_arrays
 from gelpolight_core.io.reading import brief, parse_json, read_file
 from gelpolight_core.io.table import read_csv
+from gelpolight_core.number import read_number
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.translation import tr
 
@@ -152,7 +153,7 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
     presses = []
     for number, row in read_csv(table, TABLE_LIMIT):
         where = f"{table}, {tr('line {n}').format(n=number)}"
-        if number == 1 and len(row) == 4 and not _is_number(row[1]):
+        if number == 1 and len(row) == 4 and not row[1][:1].isdecimal():
             continue
         if len(row) != 4:
             needed = tr("The line has {n} values, not image, x, y and radius")
@@ -215,20 +216,9 @@ def _if_there(path: Path) -> Path | None:
     return path if path.is_file() else None
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 def _number(value: object, where: str, low: float, high: float) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        number = math.nan
-    if not low <= number <= high:
+    number = read_number(value, where) if isinstance(value, str) else value
+    if not isinstance(number, int | float) or not low <= number <= high:
         found = tr("{value} is not a number from {low:g} to {high:g}")
         raise _wrong_line(found.format(value=brief(value, 40), low=low, high=high), where)
-    return number
+    return float(number)

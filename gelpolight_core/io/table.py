@@ -29,22 +29,39 @@ def csv_of(rows: Sequence[Mapping[str, object]]) -> str:
 def read_csv(path: Path, limit: int = TEXT_LIMIT) -> list[tuple[int, list[str]]]:
     """Return the lines of a CSV file that are not empty, each with its number.
 
+    Cells are separated by commas; by semicolons if the first line has some and no comma, as in
+    tables of spreadsheets that write decimals with a comma.
+
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     InputError
-        If it is not a table in UTF-8, or is larger than `limit` bytes.
+        If it is not a table in UTF-8, is larger than `limit` bytes, or a line has more cells than
+        the first one.
     """
     try:
         text = read_file(path, limit).decode("utf-8-sig")
         if "\0" in text:  # no name of a file contains it
             raise csv.Error("line contains NUL")
-        reader = csv.reader(text.splitlines(), skipinitialspace=True)
-        return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+        lines = text.splitlines()
+        first = next(filter(str.strip, lines), "")
+        sign = ";" if ";" in first and "," not in first else ","
+        reader = csv.reader(lines, delimiter=sign, skipinitialspace=True)
+        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(
             tr("the file is not a table ({error})").format(error=brief(str(error), 200)),
             path,
             Remedy.SAVE_CSV,
         ) from error
+    for line, row in rows:
+        if any(cell.strip() for cell in row[len(rows[0][1]) :]):
+            raise InputError(
+                tr("the line has {n} cells, the table has {columns} columns").format(
+                    n=len(row), columns=len(rows[0][1])
+                ),
+                tr("{path}, line {line}").format(path=path, line=line),
+                Remedy.WRITE_POINT,
+            )
+    return rows

@@ -14,6 +14,7 @@ from gelpolight_core.io.reading import brief, is_file_name
 from gelpolight_core.io.table import read_csv
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.number import read_number
 from gelpolight_core.quantity import COVERAGE, TOLERANCE_PERCENT, Quantity, percent_error
 from gelpolight_core.reference import RANGE_MM, Truth, checked_day
 from gelpolight_core.session.session import (
@@ -232,7 +233,7 @@ def _completed(
 
 
 def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
-    size = "side" if shape == "cuboid" else "diameter"
+    size, other = ("side", "diameter") if shape == "cuboid" else ("diameter", "side")
 
     def optional(key: str) -> float:
         return _length(record, key, where, 0.0) if record.get(key) else 0.0
@@ -249,6 +250,10 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
         due=checked_day(record.get("due", ""), where),
         serial=record.get("serial", ""),
     )
+    if text := record.get(f"{other}_mm"):
+        found = tr("{key} is '{text}', which is no size of a {shape}")
+        found = found.format(key=f"{other}_mm", text=brief(text), shape=shape)
+        raise InputError(found, where, Remedy.WRITE_POINT)
     names = record.get("region", ""), record.get("repeat", "")
     if not record.get("position_sd_mm"):
         return Press(file, truth, *names)
@@ -260,10 +265,7 @@ def _press(file: str, shape: str, record: dict[str, str], where: str) -> Press:
 
 def _length(record: dict[str, str], key: str, where: str, least_mm: float = SHORTEST_MM) -> float:
     text = record.get(key, "")
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = read_number(text, f"{where}, {key}") if text else math.nan
     if least_mm <= value <= LONGEST_MM:
         return value
     found = tr("{key} is '{text}'") if text else tr("{key} is empty")

@@ -129,7 +129,7 @@ def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
         (["--tool", "edge-radius", "--at", "1,2", "3,4", "--set", "level_mm=1"], "level_mm"),
         (
             ["--tool", "edge-radius", "--at", "1,2", "3,4", "--set", "width_mm=wide"],
-            "width_mm has the invalid value wide",
+            "width_mm: 'wide' is not a number",
         ),
         (["--tool", "circle", "--at", "1", "2", "3", "4", "5", "7", "--size", "3"], "--size"),
         (["--tool", "profile-step", "--at", "1,2", "3,4", "--set", "first_mm=1,2"], "second_mm"),

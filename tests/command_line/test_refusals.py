@@ -19,6 +19,7 @@ from one_line import refusal
 from app.command_line import calibrate
 from app.command_line import main as main_module
 from app.command_line.main import MENDABLE, OUR_FAULT, main
+from app.command_line.parser import build_parser
 from gelpolight_core.errors import InputError, Remedy
 from gelpolight_core.image.file import files_in
 from gelpolight_core.session.decisions import Decisions, write_decisions
@@ -295,3 +296,50 @@ def test_a_folder_that_may_not_be_read_is_not_called_empty(
     with pytest.raises(InputError) as refused:
         files_in(tmp_path / "in")
     assert (refused.value.where, refused.value.advice) == (str(tmp_path / "in"), Remedy.MAY_READ)
+
+
+@pytest.mark.parametrize(
+    ("square", "found"),
+    [("1.002,5", "1.002,5 could be 1002.5"), ("2.5.1", "'2.5.1' is not a number")],
+)
+def test_an_option_that_could_be_another_number_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], square: str, found: str
+) -> None:
+    assert main(["board", "-o", str(tmp_path / "ours.pdf"), "--square", "2,5"]) == 0
+    assert "2.5 mm" in capsys.readouterr().out
+    again = "board", "-o", str(tmp_path / "none.pdf"), "--square", square
+    assert f"--square: {found}" in refusal(capsys, *again)
+    assert not (tmp_path / "none.pdf").exists()
+
+
+@pytest.mark.parametrize(
+    "at",
+    [
+        ["-2.5", "3", "1.5", "-.5"],
+        ["-2,5", "3", "1,5", "-,5"],
+        ["-2.5,3", "1.5,-.5"],
+        ["-2.5", "3", "1.5,-.5"],
+    ],
+)
+def test_a_comma_between_values_is_told_from_one_before_decimals(at: list[str]) -> None:
+    parser, files = build_parser(), ["a.gplcal", "press.png"]
+    arguments = ["--from", "-5,2", "--to", "-.52", "3,5", "-o", "cut.csv"]
+    profile = parser.parse_args(["profile", *files, *arguments])
+    assert (tuple(profile.start), tuple(profile.end)) == ((-5.0, 2.0), (-0.52, 3.5))
+    arguments = ["--tool", "scratch", "--at", *at, "--set", "width_mm=0,4"]
+    parsed = parser.parse_args(["measure", *files, *arguments])
+    (tool,) = parsed.command.of(parsed).tools()
+    assert (tool.start_mm, tool.end_mm, tool.width_mm) == ((-2.5, 3.0), (1.5, -0.5), 0.4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "found"),
+    [
+        (["pit", "--at", "1", "2", "--size", "1,5", "2"], "1,5 2 could be 1.5 2 or 1 5 2"),
+        (["circle", "--at", "1,5", "2,5", "3", "4", "5", "6"], "could be 1.5 2.5 3 4 5 6 or 1 5"),
+    ],
+)
+def test_a_comma_that_could_be_both_is_refused(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], found: str
+) -> None:
+    assert found in refusal(capsys, "measure", "a.gplcal", "press.png", "--tool", *arguments)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 from chapter import DOCS
 
-from app.command_line.main import build_parser, split_numbers
+from app.command_line.main import build_parser
 
 
 def commands() -> Iterator[tuple[str, str]]:
@@ -29,6 +29,6 @@ def test_a_command_of_the_documentation_is_understood(
     """Options are renamed; what people copy has to follow."""
     arguments = shlex.split(command, comments=True)
     try:
-        build_parser().parse_args(split_numbers(arguments))
+        build_parser().parse_args(arguments)
     except SystemExit as end:
         pytest.fail(f"{chapter}: gelpolight {command}\n{end.code} {capsys.readouterr().err}")

@@ -153,7 +153,11 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
     [
         ("file,shape\na.png,ball\n", "column height_mm, diameter_mm is missing"),
         (HEADER + "a.png,ball,,,1\n", "line 2: diameter_mm is empty"),
-        (HEADER + "a.png,ball,nan,,1\n", "diameter_mm is 'nan'"),
+        (HEADER + "a.png,ball,nan,,1\n", "diameter_mm: 'nan' is not a number"),
+        (HEADER + "a.png,cylinder,5,002,1,0\n", "line 2: the line has 6 cells, the table has 5"),
+        (HEADER + "a.png,cylinder,5,002,1\n", "side_mm is '002', which is no size of a cylinder"),
+        ("file,shape,diameter_mm,height_mm\na.png,ball,5,002\n", "height_mm: '002' is not a num"),
+        (HEADER.replace(",", ";") + "a.png;ball;1.234,5;;1\n", "1.234,5 could be 1234.5"),
         (HEADER + "a.png,ball,6,,-1\n", "height_mm is '-1'"),
         (HEADER + "a.png,ball,6,,1\n\na.png,ball,6,,1\n", "line 4: a.png is listed twice"),
         (HEADER + ",ball,6,,1\n", "names no file"),
@@ -167,6 +171,19 @@ def test_a_truth_file_that_cannot_be_used_says_where_and_why(
     (tmp_path / "truth.csv").write_text(text)
     with pytest.raises(InputError, match=message):
         read_truth(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "file;shape;diameter_mm;height_mm;;\na.png;cylinder;5,002;1,0;;\n",
+        'file,shape,diameter_mm,height_mm\na.png,cylinder,"5,002",1.0\n',
+    ],
+)
+def test_a_decimal_comma_is_read_where_commas_separate_no_cells(tmp_path: Path, text: str) -> None:
+    (tmp_path / "truth.csv").write_text(text)
+    (row,) = read_truth(tmp_path).rows
+    assert (row.truth.size_mm, row.truth.height_mm) == (5.002, 1.0)
 
 
 def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet() -> None:

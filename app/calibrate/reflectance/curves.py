@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QTableWidget,
     QTableWidgetItem,
+    QToolTip,
     QWidget,
 )
 
@@ -23,8 +24,9 @@ from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_model import Curve, CurveSet
 from app.calibrate.reflectance.lut_plot import CurvePlot, Preview
 from app.services.jobs import Job
+from app.theme import theme
 from app.widgets.buttons import push_button
-from app.widgets.label import PlainLabel
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.naming import named
 from gelpolight_core.calibration.ball_stage import BALLS, REFLECTANCE
@@ -34,6 +36,8 @@ from gelpolight_core.calibration.recipes import JOINT, PAPER
 from gelpolight_core.calibration.scatter import ReflectanceScatter, gather_scatter
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.channels import CHANNEL_KEYS, channel_name
+from gelpolight_core.errors import InputError, Remedy
+from gelpolight_core.number import read_number
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.decisions import Point
 from gelpolight_core.translation import tr
@@ -219,6 +223,8 @@ class LutEditor(QWidget):
             item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             self.nodes.setItem(row, column, item)
         item.setText(f"{number:.4f}")
+        item.setData(Qt.ItemDataRole.ForegroundRole, None)
+        item.setToolTip("")
 
     def _apply(self, text: str, edit: Callable[[Curve], Curve]) -> None:
         self.chosen = None
@@ -242,10 +248,21 @@ class LutEditor(QWidget):
 
     def _on_typed(self, row: int, column: int) -> None:
         point, item = list(self.curve.points[row]), self.nodes.item(row, column)
+        head = self.nodes.horizontalHeaderItem(column)
+        assert item is not None and head is not None
         try:
-            point[column] = float("" if item is None else item.text().replace(",", "."))
-        except ValueError:
-            self._refresh()
+            point[column] = read_number(item.text(), head.text(), decimals=4)
+            nearest = model.move_node(self.curve, row, *point).points[row][column]
+            if abs(nearest - point[column]) > 1e-9:
+                found = tr("{value} is not possible there, {nearest:.4f} is")
+                found = found.format(value=item.text(), nearest=nearest)
+                raise InputError(found, head.text(), Remedy.CORRECT_VALUE)
+        except InputError as error:
+            with QSignalBlocker(self.nodes):
+                item.setForeground(theme.colour("fail"))
+                item.setToolTip(plain_tip(str(error)))
+            at = self.nodes.visualItemRect(item).bottomLeft()
+            QToolTip.showText(self.nodes.viewport().mapToGlobal(at), item.toolTip(), self.nodes)
             return
         self._on_moved(row, point[0], point[1], True)
 

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QScrollArea, QVBoxLayout, QW
 from pytestqt.qtbot import QtBot
 
 import app
-from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
+from app.widgets.inputs import ComboBox, NumberField, Slider
 
 INPUTS = {"QSpinBox", "QDoubleSpinBox", "QComboBox", "QSlider", "QDial"}
 
@@ -33,11 +33,11 @@ def turn_wheel(widget: QWidget) -> None:
     QApplication.processEvents()
 
 
-@pytest.mark.parametrize("make", [SpinBox, DoubleSpinBox, combo_box, Slider])
+@pytest.mark.parametrize("make", [NumberField, combo_box, Slider])
 def test_only_the_focused_input_follows_the_wheel(
     qtbot: QtBot, make: Callable[[], QWidget]
 ) -> None:
-    panel, content, other, box = QScrollArea(), QWidget(), SpinBox(), make()
+    panel, content, other, box = QScrollArea(), QWidget(), NumberField(), make()
     qtbot.addWidget(panel)
     layout = QVBoxLayout(content)
     for widget in (other, box, *(QLabel("text") for _ in range(60))):

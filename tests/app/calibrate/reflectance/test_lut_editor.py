@@ -124,17 +124,19 @@ def test_a_double_click_on_the_curve_adds_a_node_there(editor: LutEditor) -> Non
     assert editor.curve.cosines[4] == pytest.approx(cosine, abs=0.01)
 
 
-def test_a_typed_value_moves_the_node_as_far_as_its_neighbours_allow(editor: LutEditor) -> None:
+def test_a_typed_value_moves_the_node_or_is_refused_in_words(editor: LutEditor) -> None:
     before = editor.curve
     value = 0.5 * (before.values[3] + before.values[4])
     editor.nodes.item(3, 1).setText(f"{value:.4f}".replace(".", ","))
     assert editor.curve.values[3] == pytest.approx(value, abs=1e-4)
-    editor.nodes.item(3, 1).setText("9")
-    assert editor.curve.values[3] < before.values[4]
     moved = editor.curve
-    editor.nodes.item(3, 1).setText("high")
-    assert editor.curve == moved
-    assert editor.nodes.item(3, 1).text() == f"{moved.values[3]:.4f}"
+    for refused in ("9", "high", "1,234.5"):
+        editor.nodes.item(3, 1).setText(refused)
+        assert editor.curve == moved
+        assert editor.nodes.item(3, 1).text() == refused
+        assert refused in editor.nodes.item(3, 1).toolTip()
+    editor.nodes.item(3, 1).setText(f"{value:.4f}")
+    assert not editor.nodes.item(3, 1).toolTip()
 
 
 @pytest.mark.parametrize("name", ["thin", "smooth", "reset"])
