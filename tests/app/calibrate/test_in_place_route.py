@@ -93,13 +93,6 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert technician.state("validation") == "pass"
 
 
-def test_too_few_presses_are_not_a_failure(
-    technician: Technician, small_session: Path, tmp_path: Path
-) -> None:
-    technician.begin(closed_project(small_session, tmp_path, balls=2), "balls")
-    assert technician.state("balls") == "begun"
-
-
 def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
     technician: Technician, small_session: Path, tmp_path: Path
 ) -> None:
@@ -128,6 +121,7 @@ def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician.page.context.source.choose_virtual_sensor()
     project = closed_project(small_session, tmp_path, balls=1)
     technician.begin(project, "background")
+    assert technician.state("balls") == "begun", "too few presses are not a failure"
     technician.until(lambda: technician.wizard.model.page.shown)
     technician.wizard.go_to("balls")
     assert technician.wizard.model.page.shown == project.session.found("balls")[0].name
@@ -135,13 +129,7 @@ def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician.until(lambda: technician.see("calibrate.capture").isEnabled())
     technician.click("calibrate.capture")
     assert "belongs to sensor c" in technician.see("calibrate.notice").text()
-
-
-def test_a_session_from_files_shows_its_own_images_beside_a_sensor_of_its_serial(
-    technician: Technician, small_session: Path, tmp_path: Path
-) -> None:
-    technician.page.context.source.choose_virtual_sensor()
-    project = closed_project(small_session, tmp_path, balls=1)
+    # Also beside a sensor of its serial the session shows its own images.
     description = project.session.folder / "session.toml"
     text = description.read_text("utf-8").replace('"c"', f'"{SensorDesign().serial}"')
     description.write_text(text, "utf-8")
@@ -222,29 +210,6 @@ def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> Project:
         radius_mm = source.ball_radius_mm(path.name)
         project.import_files("balls", [path], radius_mm=radius_mm)
     return project
-
-
-def test_a_change_makes_the_calibration_outdated_and_undo_restores_it(
-    small_session: Path, tmp_path: Path
-) -> None:
-    project = closed_project(small_session, tmp_path, balls=4)
-    for stage in project.stale():
-        project.compute(stage)
-    assert project.stale() == ()
-    made = project.finish().calibration
-    assert made.provenance.inputs == project.all_inputs
-    name = project.session.found("balls")[0].name
-    project.exclude("balls", name)
-    assert project.stale() == ("balls",)
-    project.exclude("balls", name, False)
-    assert project.stale() == ()
-    session = project.session
-    twice = InPlace((2.0 * MM_PER_PX, 2.0 * MM_PER_PX))
-    project.describe(replace(session, in_place=twice))
-    assert project.stale() == ("balls",)
-    kept = read_session(session.folder)
-    assert kept.in_place == twice
-    assert kept.ball_radii_mm == session.ball_radii_mm
 
 
 def test_a_preset_fills_in_the_scale_and_its_uncertainty(context: AppContext, qtbot: QtBot) -> None:

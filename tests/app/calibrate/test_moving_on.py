@@ -29,16 +29,6 @@ def automatic(context: AppContext, technician: Technician, monkeypatch: pytest.M
     context.settings.prefer(captures_automatically=True)
 
 
-def test_it_is_on_for_a_new_user_and_remembers_a_change(
-    technician: Technician, context: AppContext, computed_project: Made, tmp_path: Path
-) -> None:
-    assert Settings(tmp_path / "new.ini").preferences.captures_automatically
-    technician.begin(computed_project(), "lights")
-    assert not technician.wizard.panel.automatic.isChecked()
-    technician.wizard.panel.automatic.trigger()
-    assert context.settings.preferences.captures_automatically
-
-
 def test_a_completed_step_leads_to_the_next_one_that_needs_the_user_and_back(
     automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
     small_session: Path,
@@ -108,7 +98,7 @@ def test_any_action_stops_the_countdown_and_a_moving_mouse_delays_it(
 
 
 def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
-    technician: Technician, computed_project: Made
+    technician: Technician, context: AppContext, computed_project: Made, tmp_path: Path
 ) -> None:
     project = computed_project()
     for path in project.session.found("mirror"):
@@ -121,6 +111,11 @@ def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
     technician.wizard.model.changed.emit()
     technician.click("calibrate.next")
     assert technician.wizard.open.key == "radiance"
+    # Automatic captures are on for a new user, and the change is remembered.
+    assert Settings(tmp_path / "new.ini").preferences.captures_automatically
+    assert not technician.wizard.panel.automatic.isChecked()
+    technician.wizard.panel.automatic.trigger()
+    assert context.settings.preferences.captures_automatically
     technician.rest()
 
 

@@ -20,7 +20,7 @@ from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session, read_session
 
 FIRST_SEED = int(os.environ.get("GELPOLIGHT_KILL_SEED", "0"))
-KILLS = int(os.environ.get("GELPOLIGHT_KILLS", "5"))
+KILLS = int(os.environ.get("GELPOLIGHT_KILLS", "2"))
 LONGEST_S = 0.8
 HERE = Path(__file__).parent
 

@@ -40,10 +40,7 @@ def live(
     page: InspectPage, small_session: Path, small_calibration: Calibration, context: AppContext
 ) -> InspectPage:
     """Return the page with a folder of images as the camera."""
-    from app.sources.listing import image_folder
-
-    info = image_folder(small_session / "balls")
-    context.source.choose(info)
+    context.source.choose_folder(small_session / "balls")
     page.enter()
     reconstructor = Reconstructor(small_calibration, model="paper")
     page.live_depth.load(reconstructor, reconstructor)

@@ -50,11 +50,8 @@ def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
     press = Press("p.png", Truth(shape, 4.0, height_mm=1.0), "r01", "1", (3.0, -2.0), 30.0)
     target = make_target(press, calibration)
     seen = np.vstack([target.outline_px, [target.centre_px]])
-    back, _ = camera_to_membrane(
-        calibration.data.camera.directions(seen),
-        calibration.data.plane,
-        calibration.data.stack,
-    )
+    data = calibration.data
+    back, _ = camera_to_membrane(data.camera.directions(seen), data.plane, data.stack)
     away = np.linalg.norm(back - np.array(press.position_mm), axis=1)
     assert away[-1] == pytest.approx(0.0, abs=1e-6)
     assert away[:-1].min() == pytest.approx(2.0, abs=1e-3)
@@ -166,30 +163,6 @@ def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
     camera.press(None)
 
 
-def test_the_number_of_presses_is_shown_before_the_start(view: ProtocolView, qtbot: QtBot) -> None:
-    assert "Objects: 18. Presses: 540" in view.setup.summary.text()
-    choose(view, qtbot, repeats=2, regions=3)
-    assert "Objects: 1. Presses: 5" in view.setup.summary.text()
-    choose(view, qtbot, repeats=0)
-    assert not view.setup.begin.isEnabled()
-
-
-def test_a_membrane_with_an_object_on_it_is_not_accepted_as_bare(
-    view: ProtocolView, camera: SceneCamera, context: AppContext, qtbot: QtBot
-) -> None:
-    choose(view, qtbot, repeats=1, regions=1)
-    camera.press((0.0, 0.0))
-    panel = begin(view, qtbot)
-    panel.bare.click()
-    qtbot.waitUntil(lambda: bool(context.toasts.history), timeout=WAIT_MS)
-    assert "Something presses on the membrane" in context.toasts.history[-1].finding.text
-    assert not panel.capture.isEnabled()
-    camera.press(None)
-    qtbot.wait(100)  # the frames with the object have passed
-    take_bare(panel, qtbot)
-    assert panel.bare.isVisible()  # if that was wrong after all, it can be done again
-
-
 def test_presses_are_captured_automatically_continued_and_reported(
     view: ProtocolView,
     camera: SceneCamera,
@@ -249,12 +222,35 @@ def test_presses_are_captured_automatically_continued_and_reported(
         assert (tmp_path / "out" / name).read_bytes() == on_screen
 
 
-def test_an_unsteady_press_is_refused_with_its_reason_and_requested_again(
-    view: ProtocolView, camera: SceneCamera, qtbot: QtBot
+def test_what_cannot_be_used_is_refused_with_its_reason_and_requested_again(
+    view: ProtocolView, camera: SceneCamera, context: AppContext, qtbot: QtBot
 ) -> None:
+    assert "Objects: 18. Presses: 540" in view.setup.summary.text()
+    choose(view, qtbot, repeats=0)
+    assert not view.setup.begin.isEnabled()
     choose(view, qtbot, repeats=2)
+    assert "Objects: 1. Presses: 2" in view.setup.summary.text()
+
+    # A camera of another size, and a membrane with an object on it.
+    camera.cropped = True
     panel = begin(view, qtbot)
+    panel.bare.click()
+    sizes = "160x240", "320x240"
+    qtbot.waitUntil(lambda: all(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
+    assert not panel.capture.isEnabled()
+    camera.press((0.0, 0.0))
+    camera.cropped = False
+    qtbot.waitUntil(lambda: not any(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
+    panel.bare.click()
+    qtbot.waitUntil(lambda: bool(context.toasts.history), timeout=WAIT_MS)
+    assert "Something presses on the membrane" in context.toasts.history[-1].finding.text
+    assert not panel.capture.isEnabled()
+    camera.press(None)
+    qtbot.wait(100)  # the frames with the object have passed
     take_bare(panel, qtbot)
+    assert panel.bare.isVisible()  # if that was wrong after all, it can be done again
+
+    # An unsteady press.
     run = view.run.work.run
     wait_until_asked(view, qtbot)
     camera.shaking = True
@@ -273,15 +269,3 @@ def test_an_unsteady_press_is_refused_with_its_reason_and_requested_again(
     panel.take_back.click()
     assert run.progress.done == 0
     assert len(list((run.folder / "discarded").iterdir())) == 1
-
-
-def test_a_camera_of_another_size_is_refused_before_anything_is_pressed(
-    view: ProtocolView, camera: SceneCamera, qtbot: QtBot
-) -> None:
-    choose(view, qtbot, repeats=1)
-    camera.cropped = True
-    panel = begin(view, qtbot)
-    panel.bare.click()
-    sizes = "160x240", "320x240"
-    qtbot.waitUntil(lambda: all(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
-    assert not panel.capture.isEnabled()

@@ -116,16 +116,3 @@ def test_export_offers_what_the_visible_page_can_export(window: MainWindow) -> N
     window.show_page("bare")
     (nothing,) = _entries(window.menus.file.exports).values()
     assert not nothing.isEnabled()
-
-
-def test_the_real_pages_offer_their_exports(context: AppContext, qtbot: QtBot) -> None:
-    window = MainWindow(context=context)
-    qtbot.addWidget(window)
-    names = {}
-    for name in ("sensors", "measure"):
-        names[name] = {action.objectName() for action in window.page(name).export_actions()}
-    assert names == {
-        "sensors": {"sensors.report"},
-        "measure": {"measure.certify", "records.export"},
-    }
-    window.close()
