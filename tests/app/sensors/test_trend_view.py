@@ -46,12 +46,7 @@ def test_the_drift_of_an_led_is_drawn_and_named_with_its_day(qtbot: QtBot) -> No
     drawn = view.chart.shown[0]
     assert np.allclose(drawn.times_s, DAY_S * red.days) and np.allclose(drawn.values, red.values)
     assert drawn.limit == LED_PERCENT
-
-
-def test_other_values_are_chosen_and_a_sensor_without_any_says_so(qtbot: QtBot) -> None:
-    view = TrendView()
-    qtbot.addWidget(view)
-    view.show_trend(samples(0.0), "C-1", (5.0, 8.0))
+    # Other values are chosen, and a sensor without any says so.
     view.group.setCurrentIndex(1)
     assert [course.followed.key for course in view.shown] == ["shift_u", "shift_v"]
     view.group.setCurrentIndex(3)
