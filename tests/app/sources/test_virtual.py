@@ -43,27 +43,18 @@ def source(bench: Bench) -> Iterator[VirtualSource]:
     source.close()
 
 
-@pytest.mark.parametrize("item", ITEMS)
-def test_without_noise_each_state_equals_the_virtual_sensor_image(
-    source: VirtualSource, item: str
-) -> None:
+def test_without_noise_each_state_equals_the_virtual_sensor_image(source: VirtualSource) -> None:
     bench = source.bench
     bench.adjust(noise=0.0)
-    bench.lay(item)
-    bench.arrange(size_mm=3.0)
-    got = settled(source)
     sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
-    expected = sensor.frame(state_of(bench, bench.design, bench.scene))
-    # The source keeps float32: values half-way between two counts may be rounded the other way.
-    away = np.abs(got.rgb.astype(int) - expected)
-    assert away.max() <= 1 and away.mean() < 1e-4
-
-
-def test_a_stage_shows_the_images_of_a_simulated_session(source: VirtualSource) -> None:
-    bench = source.bench
-    bench.adjust(noise=0.0)
-    bench.show("whiteboard")
-    sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
+    for item in ITEMS:
+        bench.lay(item)
+        bench.arrange(size_mm=3.0)
+        expected = sensor.frame(state_of(bench, bench.design, bench.scene))
+        # The source keeps float32: values half-way between two counts may be rounded another way.
+        away = np.abs(settled(source).rgb.astype(int) - expected)
+        assert away.max() <= 1 and away.mean() < 1e-4, item
+    bench.show("whiteboard")  # as in a simulated session
     assert np.array_equal(settled(source).rgb, sensor.frame(Whiteboard()))
 
 
